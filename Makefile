@@ -1,0 +1,71 @@
+# Sets up .venv by itself with what a target needs; no ROS on the machine is required.
+.DEFAULT_GOAL := help
+
+BIN := .venv/bin
+PACKAGING := setup.py setup.cfg pyproject.toml
+PYTHON ?=
+SUPPORTED := import sys, ensurepip, venv; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+# .venv has its own ROS: a sourced one, or another environment's, would be mixed into it.
+ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
+unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
+endif
+
+.PHONY: help venv demo test bench format clean distclean
+
+help: ## Show this list
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
+	@echo "PYTHON=... chooses the interpreter of a new .venv (3.11 or 3.12)."
+
+venv: .venv/.installed ## Set up .venv
+
+demo: .venv/.installed ## Let the humanoid walk for 20 s and record it in runs/demo
+	$(BIN)/actuated_characters run --character humanoid --clip walk --duration 20 --output runs/demo --overwrite
+
+test: .venv/.installed-test ## Check style and types, run the tests
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/python -m pytest
+
+bench: .venv/.installed ## Measure speed
+	$(BIN)/python -m benchmarks
+
+format: .venv/.installed-test ## Format the code and fix what can be fixed
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+clean: ## Remove caches and builds
+	rm -rf build dist install log *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find . -path ./.venv -prune -o -name __pycache__ -type d -exec rm -rf {} +
+
+distclean: clean ## Remove .venv too
+	rm -rf .venv
+
+.venv/.created:
+	@found=; for python in $(or $(PYTHON),python3.11 python3.12 python3); do \
+	    if $$python -c '$(SUPPORTED)' 2>/dev/null; then found=$$python; break; fi; \
+	done; \
+	if [ -z "$$found" ]; then \
+	    echo "error: $(if $(PYTHON),PYTHON=$(PYTHON) is not,found no) Python 3.11 or 3.12 with venv; say which: make PYTHON=/path/to/python3.11" >&2; \
+	    exit 1; \
+	fi; \
+	version=$$($$found -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+	if [ $$version = 3.12 ]; then time="some minutes: pip compiles PyBullet"; else time="about a minute"; fi; \
+	echo "setting up .venv with Python $$version ($$time) ..."; \
+	$$found -m venv --clear .venv
+	@touch $@
+
+.venv/.installed: $(PACKAGING) | .venv/.created
+	@echo "installing the package into .venv ..."
+	@$(BIN)/python -m pip install -qq -e '.[wheels]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
+	@touch $@
+
+.venv/.installed-test: $(PACKAGING) | .venv/.created
+	@echo "installing the package and its test tools into .venv ..."
+	@$(BIN)/python -m pip install -qq -e '.[wheels,test]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
+	@touch .venv/.installed $@
+
+PIP_FAILED := error: pip failed. It needs the network, and the wheels of ROS 2 are for Linux on x86-64 only.

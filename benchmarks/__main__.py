@@ -1,0 +1,65 @@
+"""`make bench`: what lockstep over topics costs, everything measured in one run."""
+
+import os
+import sys
+
+from msgs_config.process import limit_threads
+
+limit_threads()
+
+import numpy as np  # noqa: E402 - after the limit on threads
+from rich.console import Console  # noqa: E402
+from rich.table import Table  # noqa: E402
+
+from benchmarks.closed_loop import in_process, over_topics  # noqa: E402
+from benchmarks.round_trip import round_trips  # noqa: E402
+from experiment.domain import own_domain  # noqa: E402
+from experiment.plan import Plan, make_plan  # noqa: E402
+
+_ROUND_TRIPS = 5000
+_DURATION = 20.0  # s of simulated time
+_REFERENCES: dict[str, dict[str, object]] = {
+    "pendulum": {"reference": "hold"},
+    "humanoid": {"reference": "clip", "clip": "walk"},
+}
+
+
+def main() -> int:
+    """Measure and print the table."""
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    table = Table(title="lockstep, one tick (µs)", title_justify="left")
+    for column in ("", "p50", "p99", "ticks/s", "real-time factor"):
+        table.add_column(column, justify="right" if column else "left")
+    ratios = []
+    with own_domain() as domain:
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        for name, reference in _REFERENCES.items():
+            plan = make_plan(name, _DURATION, reference, {}, {})
+            ratios.append(f"{name}: ((c) - (b)) / (a) = {_measure(plan, table):.2f}")
+    console = Console()
+    console.print(table)
+    for ratio in ratios:
+        console.print(ratio)
+    return 0
+
+
+def _measure(plan: Plan, table: Table) -> float:
+    """Add the rows of one character; returns the ratio of the medians."""
+    name, rate = plan.character.name, plan.simulator.integer("rate")
+    bare = 1e6 * round_trips(plan.character.layout, _ROUND_TRIPS)
+    joined = 1e6 * in_process(plan)
+    topics = over_topics(plan)
+    rows = {
+        "(a) bare round trip": (*np.percentile(bare, (50, 99)), 1e6 / bare.mean()),
+        "(b) in one process": (*np.percentile(joined, (50, 99)), 1e6 / joined.mean()),
+        "(c) over topics": (topics["tick_us_p50"], topics["tick_us_p99"], topics["ticks_per_s"]),
+    }
+    for label, (p50, p99, per_second) in rows.items():
+        factor = "" if label.startswith("(a)") else f"{per_second / rate:.1f}"
+        table.add_row(f"{name} {label}", f"{p50:.0f}", f"{p99:.0f}", f"{per_second:.0f}", factor)
+    medians = [values[0] for values in rows.values()]
+    return float((medians[2] - medians[1]) / medians[0])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

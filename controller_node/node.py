@@ -1,0 +1,165 @@
+"""`controller_node`: answers each state with joint torques, the state's stamp echoed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import Header, String
+
+from controller_node.parameters import (
+    DEFAULT_CHARACTER,
+    PARAMETERS,
+    character_parameters,
+    commanded_joints,
+    make_controller,
+    make_gains,
+    make_reference,
+    read_frames,
+)
+from msgs_config import configuration, topics
+from msgs_config.character_loading import load_character
+from msgs_config.errors import ActuatedCharactersError, LayoutError, MessageError
+from msgs_config.messages import JointStateDecoder, JointStateEncoder, state_in_layout
+from msgs_config.node_parameters import declare, given_parameters
+from msgs_config.parameters import Values, resolve
+from msgs_config.polling import DirectSubscription, Spinner
+from msgs_config.process import StopSignal
+from msgs_config.stamped import StampedState
+from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """The last answer: a state that comes again gets it again, and nothing is computed anew."""
+
+    stamp_ns: int
+    torques: bytes
+    reference: bytes
+
+
+class ControllerNode(Node):
+    """Subscribes to `joint_states`; publishes `joint_torques` and `~/reference`."""
+
+    def __init__(self) -> None:
+        """Read the parameters, build the controller, and offer the topics.
+
+        Raises:
+            ActuatedCharactersError: a parameter, the character or the clip cannot be used.
+        """
+        super().__init__(topics.CONTROLLER_NODE)
+        given = given_parameters(self)
+        self._character = load_character(str(given.get("character", DEFAULT_CHARACTER)))
+        self._layout = self._character.layout
+        self._declared = PARAMETERS + character_parameters(self._character)
+        self._values = resolve(self._declared, given)
+        declare(self, self._declared, self._values)
+        frames = read_frames(self._character, self._values)
+        if frames is not None and frames.clamped:
+            self.get_logger().warning(f"kept within joint limits: {', '.join(frames.clamped)}")
+        reference = make_reference(self._character, frames)
+        self._controller = make_controller(self._character, reference, self._values)
+        self._open_topics()
+        self._answer: _Answer | None = None
+        self._episode_ns: int | None = None
+        self._told: set[str] = set()
+        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_post_set_parameters_callback(self._take_parameters)
+
+    def _open_topics(self) -> None:
+        commanded = self._layout.mask(commanded_joints(self._character, self._values))
+        self._commanded = np.flatnonzero(commanded)
+        names = [self._layout.dof_names[index] for index in self._commanded]
+        self._decoder = JointStateDecoder()
+        self._torque_encoder = JointStateEncoder(names)
+        self._reference_encoder = JointStateEncoder(self._layout.dof_names)
+        self._states = DirectSubscription(self, topics.JOINT_STATES)
+        self._episodes = DirectSubscription(self, topics.EPISODE)
+        self._references = topics.create_publisher(self, topics.REFERENCE)
+        self._torques = topics.create_publisher(self, topics.JOINT_TORQUES)
+        description = configuration.describe(self._character, self._values)
+        topics.create_publisher(self, topics.CONFIGURATION).publish(String(data=description))
+
+    def run(self, stop: StopSignal) -> None:
+        """Answer states until `stop`.
+
+        Raises:
+            ClockError: the states come at another rate than this controller's.
+        """
+        spinner = Spinner(self)
+        try:
+            while not stop:
+                raw = self._states.take()
+                if raw is None:
+                    spinner.rest()
+                else:
+                    spinner.received()
+                    self._take_state(raw)
+        finally:
+            spinner.close()
+
+    def _take_state(self, raw: bytes) -> None:
+        if self._torques.get_subscription_count() < self._values.integer("wait_for_subscribers"):
+            return  # the simulator publishes the state again
+        try:
+            state = state_in_layout(self._layout, self._decoder.decode(raw))
+        except (MessageError, LayoutError) as error:
+            self._tell_once(f"state ignored: {error}")
+            return
+        if self._answer is None or self._answer.stamp_ns != state.stamp_ns:
+            episode_ns = self._episode_of(state)
+            if episode_ns is None:
+                return  # the simulator publishes the state again
+            self._answer = self._compute(state, episode_ns)
+        if self._references.get_subscription_count():
+            self._references.publish(self._answer.reference)
+        self._torques.publish(self._answer.torques)
+
+    def _compute(self, state: StampedState, episode_ns: int) -> _Answer:
+        effort, reference = self._controller.answer(state, episode_ns)
+        return _Answer(
+            stamp_ns=state.stamp_ns,
+            torques=self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded]),
+            reference=self._reference_encoder.encode(
+                reference.stamp_ns, reference.position, reference.velocity
+            ),
+        )
+
+    def _episode_of(self, state: StampedState) -> int | None:
+        """Stamp of the first state of the state's episode; None if it is not known yet.
+
+        The first state says so itself. Who joins later learns it from the latched topic.
+        """
+        raw = self._episodes.take()
+        if raw is not None:
+            stamp = deserialize_message(raw, Header).stamp
+            self._episode_ns = stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
+        if state.effort is None:
+            self._episode_ns = state.stamp_ns
+        if self._episode_ns is None or self._episode_ns > state.stamp_ns:
+            return None
+        return self._episode_ns
+
+    def _check_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
+        try:
+            self._changed_values(changes)
+        except ActuatedCharactersError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _take_parameters(self, changes: list[RosParameter]) -> None:
+        """Take changed gains, all at once; they count from the next state on."""
+        self._values = self._changed_values(changes)
+        self._controller.gains = make_gains(self._character, self._values)
+
+    def _changed_values(self, changes: list[RosParameter]) -> Values:
+        given = {change.name: change.value for change in changes}
+        return resolve(self._declared, {**self._values, **given})
+
+    def _tell_once(self, sentence: str) -> None:
+        """Warn of what may come again at every tick."""
+        if sentence not in self._told:
+            self._told.add(sentence)
+            self.get_logger().warning(sentence)

@@ -1,0 +1,131 @@
+"""The parameters of `controller_node`, and the controller that they make."""
+
+import numpy as np
+
+from controller_node.controller import LAWS, Controller, GainArrays
+from controller_node.references.base import Reference
+from controller_node.references.clip import ClipReference
+from controller_node.references.clip_file import ClipFrames, read_clip
+from controller_node.references.hold import HoldReference
+from msgs_config.arrays import FloatArray
+from msgs_config.character import ROOT_TORQUE, Character
+from msgs_config.joint_layout import ROOT
+from msgs_config.parameters import Parameter, Values
+
+DEFAULT_CHARACTER = "humanoid"
+
+PARAMETERS = [
+    Parameter(
+        "character", DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml file"
+    ),
+    Parameter(
+        "rate",
+        240,
+        "control ticks a second, the simulator's",
+        unit="Hz",
+        minimum=1,
+        maximum=100_000,
+    ),
+    Parameter("law", "stable_pd", "the control law", choices=LAWS),
+    Parameter(
+        "reference",
+        "hold",
+        "what to track: the rest pose, or a motion clip",
+        choices=("hold", "clip"),
+    ),
+    Parameter("clip", "walk", "name of a clip of the character, or path of a .txt file"),
+    Parameter(
+        "root_assistance", True, "drive a floating base by the lecture's root force and torque"
+    ),
+    Parameter(
+        "gravity", 9.81, "gravity in the model of the dynamics", unit="m/s^2", maximum=1000.0
+    ),
+    Parameter(
+        "wait_for_subscribers", 1, "answer when this many subscribe to joint_torques", maximum=1000
+    ),
+    Parameter("gain_scale.p", 1.0, "factor on every joint's stiffness, not the root's", live=True),
+    Parameter("gain_scale.d", 1.0, "factor on every joint's damping, not the root's", live=True),
+]
+
+
+def character_parameters(character: Character) -> list[Parameter]:
+    """The parameters whose names and defaults depend on the character: gains and limits."""
+    parameters = []
+    for name, limit in zip(character.vector_names, character.effort_limits(), strict=True):
+        gains = character.gains[name]
+        parameters += [
+            Parameter(
+                f"gains.{name}.p",
+                gains.stiffness,
+                f"stiffness of '{name}'",
+                unit="N m/rad or N/m",
+                live=True,
+            ),
+            Parameter(
+                f"gains.{name}.d",
+                gains.damping,
+                f"damping of '{name}'",
+                unit="N m s/rad or N s/m",
+                live=True,
+            ),
+            Parameter(
+                f"effort_limit.{name}",
+                float(limit),
+                f"largest effort of '{name}'",
+                unit="N m or N",
+                maximum=np.inf,
+                live=True,
+            ),
+        ]
+    return parameters
+
+
+def make_gains(character: Character, values: Values) -> GainArrays:
+    """The gains and limits that the parameters' values say."""
+    scales = {"p": values.number("gain_scale.p"), "d": values.number("gain_scale.d")}
+    lengths = character.layout.vector_lengths
+
+    def entries(kind: str) -> FloatArray:
+        gains = []
+        for name in character.vector_names:
+            assists = name in (ROOT, ROOT_TORQUE)
+            scale = float(values.flag("root_assistance")) if assists else scales[kind]
+            gains.append(scale * values.number(f"gains.{name}.{kind}"))
+        return np.repeat(np.array(gains), lengths)
+
+    limits = [values.number(f"effort_limit.{name}") for name in character.vector_names]
+    return GainArrays(entries("p"), entries("d"), np.array(limits))
+
+
+def read_frames(character: Character, values: Values) -> ClipFrames | None:
+    """The clip that the parameters name; None if they track none.
+
+    Raises:
+        ClipError: the clip does not exist or does not fit the character.
+    """
+    if values.text("reference") != "clip":
+        return None
+    return read_clip(character, values.text("clip"))
+
+
+def make_reference(character: Character, frames: ClipFrames | None) -> Reference:
+    """The reference that plays a clip, or holds the rest pose where there is none."""
+    return HoldReference(character) if frames is None else ClipReference(character.layout, frames)
+
+
+def make_controller(character: Character, reference: Reference, values: Values) -> Controller:
+    """The controller that the parameters' values say."""
+    return Controller(
+        character,
+        reference,
+        make_gains(character, values),
+        law=values.text("law"),
+        rate_hz=values.integer("rate"),
+        gravity=values.number("gravity"),
+    )
+
+
+def commanded_joints(character: Character, values: Values) -> list[str]:
+    """The joints that the controller commands: all that have a motor, and `root` if assisted."""
+    assisted = character.layout.has_floating_base and values.flag("root_assistance")
+    return [ROOT] * assisted + character.layout.actuated_joint_names

@@ -1,0 +1,129 @@
+"""Captured motion as a reference: interpolated, and continued from its end where it wraps."""
+
+import cmath
+from bisect import bisect_right
+from functools import lru_cache
+
+import numpy as np
+
+from controller_node.references.base import ReferenceState
+from controller_node.references.clip_file import ClipFrames
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.joint_layout import Configuration, JointLayout
+
+_BLEND_TIME = 0.15  # s before the wrap, over which the gap to the first frame is closed
+
+_STRAIGHT = 1e-9  # rad a cycle; below it the geometric series is its limit
+
+
+class ClipReference:
+    """A clip in time. Between two frames every velocity is constant, so that it agrees exactly
+    with the interpolation: linear for coordinates, along the shortest turn for rotations.
+
+    A clip that wraps goes on from where, and in the direction in which, it ended; one that does
+    not holds its last frame at zero velocity.
+    """
+
+    def __init__(self, layout: JointLayout, frames: ClipFrames) -> None:
+        self._layout = layout
+        self._wraps = frames.wraps
+        self._moves = layout.has_floating_base
+        self._times = frames.times
+        self._frame_times: list[float] = frames.times.tolist()
+        self._period = float(frames.times[-1])
+        positions, orientations = frames.positions, frames.orientations_xyzw
+        self._turn = 0.0  # rad about z a cycle
+        if frames.wraps:
+            if self._moves:
+                self._turn = float(_cycle_turn(orientations[:, 0]))
+            positions, orientations = self._closed(frames)
+        self._positions, self._orientations = positions, orientations
+        self._velocities = self._segment_velocities()
+        self._cycle_motion = lru_cache(maxsize=2)(self._motion_of)  # this tick's and the next's
+
+    def sample(self, time: float) -> ReferenceState:
+        """The desired state `time` seconds after the clip's first frame."""
+        cycle, time_in_cycle = self._cycle(time)
+        if not self._wraps and time >= self._period:
+            return self._last_frame()
+        frame = min(bisect_right(self._frame_times, time_in_cycle), len(self._frame_times) - 1) - 1
+        since_frame = time_in_cycle - self._frame_times[frame]
+        velocity = self._velocities[frame].copy()
+        position = self._positions[frame] + since_frame * velocity
+        turned = since_frame * velocity[self._layout.rotation_entries]
+        orientations = rotations.multiply(self._orientations[frame], rotations.exp(turned))
+        if cycle and self._moves:
+            self._continue_root(cycle, position, orientations, velocity)
+        return self._state(position, orientations, velocity)
+
+    def _cycle(self, time: float) -> tuple[int, float]:
+        if not self._wraps:
+            return 0, time
+        cycle = int(time // self._period)
+        return cycle, time - cycle * self._period
+
+    def _last_frame(self) -> ReferenceState:
+        velocity = np.zeros(self._layout.size)
+        return self._state(self._positions[-1].copy(), self._orientations[-1], velocity)
+
+    def _state(
+        self, position: FloatArray, orientations_xyzw: FloatArray, velocity: FloatArray
+    ) -> ReferenceState:
+        position[self._layout.rotation_entries] = rotations.log(orientations_xyzw)
+        return ReferenceState(Configuration(position, orientations_xyzw), velocity)
+
+    def _closed(self, frames: ClipFrames) -> tuple[FloatArray, FloatArray]:
+        """The frames with the last ones led towards the first one of the next cycle."""
+        progress = np.clip((frames.times - self._period) / _BLEND_TIME + 1.0, 0.0, 1.0)
+        weight = (progress * progress * (3.0 - 2.0 * progress))[:, np.newaxis]
+        positions, orientations = frames.positions, frames.orientations_xyzw
+        gap = positions[0] - positions[-1]
+        goal = orientations[0]
+        if self._moves:
+            gap[:2] = 0.0  # on the ground it goes on from where it is
+            goal = goal.copy()
+            goal[0] = rotations.multiply(rotations.about_z(self._turn), orientations[0, 0])
+        turn = rotations.log(rotations.multiply(rotations.conjugate(orientations[-1]), goal))
+        correction = rotations.exp(weight[:, :, np.newaxis] * turn)
+        return positions + weight * gap, rotations.multiply(orientations, correction)
+
+    def _segment_velocities(self) -> FloatArray:
+        """Velocity (f - 1, n) between each frame and the next; a rotation's in the child frame."""
+        durations = np.diff(self._times)[:, np.newaxis]
+        velocities = np.diff(self._positions, axis=0) / durations
+        turns = rotations.multiply(
+            rotations.conjugate(self._orientations[:-1]), self._orientations[1:]
+        )
+        entries = self._layout.rotation_entries
+        velocities[:, entries] = rotations.log(turns) / durations[:, :, np.newaxis]
+        return velocities
+
+    def _continue_root(
+        self, cycle: int, position: FloatArray, orientations: FloatArray, velocity: FloatArray
+    ) -> None:
+        """Carry the root on from the end of the cycle before: displacement and yaw composed.
+
+        On the ground plane, as complex numbers, one cycle maps `x` to `start + d + z (x - start)`
+        with `z = exp(i turn)`; n of them shift by `d (1 + z + ... + z^(n-1))`.
+        """
+        start, shift, turn, turn_xyzw = self._cycle_motion(cycle)
+        place = start + shift + turn * (complex(*position[:2]) - start)
+        speed = turn * complex(*velocity[:2])
+        position[:2] = place.real, place.imag
+        velocity[:2] = speed.real, speed.imag
+        orientations[0] = rotations.multiply(turn_xyzw, orientations[0])
+
+    def _motion_of(self, cycle: int) -> tuple[complex, complex, complex, FloatArray]:
+        """Start, shift, turn, and the turn's quaternion, that `cycle` cycles add up to."""
+        start = complex(*self._positions[0, :2])
+        displacement = complex(*self._positions[-1, :2]) - start
+        one_turn, turn = cmath.exp(1j * self._turn), cmath.exp(1j * self._turn * cycle)
+        straight = abs(self._turn) < _STRAIGHT
+        shift = displacement * (cycle if straight else (1.0 - turn) / (1.0 - one_turn))
+        return start, shift, turn, rotations.about_z(self._turn * cycle)
+
+
+def _cycle_turn(root_xyzw: FloatArray) -> FloatArray:
+    """Turn in rad about z from the first frame to the last."""
+    return rotations.yaw(rotations.multiply(root_xyzw[-1], rotations.conjugate(root_xyzw[0])))

@@ -1,0 +1,154 @@
+"""Motion clips in the format of DeepMimic (Peng et al. 2018): JSON with `Loop` and `Frames`.
+
+A frame is: its duration in s, the root's position in m, the root's quaternion (wxyz), and for each
+joint of the character's list an angle in rad or, for a ball joint, a quaternion (wxyz).
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+from msgs_config.errors import ClipError, one_of
+from msgs_config.files import read_text
+from msgs_config.joint_layout import JointType
+
+_ROOT_COLUMNS = 8  # duration, position, quaternion
+_SHORTEST_QUATERNION = 0.1
+
+
+@dataclass(frozen=True)
+class ClipFrames:
+    """The frames of a clip in a character's layout, z-up, in its joint limits."""
+
+    times: FloatArray  # (f,) s, rising from 0
+    positions: FloatArray  # (f, n) message form, save that rotations are in `orientations_xyzw`
+    orientations_xyzw: FloatArray  # (f, k, 4)
+    wraps: bool  # whether it goes on from its end
+    clamped: tuple[str, ...]  # degrees of freedom that had to be kept within their limits
+
+
+def available_clips(character: Character) -> list[str]:
+    """Names of the clips that the character's file points at."""
+    if not character.clips.pattern:
+        return []
+    pattern = Path(character.clips.pattern)
+    prefix, suffix = pattern.name.split("*")
+    found = pattern.parent.glob(pattern.name)
+    return sorted(path.name.removeprefix(prefix).removesuffix(suffix) for path in found)
+
+
+def read_clip(character: Character, name_or_path: str) -> ClipFrames:
+    """Read a clip by name, or by the path of a `.txt` or `.json` file.
+
+    Raises:
+        ClipError: there is no such clip, it is malformed, or it does not fit the character.
+    """
+    path = _clip_path(character, name_or_path)
+    loop, frames = _parse(path, read_text(path, ClipError))
+    return _in_layout(character, path, loop, frames)
+
+
+def _clip_path(character: Character, name_or_path: str) -> Path:
+    if not character.clips.pattern:
+        raise ClipError(f"character '{character.name}' has no clips: its file has no key 'clips'")
+    if name_or_path.endswith((".txt", ".json")):
+        return Path(name_or_path)
+    clips = available_clips(character)
+    if name_or_path not in clips:
+        raise ClipError(f"{one_of('clip', name_or_path, clips)}, or the path of a .txt file")
+    return Path(character.clips.pattern.replace("*", name_or_path))
+
+
+def _parse(path: Path, text: str) -> tuple[str, FloatArray]:
+    try:
+        content = json.loads(text)
+        loop, frames = content["Loop"], np.array(content["Frames"], dtype=float)
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ClipError(
+            f"{path}: not a motion clip; it must be JSON with 'Loop' and with 'Frames' of equal "
+            "length"
+        ) from error
+    if loop not in ("wrap", "none"):
+        raise ClipError(f"{path}: Loop is {loop!r}; it must be 'wrap' or 'none'")
+    if frames.ndim != 2 or len(frames) < 2:
+        raise ClipError(f"{path}: needs two frames or more")
+    if not np.isfinite(frames).all():
+        raise ClipError(f"{path}: frame {_first_bad_row(frames)} holds a number that is not finite")
+    if not (frames[:-1, 0] > 0.0).all():
+        bad = int(np.argmax(frames[:-1, 0] <= 0.0))
+        raise ClipError(f"{path}: frame {bad} lasts {frames[bad, 0]} s; it must last some time")
+    return loop, frames
+
+
+def _first_bad_row(frames: FloatArray) -> int:
+    return int(np.argmin(np.isfinite(frames).all(axis=1)))
+
+
+def _in_layout(character: Character, path: Path, loop: str, frames: FloatArray) -> ClipFrames:
+    layout, column = character.layout, _ROOT_COLUMNS
+    positions = np.tile(np.array(character.rest_position), (len(frames), 1))
+    orientations = rotations.exp(positions[:, layout.rotation_entries])
+    rotation_of = {int(start): k for k, start in enumerate(layout.rotation_entries[:, 0])}
+    if layout.has_floating_base:
+        root_position, root_turn = _root_in_world(character, path, frames)
+        positions[:, :3], orientations[:, 0] = root_position, root_turn
+    for name in character.clips.joints:
+        joint = layout.joint(name)
+        width = 4 if joint.type is JointType.SPHERICAL else 1
+        values = frames[:, column : column + width]
+        column += width
+        if values.shape[1] < width:
+            break
+        if width == 4:
+            orientations[:, rotation_of[joint.start]] = _quaternions(path, name, values)
+        else:
+            positions[:, joint.start] = values[:, 0]
+    if column != frames.shape[1]:
+        raise ClipError(
+            f"{path}: frames have {frames.shape[1]} numbers; "
+            f"character '{character.name}' needs {_width(character)}"
+        )
+    positions, clamped = _within_limits(character, positions)
+    times = np.concatenate(([0.0], np.cumsum(frames[:-1, 0])))
+    return ClipFrames(times, positions, orientations, loop == "wrap", clamped)
+
+
+def _width(character: Character) -> int:
+    balls = [character.layout.joint(n).type is JointType.SPHERICAL for n in character.clips.joints]
+    return _ROOT_COLUMNS + sum(4 if ball else 1 for ball in balls)
+
+
+def _root_in_world(
+    character: Character, path: Path, frames: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    position, turn = frames[:, 1:4], _quaternions(path, "root", frames[:, 4:8])
+    if character.clips.up_axis == "y":
+        upright = rotations.ABOUT_X_QUARTER_TURN_XYZW
+        return rotations.rotate(upright, position), rotations.multiply(upright, turn)
+    return position, turn
+
+
+def _quaternions(path: Path, joint: str, values_wxyz: FloatArray) -> FloatArray:
+    """Unit quaternions xyzw; captured ones are rounded, and some shipped ones badly so."""
+    lengths = np.linalg.norm(values_wxyz, axis=1)
+    if lengths.min() < _SHORTEST_QUATERNION:
+        raise ClipError(
+            f"{path}: frame {lengths.argmin()}: the quaternion of '{joint}' has length "
+            f"{lengths.min():.3g}; it must be 1"
+        )
+    return rotations.normalised(rotations.xyzw_from_wxyz(values_wxyz))
+
+
+def _within_limits(
+    character: Character, positions: FloatArray
+) -> tuple[FloatArray, tuple[str, ...]]:
+    lower, upper = character.position_bounds()
+    within = np.clip(positions, lower, upper)
+    beyond = np.any(within != positions, axis=0)
+    names = character.layout.dof_names
+    return within, tuple(name for name, is_beyond in zip(names, beyond, strict=True) if is_beyond)

@@ -1,0 +1,18 @@
+"""A reference that stands still."""
+
+import numpy as np
+
+from controller_node.references.base import ReferenceState
+from msgs_config.character import Character
+
+
+class HoldReference:
+    """The character's rest pose, for ever."""
+
+    def __init__(self, character: Character) -> None:
+        rest = character.layout.configuration(np.array(character.rest_position))
+        self._state = ReferenceState(rest, np.zeros(character.layout.size))
+
+    def sample(self, time: float) -> ReferenceState:
+        """The rest pose at zero velocity, at whatever time."""
+        return self._state

@@ -1,0 +1,1 @@
+"""What needs both sides: runs of simulator and controller, recordings, measurements."""

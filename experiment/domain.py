@@ -1,0 +1,64 @@
+"""A ROS domain of one's own, so that two runs on a machine never hear each other."""
+
+import fcntl
+import os
+import socket
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from msgs_config.errors import ConfigurationError
+
+_DOMAINS = range(1, 102)  # above 101 the ports lie among those that Linux gives out by itself
+_FIRST_PORT, _PORTS_A_DOMAIN = 7400, 250  # DDSI-RTPS 2.3, section 9.6.1.1
+
+
+@contextmanager
+def own_domain() -> Iterator[int]:
+    """A free domain id, held under a file lock until the context ends.
+
+    Raises:
+        ConfigurationError: every domain is taken.
+    """
+    directory = Path(tempfile.gettempdir()) / f"actuated_characters_domains_{os.getuid()}"
+    directory.mkdir(exist_ok=True)
+    start = os.getpid()  # spread, so that many runs at once seldom try the same one
+    for offset in range(len(_DOMAINS)):
+        domain = _DOMAINS[(start + offset) % len(_DOMAINS)]
+        path = directory / str(domain)
+        lock = _lock(path)
+        if lock is None:
+            continue
+        try:
+            if _is_silent(domain):
+                yield domain
+                return
+        finally:
+            path.unlink(missing_ok=True)
+            os.close(lock)
+    raise ConfigurationError("every ROS domain is taken; set ROS_DOMAIN_ID to share one")
+
+
+def _lock(path: Path) -> int | None:
+    """An open, locked file; None if somebody else has it."""
+    descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # who held it before may have removed the file between our opening and locking it
+        if path.stat().st_ino == os.fstat(descriptor).st_ino:
+            return descriptor
+    except OSError:
+        pass
+    os.close(descriptor)
+    return None
+
+
+def _is_silent(domain: int) -> bool:
+    """Whether no process on this machine takes part in the domain."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", _FIRST_PORT + _PORTS_A_DOMAIN * domain))
+        except OSError:
+            return False
+    return True

@@ -1,0 +1,108 @@
+"""Reads the serialised messages of a run and measures it, live or from a bag."""
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import String
+
+from experiment.metrics import Measurement
+from experiment.recording import TickAssembler
+from msgs_config import configuration, topics
+from msgs_config.arrays import FloatArray
+from msgs_config.configuration import RunConfiguration
+from msgs_config.errors import RecordingError
+from msgs_config.messages import JointStateDecoder, state_in_layout
+from msgs_config.stamped import StampedReference
+from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
+
+CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
+REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
+COMMAND_COUNTS = ("rejected", "duplicate")
+
+
+class RunListener:
+    """Takes messages as they come; has the figures at the end.
+
+    What a topic says can be read only once the simulator's configuration is known, so whatever
+    comes before it is kept.
+    """
+
+    def __init__(self) -> None:
+        self._decoder = JointStateDecoder()
+        self._configuration: RunConfiguration | None = None
+        self._early: list[tuple[str, bytes, int]] = []
+        self._counts = dict.fromkeys(COMMAND_COUNTS, 0)
+        self._first_command_ns: int | None = None
+        self._last_state_ns = 0
+
+    @property
+    def ticks(self) -> int:
+        """Ticks seen so far."""
+        return 0 if self._configuration is None else self._assembler.ticks
+
+    @property
+    def missing_ticks(self) -> int:
+        """Ticks whose state never came, before the last that did."""
+        return 0 if self._configuration is None else self._assembler.missing_ticks
+
+    def take(self, topic: str, raw: bytes, published_ns: int) -> None:
+        """Take a serialised message that was published at a wall time in ns.
+
+        Raises:
+            ActuatedCharactersError: the message is not what its topic should carry.
+        """
+        if topic == CONFIGURATION and self._configuration is None:
+            self._configure(configuration.parse(deserialize_message(raw, String).data))
+        elif self._configuration is None:
+            self._early.append((topic, raw, published_ns))
+        elif topic == topics.JOINT_STATES.name:
+            self._take_state(self._configuration, raw, published_ns)
+        elif topic == REFERENCE:
+            self._take_reference(self._configuration, raw)
+        elif topic == topics.JOINT_TORQUES.name:
+            self._first_command_ns = self._first_command_ns or published_ns
+        elif topic == topics.DIAGNOSTICS.name:
+            self._take_counts(deserialize_message(raw, DiagnosticArray))
+
+    def summary(self) -> dict[str, object]:
+        """The figures of the run.
+
+        Raises:
+            RecordingError: there was no simulator to listen to.
+        """
+        if self._configuration is None:
+            raise RecordingError("no simulator was heard")
+        self._assembler.finish()
+        wall_ns = self._last_state_ns - (self._first_command_ns or self._last_state_ns)
+        figures = self._measurement.summary(wall_ns / NANOSECONDS_PER_SECOND)
+        counts = {f"{name}_commands": count for name, count in self._counts.items()}
+        return {"character": self._configuration.character} | figures | counts
+
+    def series(self) -> FloatArray:
+        """The series of the run, one row a tick; see `metrics.COLUMNS`."""
+        return self._measurement.series()
+
+    def _configure(self, found: RunConfiguration) -> None:
+        self._configuration = found
+        self._measurement = Measurement(found)
+        self._assembler = TickAssembler(self._measurement, int(found.parameters["rate"]))
+        early, self._early = self._early, []
+        for message in early:
+            self.take(*message)
+
+    def _take_state(self, known: RunConfiguration, raw: bytes, published_ns: int) -> None:
+        before = self._assembler.ticks
+        self._assembler.add_state(state_in_layout(known.layout, self._decoder.decode(raw)))
+        if self._assembler.ticks > before:
+            self._last_state_ns = published_ns
+
+    def _take_reference(self, known: RunConfiguration, raw: bytes) -> None:
+        state = state_in_layout(known.layout, self._decoder.decode(raw))
+        self._assembler.add_reference(
+            StampedReference(state.stamp_ns, state.position, state.velocity)
+        )
+
+    def _take_counts(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == topics.SIM_NODE:
+                values = {item.key: item.value for item in status.values}
+                self._counts |= {name: int(values[name]) for name in self._counts if name in values}

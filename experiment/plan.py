@@ -1,0 +1,116 @@
+"""What a run is made of, checked before anything is started."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from controller_node import parameters as controller_parameters
+from controller_node.references.base import Reference
+from msgs_config.character import Character
+from msgs_config.character_loading import load_character
+from msgs_config.errors import ConfigurationError
+from msgs_config.joint_layout import ROOT
+from msgs_config.parameters import Values, resolve
+from sim_node import parameters as simulator_parameters
+
+_SHARED = ("rate", "gravity")  # must be the same on both sides; set on one side, they count on both
+_LARGEST_DURATION = 1e9  # s
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run's character, reference and parameters; both sides agree with each other."""
+
+    character: Character
+    reference: Reference
+    simulator: Values
+    controller: Values
+    notes: tuple[str, ...]  # what the user should know
+
+    @property
+    def ticks(self) -> int:
+        """Length of the run in ticks."""
+        return self.simulator.integer("max_ticks")
+
+
+def make_plan(
+    character_name: str,
+    duration: float,
+    reference: Mapping[str, object],
+    simulator_settings: Mapping[str, object],
+    controller_settings: Mapping[str, object],
+) -> Plan:
+    """Resolve all parameters of both sides, and the initial state that the reference begins with.
+
+    Args:
+        character_name: A shipped character, or the path of a YAML file.
+        duration: Length of the run in s.
+        reference: The controller's parameters that say what is tracked.
+        simulator_settings: Parameters of `sim_node` that the user set, by name.
+        controller_settings: Parameters of `controller_node` that the user set, by name.
+
+    Raises:
+        ActuatedCharactersError: a name or value is wrong; says which, and what there is.
+    """
+    simulator_given, controller_given = _shared(simulator_settings, controller_settings)
+    for given in (simulator_given, controller_given):
+        given.setdefault("character", character_name)
+        if given["character"] != character_name:
+            raise ConfigurationError("the character is set by --character, for both nodes")
+    character = load_character(character_name)
+    controller_given = {**reference, **controller_given}
+    _keep_assistance_in_step(character, simulator_given, controller_given)
+    controller = resolve(
+        controller_parameters.PARAMETERS + controller_parameters.character_parameters(character),
+        controller_given,
+    )
+    frames = controller_parameters.read_frames(character, controller)
+    motion = controller_parameters.make_reference(character, frames)
+    first = motion.sample(0.0)
+    defaults = {
+        "commanded_joints": controller_parameters.commanded_joints(character, controller),
+        "initial_position": first.configuration.position.tolist(),
+        "initial_velocity": first.velocity.tolist(),
+        "on_fault": "abort",
+    }
+    simulator = resolve(
+        simulator_parameters.PARAMETERS + simulator_parameters.character_parameters(character),
+        {**defaults, **simulator_given},
+    )
+    if "max_ticks" not in simulator_given:
+        simulator["max_ticks"] = _ticks(duration, simulator.integer("rate"))
+    clamped = () if frames is None else frames.clamped
+    notes = (f"kept within joint limits: {', '.join(clamped)}",) if clamped else ()
+    return Plan(character, motion, simulator, controller, notes)
+
+
+def _shared(
+    simulator: Mapping[str, object], controller: Mapping[str, object]
+) -> tuple[dict[str, object], dict[str, object]]:
+    both = {
+        name: side[name] for side in (controller, simulator) for name in _SHARED if name in side
+    }
+    for name, value in both.items():
+        for side in (simulator, controller):
+            if side.get(name, value) != value:
+                raise ConfigurationError(
+                    f"parameter '{name}' is {simulator[name]} for sim_node and {controller[name]} "
+                    "for controller_node; it must be the same"
+                )
+    return {**both, **simulator}, {**both, **controller}
+
+
+def _keep_assistance_in_step(
+    character: Character, simulator: dict[str, object], controller: dict[str, object]
+) -> None:
+    """Without `root` among the commanded joints there can be no root assistance."""
+    commanded = simulator.get("commanded_joints")
+    if isinstance(commanded, list) and character.layout.has_floating_base:
+        controller.setdefault("root_assistance", ROOT in commanded)
+
+
+def _ticks(duration: float, rate_hz: int) -> int:
+    if not 1.0 / rate_hz <= duration <= _LARGEST_DURATION:
+        raise ConfigurationError(
+            f"duration is {duration} s; it must be {1.0 / rate_hz:g} s (one tick) or more"
+        )
+    return round(duration * rate_hz)

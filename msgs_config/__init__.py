@@ -1,0 +1,1 @@
+"""The contract between simulator and controller: names, layouts, messages, characters."""

@@ -1,0 +1,136 @@
+"""What a character is: links, joints, masses, shapes and frames, and how it is to be driven.
+
+Both sides build theirs from this one description: the simulator its body, the controller its
+model of the dynamics. All frames are URDF link frames; lengths in m, masses in kg.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.joint_layout import ROOT, JointLayout, JointType
+from msgs_config.rotations import IDENTITY_XYZW
+
+ROOT_TORQUE = ROOT + "_r"
+"""Name of the gains of the floating base's rotation; those of its translation are `root`."""
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Position (m) and orientation of a frame in another."""
+
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation_xyzw: Quaternion = IDENTITY_XYZW
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What joins a link to its parent; for a base link, to the world."""
+
+    name: str
+    type: JointType
+    axis_in_child: Vector = (0.0, 0.0, 0.0)
+    pose_in_parent: Pose = Pose()
+    lower: float = -np.inf  # rad or m
+    upper: float = np.inf
+    effort_limit: float = np.inf  # N m or N, of the vector's norm for a ball joint
+
+
+@dataclass(frozen=True)
+class Link:
+    """One rigid body. `parent` is its index in `Character.links`, -1 for the base."""
+
+    name: str
+    parent: int
+    joint: Joint
+    mass: float
+    inertia_diagonal: Vector  # kg m^2, in the inertial frame
+    inertial_pose: Pose  # in the link frame
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Stiffness and damping of a joint: N m/rad and N m s/rad, or N/m and N s/m."""
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class ClipFormat:
+    """Where a character's motion clips lie and which joints their columns are."""
+
+    pattern: str = ""  # a path with one '*', the clip's name
+    joints: tuple[str, ...] = ()
+    up_axis: str = "z"
+
+
+@dataclass(frozen=True)
+class Loading:
+    """How the URDF is to be read: what the simulator needs to load the same body."""
+
+    urdf_path: Path
+    urdf_text: str = field(repr=False)
+    scale: float = 1.0
+    fixed_base: bool = False
+    inertia_from_file: bool = False
+    self_collision: bool = False
+
+
+@dataclass(frozen=True)
+class Character:
+    """A character: its body and its defaults. Links and joints are listed depth-first."""
+
+    name: str
+    file: Path
+    loading: Loading
+    links: tuple[Link, ...]
+    gains: dict[str, Gains]  # by joint; the base's force and torque under `root` and `root_r`
+    rest_position: tuple[float, ...]  # (n,), message form
+    clips: ClipFormat
+
+    @cached_property
+    def layout(self) -> JointLayout:
+        """The order of the character's degrees of freedom."""
+        return JointLayout((link.joint.name, link.joint.type) for link in self.links)
+
+    @property
+    def mass(self) -> float:
+        """Mass of all links together, kg."""
+        return float(sum(link.mass for link in self.links))
+
+    @property
+    def moving_joints(self) -> list[Joint]:
+        """The joints of the layout, in its order."""
+        return [link.joint for link in self.links if link.joint.type is not JointType.FIXED]
+
+    @property
+    def vector_names(self) -> list[str]:
+        """Name of each physical vector of the layout: the joint's, `root_r` for root torque."""
+        names: list[str] = []
+        for joint in self.moving_joints:
+            names.append(joint.name)
+            if joint.type is JointType.FLOATING:
+                names.append(ROOT_TORQUE)
+        return names
+
+    def effort_limits(self) -> FloatArray:
+        """Limit (b,) of the norm of each physical vector of the layout, N m or N."""
+        limits: list[float] = []
+        for joint in self.moving_joints:
+            limits += [joint.effort_limit] * len(self.layout.joint(joint.name).vectors)
+        return np.array(limits)
+
+    def position_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bound (n,) of each entry; infinite where the joint has none."""
+        lower, upper = np.full(self.layout.size, -np.inf), np.full(self.layout.size, np.inf)
+        for joint in self.moving_joints:
+            entries = self.layout.joint(joint.name).entries
+            lower[entries], upper[entries] = joint.lower, joint.upper
+        return lower, upper

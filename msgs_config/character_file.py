@@ -1,0 +1,195 @@
+"""The YAML file of a character, checked key by key."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from msgs_config import files
+from msgs_config.character import ClipFormat, Gains, Loading
+from msgs_config.errors import CharacterError, one_of
+
+CHARACTERS_DIRECTORY = Path(__file__).parent / "characters"
+
+_LARGEST = sys.float_info.max
+_KEYS = [
+    "urdf",
+    "scale",
+    "up_axis",
+    "fixed_base",
+    "inertia",
+    "self_collision",
+    "rest_pose",
+    "joints",
+    "root_assistance",
+    "clips",
+]
+_JOINT_KEYS = ["stiffness", "damping", "effort_limit"]
+
+
+@dataclass(frozen=True)
+class CharacterFile:
+    """The content of a character's YAML file."""
+
+    name: str
+    path: Path
+    loading: Loading
+    up_axis: str
+    rest_pose: dict[str, float]  # DoF name -> m or rad
+    gains: dict[str, Gains]  # joint name -> gains; `force` and `torque` of the root assistance
+    effort_limits: dict[str, float]  # joint name -> N m or N
+    assistance: dict[str, Gains]
+    clips: ClipFormat
+
+
+def shipped_characters() -> list[str]:
+    """Names of the characters that come with the package."""
+    return sorted(path.stem for path in CHARACTERS_DIRECTORY.glob("*.yaml"))
+
+
+def character_path(name_or_path: str) -> Path:
+    """The file of a shipped character, or the path itself if it ends in `.yaml`.
+
+    Raises:
+        CharacterError: there is no such character or file.
+    """
+    if name_or_path.endswith((".yaml", ".yml")):
+        path = Path(name_or_path).absolute()
+    elif name_or_path in shipped_characters():
+        path = CHARACTERS_DIRECTORY / f"{name_or_path}.yaml"
+    else:
+        sentence = one_of("character", name_or_path, shipped_characters())
+        raise CharacterError(f"{sentence}, or the path of a .yaml file")
+    return path
+
+
+def read_character_file(name_or_path: str) -> CharacterFile:
+    """Read and check a character's file.
+
+    Raises:
+        CharacterError: names the file, the key and what would be right.
+    """
+    path = character_path(name_or_path)
+    reader = _Reader(path, files.read_yaml_mapping(path, CharacterError))
+    reader.check_keys(_KEYS)
+    joints = reader.parts("joints")
+    for joint in joints.values():
+        joint.check_keys(_JOINT_KEYS)
+    assistance = reader.part("root_assistance")
+    assistance.check_keys(["force", "torque"])
+    rest_pose = reader.part("rest_pose")
+    return CharacterFile(
+        name=path.stem,
+        path=path,
+        loading=_loading(reader),
+        up_axis=reader.choice("up_axis", ["z", "y"]),
+        rest_pose={name: rest_pose.number(name) for name in rest_pose.content},
+        gains={name: joint.gains() for name, joint in joints.items()},
+        effort_limits={
+            name: joint.number("effort_limit", minimum=0.0)
+            for name, joint in joints.items()
+            if "effort_limit" in joint.content
+        },
+        assistance={name: part.gains() for name, part in reader.parts("root_assistance").items()},
+        clips=_clip_format(reader.part("clips")),
+    )
+
+
+def _loading(reader: "_Reader") -> Loading:
+    urdf = reader.path_of("urdf")
+    return Loading(
+        urdf_path=urdf,
+        urdf_text=files.read_text(urdf, CharacterError),
+        scale=reader.number("scale", default=1.0, minimum=1e-6),
+        fixed_base=reader.flag("fixed_base"),
+        inertia_from_file=reader.choice("inertia", ["file", "shapes"]) == "file",
+        self_collision=reader.flag("self_collision"),
+    )
+
+
+def _clip_format(clips: "_Reader") -> ClipFormat:
+    if not clips.content:
+        return ClipFormat()
+    clips.check_keys(["files", "joints", "up_axis"])
+    joints = clips.content.get("joints")
+    if not isinstance(joints, list) or not all(isinstance(name, str) for name in joints):
+        raise clips.wrong("joints", joints, "a list of joint names")
+    pattern = clips.path_of("files")
+    if pattern.name.count("*") != 1:
+        raise clips.wrong("files", pattern.name, "a path with one '*'")
+    return ClipFormat(str(pattern), tuple(joints), clips.choice("up_axis", ["z", "y"]))
+
+
+class _Reader:
+    """Takes typed values out of a mapping, with errors that name file, key and value."""
+
+    def __init__(self, file: Path, content: dict[str, Any], prefix: str = "") -> None:
+        self.content = content
+        self._file = file
+        self._prefix = prefix  # the keys that lead to this mapping, such as `joints.chest.`
+
+    def wrong(self, key: str, value: object, right: str) -> CharacterError:
+        # no content of lists: a few lines of YAML can stand for millions of entries
+        shown = f"a {type(value).__name__}" if isinstance(value, (list, dict)) else repr(value)
+        return CharacterError(f"{self._file}: {self._prefix}{key} is {shown}; it must be {right}")
+
+    def check_keys(self, known: list[str]) -> None:
+        for key in self.content:
+            if key not in known:
+                sentence = one_of("key", f"{self._prefix}{key}", known)
+                raise CharacterError(f"{self._file}: {sentence}")
+
+    def part(self, key: str) -> "_Reader":
+        """The mapping under a key; one that is absent is empty."""
+        value = self.content.get(key)
+        value = {} if value is None else value
+        if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
+            raise self.wrong(key, value, "a mapping")
+        return _Reader(self._file, value, f"{self._prefix}{key}.")
+
+    def parts(self, key: str) -> dict[str, "_Reader"]:
+        """The mappings in the mapping under a key."""
+        part = self.part(key)
+        return {name: part.part(name) for name in part.content}
+
+    def text(self, key: str) -> str:
+        value = self.content.get(key)
+        if not isinstance(value, str) or not value:
+            raise self.wrong(key, value, "a text")
+        return value
+
+    def path_of(self, key: str) -> Path:
+        text = self.text(key)
+        if "\0" in text:
+            raise self.wrong(key, text, "a path")
+        try:
+            return files.resolve(text, self._file.parent, CharacterError)
+        except CharacterError as error:
+            raise CharacterError(f"{self._file}: {self._prefix}{key}: {error}") from error
+
+    def choice(self, key: str, choices: list[str]) -> str:
+        value = self.content.get(key, choices[0])
+        if value not in choices:
+            raise self.wrong(key, value, " or ".join(f"'{choice}'" for choice in choices))
+        return str(value)
+
+    def flag(self, key: str) -> bool:
+        value = self.content.get(key, False)
+        if not isinstance(value, bool):
+            raise self.wrong(key, value, "true or false")
+        return value
+
+    def number(self, key: str, default: float | None = None, minimum: float = -_LARGEST) -> float:
+        value: Any = self.content.get(key, default)
+        # compared, not converted: a whole number may be larger than every float
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if is_number and minimum <= value <= _LARGEST:
+            return float(value)
+        bound = "" if minimum == -_LARGEST else f" of at least {minimum:g}"
+        raise self.wrong(key, value, f"a finite number{bound}")
+
+    def gains(self) -> Gains:
+        return Gains(
+            stiffness=self.number("stiffness", default=0.0, minimum=0.0),
+            damping=self.number("damping", default=0.0, minimum=0.0),
+        )

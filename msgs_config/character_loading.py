@@ -1,0 +1,183 @@
+"""Makes a `Character` of its YAML file and of its URDF as the engine understands it.
+
+The engine's own numbers are taken (mass, principal inertia, frames), so that the simulator and
+the controller's model of the dynamics are built from the same ones.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.bullet import connect, load_urdf, pybullet
+from msgs_config.character import (
+    ROOT_TORQUE,
+    Character,
+    Gains,
+    Joint,
+    Link,
+    Pose,
+    Quaternion,
+    Vector,
+)
+from msgs_config.character_file import CharacterFile, read_character_file
+from msgs_config.errors import CharacterError, LayoutError, one_of
+from msgs_config.joint_layout import ROOT, JointLayout, JointType
+from msgs_config.urdf_check import check_urdf
+
+_JOINT_TYPES = {
+    pybullet.JOINT_REVOLUTE: JointType.REVOLUTE,
+    pybullet.JOINT_PRISMATIC: JointType.PRISMATIC,
+    pybullet.JOINT_SPHERICAL: JointType.SPHERICAL,
+    pybullet.JOINT_FIXED: JointType.FIXED,
+}
+
+
+def load_character(name_or_path: str) -> Character:
+    """Load a shipped character by name, or any by the path of its YAML file.
+
+    Raises:
+        CharacterError: no such character, or its file or URDF cannot be used; says why.
+    """
+    file = read_character_file(name_or_path)
+    check_urdf(file.loading.urdf_path, file.loading.urdf_text)
+    client = connect()
+    try:
+        body = load_urdf(client, file.loading)
+        links = _read_links(client, body, file)
+    finally:
+        pybullet.disconnect(client)
+    links = _depth_first(links)
+    try:
+        layout = JointLayout((link.joint.name, link.joint.type) for link in links)
+    except LayoutError as error:
+        raise CharacterError(f"{file.loading.urdf_path}: {error}") from error
+    _check_joint_names(file, layout)
+    return Character(
+        name=file.name,
+        file=file.path,
+        loading=file.loading,
+        links=tuple(links),
+        gains=_gains(file, layout),
+        rest_position=_rest_position(file, layout),
+        clips=file.clips,
+    )
+
+
+def _read_links(client: int, body: int, file: CharacterFile) -> list[Link]:
+    """The links in the engine's order, each after its parent, the base first."""
+    base_type = JointType.FIXED if file.loading.fixed_base else JointType.FLOATING
+    base_name = pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()
+    base_joint = Joint(ROOT, base_type, pose_in_parent=_fixed_base_pose(file))
+    links = [_link(client, body, -1, base_name, -1, base_joint)]
+    for index in range(pybullet.getNumJoints(body, physicsClientId=client)):
+        info = pybullet.getJointInfo(body, index, physicsClientId=client)
+        name, parent = info[1].decode(), info[16] + 1
+        if info[2] not in _JOINT_TYPES:
+            raise CharacterError(
+                f"{file.loading.urdf_path}: joint '{name}' is of a type that is not supported; "
+                "it must be revolute, continuous, prismatic, spherical or fixed"
+            )
+        link = _link(client, body, index, info[12].decode(), parent, Joint(name, JointType.FIXED))
+        joint = _joint(info, links[parent].inertial_pose, link.inertial_pose)
+        limit = file.effort_limits.get(name, joint.effort_limit)
+        links.append(replace(link, joint=replace(joint, effort_limit=limit)))
+    return links
+
+
+def _link(client: int, body: int, index: int, name: str, parent: int, joint: Joint) -> Link:
+    dynamics = pybullet.getDynamicsInfo(body, index, physicsClientId=client)
+    pose = Pose(position=dynamics[3], orientation_xyzw=dynamics[4])
+    return Link(name, parent, joint, dynamics[0], dynamics[2], pose)
+
+
+def _joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Pose) -> Joint:
+    """A joint from `getJointInfo`, whose frames are the links' inertial ones.
+
+    Its position is given in the parent's inertial frame, its axis in the child's, and its
+    orientation turns the parent's inertial frame into the child's.
+    """
+    parent_turn = np.array(parent_inertial.orientation_xyzw)
+    child_turn = np.array(child_inertial.orientation_xyzw)
+    offset, turn, axis = (np.array(info[index], dtype=float) for index in (14, 15, 13))
+    position = np.array(parent_inertial.position) + rotations.rotate(parent_turn, offset)
+    orientation = rotations.multiply(
+        rotations.multiply(parent_turn, rotations.conjugate(turn)), rotations.conjugate(child_turn)
+    )
+    joint_type = _JOINT_TYPES[info[2]]
+    limited = joint_type in (JointType.REVOLUTE, JointType.PRISMATIC) and info[8] <= info[9]
+    return Joint(
+        name=info[1].decode(),
+        type=joint_type,
+        axis_in_child=_triple(rotations.rotate(child_turn, axis)),
+        pose_in_parent=Pose(_triple(position), _quadruple(orientation)),
+        lower=float(info[8]) if limited else -math.inf,
+        upper=float(info[9]) if limited else math.inf,
+        effort_limit=float(info[10]) if info[10] > 0.0 else math.inf,
+    )
+
+
+def _depth_first(links: list[Link]) -> list[Link]:
+    """The links with every child right after its parent's branch so far, parents renumbered."""
+    children: list[list[int]] = [[] for _ in links]
+    for index, link in enumerate(links[1:], start=1):
+        children[link.parent].append(index)
+    order: list[int] = []
+    pending = [0]
+    while pending:
+        order.append(pending.pop())
+        pending += reversed(children[order[-1]])
+    place = {old: new for new, old in enumerate(order)} | {-1: -1}
+    return [replace(links[old], parent=place[links[old].parent]) for old in order]
+
+
+def _check_joint_names(file: CharacterFile, layout: JointLayout) -> None:
+    for key, names in (("joints", file.gains), ("clips.joints", file.clips.joints)):
+        for name in names:
+            if name not in layout.actuated_joint_names:
+                sentence = one_of("joint", name, layout.actuated_joint_names)
+                raise CharacterError(f"{file.path}: {key}: {sentence}")
+    if file.assistance and not layout.has_floating_base:
+        raise CharacterError(f"{file.path}: root_assistance is for a floating base, this is fixed")
+
+
+def _gains(file: CharacterFile, layout: JointLayout) -> dict[str, Gains]:
+    gains = {name: file.gains.get(name, Gains()) for name in layout.actuated_joint_names}
+    if layout.has_floating_base:
+        gains[ROOT] = file.assistance.get("force", Gains())
+        gains[ROOT_TORQUE] = file.assistance.get("torque", Gains())
+    return gains
+
+
+def _fixed_base_pose(file: CharacterFile) -> Pose:
+    """Where a fixed base stands in the world; a floating one has its pose in the state."""
+    if file.loading.fixed_base and file.up_axis == "y":
+        return Pose(orientation_xyzw=_quadruple(rotations.ABOUT_X_QUARTER_TURN_XYZW))
+    return Pose()
+
+
+def _rest_position(file: CharacterFile, layout: JointLayout) -> tuple[float, ...]:
+    """The rest pose (n,), message form; a y-up model is turned to stand in the z-up world."""
+    position = np.zeros(layout.size)
+    if layout.has_floating_base and file.up_axis == "y":
+        turned = rotations.log(rotations.ABOUT_X_QUARTER_TURN_XYZW)
+        position[layout.joint(ROOT).vectors[1]] = turned
+    for name, value in file.rest_pose.items():
+        if name not in layout.dof_names:
+            sentence = one_of("degree of freedom", name, list(layout.dof_names))
+            raise CharacterError(f"{file.path}: rest_pose: {sentence}")
+        position[layout.dof_names.index(name)] = value
+    return tuple(position.tolist())
+
+
+def _triple(values: FloatArray) -> Vector:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def _quadruple(values: FloatArray) -> Quaternion:
+    x, y, z, w = values.tolist()
+    return (x, y, z, w)

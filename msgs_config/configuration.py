@@ -1,0 +1,75 @@
+"""What `~/configuration` says: all that a run depends on, as JSON, so that a bag can repeat it."""
+
+import json
+import platform
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+from msgs_config.errors import MessageError
+from msgs_config.joint_layout import JointLayout, JointType
+from msgs_config.parameters import Values
+
+_PACKAGES = ["actuated_characters", "pybullet", "mujoco-core", "numpy", "ros-jazzy-rclpy"]
+
+
+def describe(character: Character, values: Values) -> str:
+    """The JSON text: the character with its files, the parameters in force, and the versions."""
+    content = {
+        "character": character.name,
+        "character_file": character.file.read_text(encoding="utf-8"),
+        "urdf": character.loading.urdf_text,
+        "joints": [
+            {"name": joint.name, "type": joint.type.value} for joint in character.layout.joints
+        ],
+        "effort_limits": character.effort_limits().tolist(),
+        "mass": character.mass,
+        "parameters": values,
+        "versions": {"python": platform.python_version()} | _versions(),
+    }
+    return json.dumps(content)
+
+
+def _versions() -> dict[str, str]:
+    versions = {}
+    for package in _PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:  # a ROS install has some of them from elsewhere
+            versions[package] = "unknown"
+    return versions
+
+
+@dataclass(frozen=True)
+class RunConfiguration:
+    """What a listener needs to read a simulator's topics."""
+
+    character: str
+    layout: JointLayout
+    effort_limits: FloatArray  # (b,) N m or N
+    mass: float  # kg
+    parameters: dict[str, Any]
+
+
+def parse(text: str) -> RunConfiguration:
+    """Read a simulator's `~/configuration`.
+
+    Raises:
+        MessageError: the text is not one.
+    """
+    try:
+        content = json.loads(text)
+        joints = [(joint["name"], JointType(joint["type"])) for joint in content["joints"]]
+        return RunConfiguration(
+            character=str(content["character"]),
+            layout=JointLayout(joints),
+            effort_limits=np.array(content["effort_limits"], dtype=float),
+            mass=float(content["mass"]),
+            parameters=dict(content["parameters"]),
+        )
+    except (ValueError, KeyError, TypeError) as error:
+        raise MessageError("not a simulator's configuration") from error

@@ -1,0 +1,35 @@
+"""The one status that a node reports on `/diagnostics`."""
+
+from collections.abc import Mapping
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+from msgs_config.topics import DIAGNOSTICS, create_publisher
+
+
+class DiagnosticsPublisher:
+    """Publishes a node's counts, and its fault if it has one."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = create_publisher(node, DIAGNOSTICS)
+
+    def publish(self, values: Mapping[str, object], fault: str | None = None) -> None:
+        """Publish the values by name; with a fault the level is ERROR and its text the message."""
+        if self._publisher.get_subscription_count() == 0:
+            return
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.OK if fault is None else DiagnosticStatus.ERROR,
+            name=self._node.get_fully_qualified_name().lstrip("/"),
+            message=fault or "running",
+            values=[KeyValue(key=name, value=str(value)) for name, value in values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def flush(self, seconds: float) -> None:
+        """Wait until every subscriber has what was published, for some seconds at the most."""
+        self._publisher.wait_for_all_acked(Duration(seconds=seconds))

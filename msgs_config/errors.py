@@ -1,0 +1,50 @@
+"""The project's own error types: each one is a line that a user can act on."""
+
+
+class ActuatedCharactersError(Exception):
+    """Base of every error that is the user's to mend; its text is one clear line."""
+
+
+class ConfigurationError(ActuatedCharactersError):
+    """A parameter or a command-line argument cannot be used."""
+
+
+class CharacterError(ActuatedCharactersError):
+    """A character file, its URDF or a name in it cannot be used."""
+
+
+class ClipError(ActuatedCharactersError):
+    """A motion clip is missing or malformed, or does not fit the character."""
+
+
+class LayoutError(ActuatedCharactersError):
+    """Names or arrays do not fit the joint layout."""
+
+
+class MessageError(ActuatedCharactersError):
+    """Bytes on a topic are not the message that they should be."""
+
+
+class CommandError(ActuatedCharactersError):
+    """A command of joint torques is refused as a whole; says which joint and why."""
+
+
+class ClockError(ActuatedCharactersError):
+    """A stamp is no tick of the clock at this rate."""
+
+
+class RecordingError(ActuatedCharactersError):
+    """A recording cannot be written or read."""
+
+
+class RunError(ActuatedCharactersError):
+    """A run could not be started, or one of its processes failed."""
+
+
+class SimulationError(ActuatedCharactersError):
+    """The simulation cannot go on: it diverged, or a command never came."""
+
+
+def one_of(what: str, value: object, choices: list[str]) -> str:
+    """The sentence for a name that is not among the valid ones."""
+    return f"unknown {what} {str(value)!r}; there are: {', '.join(choices)}"

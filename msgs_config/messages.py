@@ -1,0 +1,161 @@
+"""`sensor_msgs/JointState` to and from its serialised form, fast where names do not change.
+
+Filling and reading dozens of name strings is most of the cost of such a message. Names are
+constant, so the bytes up to and with them are kept, and only the stamp and the doubles are
+written or read. Whatever does not look like what was kept goes through rclpy's own decoder.
+
+The form is plain CDR, little endian (OMG DDSI-RTPS 2.3, section 10): every item is aligned to
+its size, counted from the end of the four bytes of encapsulation header.
+"""
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+from msgs_config.arrays import FloatArray
+from msgs_config.errors import LayoutError, MessageError
+from msgs_config.joint_layout import JointLayout
+from msgs_config.stamped import StampedState
+from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
+
+_CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+_NAMES_START = 12  # after the encapsulation header and the stamp
+_MAX_KEPT_SENDERS = 16
+_EMPTY = np.zeros(0)
+
+
+@dataclass(frozen=True)
+class JointArrays:
+    """A decoded JointState: names and arrays in the sender's order; absent arrays are empty."""
+
+    stamp_ns: int
+    names: tuple[str, ...]
+    position: FloatArray
+    velocity: FloatArray
+    effort: FloatArray
+
+
+def split_stamp(stamp_ns: int) -> tuple[int, int]:
+    """Seconds and nanoseconds of a stamp."""
+    return divmod(stamp_ns, NANOSECONDS_PER_SECOND)
+
+
+def _padding(length: int, alignment: int) -> int:
+    return -length % alignment
+
+
+def _cdr_names(names: Sequence[str]) -> bytes:
+    """The bytes from after the stamp to the end of the names, with an empty frame_id."""
+    content = bytearray(struct.pack("<I1sxxx", 1, b"\0"))
+    content += struct.pack("<I", len(names))
+    for name in names:
+        text = name.encode() + b"\0"
+        content += bytes(_padding(len(content), 4)) + struct.pack("<I", len(text)) + text
+    return bytes(content + bytes(_padding(len(content), 4)))
+
+
+class JointStateEncoder:
+    """Serialises JointState messages that all have the same names."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._head = _CDR_LITTLE_ENDIAN + bytes(8) + _cdr_names(names)
+
+    def encode(
+        self,
+        stamp_ns: int,
+        position: FloatArray = _EMPTY,
+        velocity: FloatArray = _EMPTY,
+        effort: FloatArray = _EMPTY,
+    ) -> bytes:
+        """The serialised message; each array is (n,) or empty."""
+        content = bytearray(self._head)
+        struct.pack_into("<iI", content, 4, *split_stamp(stamp_ns))
+        for values in (position, velocity, effort):
+            content += struct.pack("<I", len(values))
+            if len(values):
+                content += bytes(_padding(len(content) - 4, 8)) + values.tobytes()
+        return bytes(content)
+
+
+def encode_clock(stamp_ns: int) -> bytes:
+    """A serialised rosgraph_msgs/Clock."""
+    return _CDR_LITTLE_ENDIAN + struct.pack("<iI", *split_stamp(stamp_ns))
+
+
+class JointStateDecoder:
+    """Reads serialised JointState messages; fast for senders whose names it has seen."""
+
+    def __init__(self) -> None:
+        self._kept: dict[bytes, tuple[str, ...]] = {}
+
+    def decode(self, raw: bytes) -> JointArrays:
+        """The message's content.
+
+        Raises:
+            MessageError: the bytes are no JointState.
+        """
+        for head, names in self._kept.items():
+            if raw.startswith(head, _NAMES_START) and raw.startswith(_CDR_LITTLE_ENDIAN):
+                return _read_doubles(raw, _NAMES_START + len(head), names)
+        return self._decode_slowly(raw)
+
+    def _decode_slowly(self, raw: bytes) -> JointArrays:
+        try:
+            message = deserialize_message(raw, JointState)
+        except Exception as error:  # rclpy has no type of its own for what cannot be decoded
+            raise MessageError(f"{len(raw)} bytes that are no JointState") from error
+        names = tuple(message.name)
+        head = _cdr_names(names)
+        if raw.startswith(head, _NAMES_START) and len(self._kept) < _MAX_KEPT_SENDERS:
+            self._kept[head] = names
+        stamp = message.header.stamp
+        return JointArrays(
+            stamp_ns=stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec,
+            names=names,
+            position=np.array(message.position, dtype=float),
+            velocity=np.array(message.velocity, dtype=float),
+            effort=np.array(message.effort, dtype=float),
+        )
+
+
+def _read_doubles(raw: bytes, offset: int, names: tuple[str, ...]) -> JointArrays:
+    """The rest of a message whose names end at `offset`."""
+    seconds, nanoseconds = struct.unpack_from("<iI", raw, 4)
+    arrays = []
+    try:
+        for _ in range(3):
+            (count,) = struct.unpack_from("<I", raw, offset)
+            offset += 4
+            if count:
+                offset += _padding(offset - 4, 8)
+            arrays.append(np.frombuffer(raw, "<f8", count, offset).copy() if count else _EMPTY)
+            offset += 8 * count
+    except (struct.error, ValueError) as error:
+        raise MessageError(f"a JointState cut off after {len(raw)} bytes") from error
+    return JointArrays(seconds * NANOSECONDS_PER_SECOND + nanoseconds, names, *arrays)
+
+
+def state_in_layout(layout: JointLayout, arrays: JointArrays) -> StampedState:
+    """A received state in the layout's order, matched by name.
+
+    Raises:
+        LayoutError: a name is unknown, or a degree of freedom is missing.
+        MessageError: an array's length is not that of the names.
+    """
+    indices = layout.indices(arrays.names)
+    if len(indices) != layout.size:
+        missing = next(name for name in layout.dof_names if name not in arrays.names)
+        raise LayoutError(f"degree of freedom '{missing}' is missing")
+    lengths = {len(arrays.position), len(arrays.velocity), len(arrays.effort) or layout.size}
+    if lengths != {layout.size}:
+        raise MessageError(f"{layout.size} names but arrays of {sorted(lengths)} entries")
+    ordered = np.empty((3, layout.size))
+    ordered[0, indices], ordered[1, indices] = arrays.position, arrays.velocity
+    if len(arrays.effort):
+        ordered[2, indices] = arrays.effort
+    effort = ordered[2] if len(arrays.effort) else None
+    return StampedState(arrays.stamp_ns, ordered[0], ordered[1], effort)

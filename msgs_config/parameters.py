@@ -1,0 +1,140 @@
+"""Parameters declared with type, unit, bounds and description, and resolved without ROS.
+
+A node, the run of both nodes in one process and the check of a command line all resolve the same
+specifications by the same function, so that a value is right or wrong in the same way everywhere.
+"""
+
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from msgs_config.errors import ConfigurationError, one_of
+
+Scalar: TypeAlias = bool | int | float | str
+Value: TypeAlias = Scalar | list[str] | list[float]
+
+_LARGEST = 1e12
+_LARGEST_FLOAT = sys.float_info.max
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a node; the type of its default is its type."""
+
+    name: str
+    default: Value
+    description: str
+    unit: str = ""
+    minimum: float = 0.0
+    maximum: float = _LARGEST
+    choices: tuple[str, ...] = ()
+    texts: bool = False  # an empty list as the default is one of texts, not of numbers
+    live: bool = False  # may be changed while the node runs
+
+    def checked(self, value: object) -> Value:
+        """The value in the parameter's type; an integer is a fine float.
+
+        Raises:
+            ConfigurationError: wrong type, out of bounds, or none of the choices.
+        """
+        if isinstance(self.default, list):
+            return self._checked_list(value, self.default)
+        return self._checked_scalar(value, self.default)
+
+    def _checked_list(self, value: object, default: list[str] | list[float]) -> Value:
+        if not isinstance(value, (list, tuple)):
+            raise self._wrong(value, "a list")
+        if self.texts or (default and isinstance(default[0], str)):
+            return [str(self._checked_scalar(item, "")) for item in value]
+        return [float(self._checked_scalar(item, 0.0)) for item in value]
+
+    def _checked_scalar(self, value: object, like: Scalar) -> Scalar:
+        if isinstance(like, float) and type(value) is int and abs(value) <= _LARGEST_FLOAT:
+            value = float(value)
+        if type(value) is not type(like):
+            raise self._wrong(value, _TYPE_NAMES[type(like)])
+        if self.choices and value not in self.choices:
+            raise ConfigurationError(
+                one_of(f"value of parameter '{self.name}':", value, list(self.choices))
+            )
+        assert isinstance(value, (bool, int, float, str))
+        if isinstance(value, (bool, str)):
+            return value
+        if not self.minimum <= value <= self.maximum:  # NaN is not within
+            unit = f" {self.unit}" if self.unit else ""
+            raise self._wrong(value, f"{self.minimum:g} to {self.maximum:g}{unit}")
+        return value
+
+    def _wrong(self, value: object, right: str) -> ConfigurationError:
+        return ConfigurationError(f"parameter '{self.name}' is {value!r}; it must be {right}")
+
+
+class Values(dict[str, Value]):
+    """The values of a node's parameters by name, each taken out in the type that it has."""
+
+    def flag(self, name: str) -> bool:
+        """The value of a parameter that is true or false."""
+        value = self[name]
+        assert isinstance(value, bool)
+        return value
+
+    def integer(self, name: str) -> int:
+        """The value of a whole-number parameter."""
+        value = self[name]
+        assert isinstance(value, int)
+        return value
+
+    def number(self, name: str) -> float:
+        """The value of a floating-point parameter."""
+        value = self[name]
+        assert isinstance(value, float)
+        return value
+
+    def text(self, name: str) -> str:
+        """The value of a text parameter."""
+        value = self[name]
+        assert isinstance(value, str)
+        return value
+
+    def numbers(self, name: str) -> tuple[float, ...]:
+        """The value of a parameter that lists numbers."""
+        value = self[name]
+        assert isinstance(value, list)
+        return tuple(float(item) for item in value)
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """The value of a parameter that lists texts."""
+        value = self[name]
+        assert isinstance(value, list)
+        return tuple(str(item) for item in value)
+
+
+_TYPE_NAMES: dict[type, str] = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+}
+
+
+def resolve(parameters: Iterable[Parameter], given: Mapping[str, object]) -> Values:
+    """The value of every parameter: the one given, checked, or else its default.
+
+    Raises:
+        ConfigurationError: a value is wrong, or a name is none of the parameters'.
+    """
+    by_name = {parameter.name: parameter for parameter in parameters}
+    for name in given:
+        if name not in by_name and name not in _OF_EVERY_NODE:
+            raise ConfigurationError(one_of("parameter", name, sorted(by_name)))
+    return Values(
+        {
+            name: parameter.checked(given[name]) if name in given else parameter.default
+            for name, parameter in by_name.items()
+        }
+    )
+
+
+_OF_EVERY_NODE = ("use_sim_time", "start_type_description_service")
+"""Parameters that rclpy itself declares for every node."""

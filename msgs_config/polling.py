@@ -1,0 +1,85 @@
+"""Waiting for messages with the least delay, while services and parameters stay alive.
+
+An executor's way from a message to its callback costs more than the rest of a lockstep tick. So a
+loop takes the one message that it waits for directly from the subscription, gives the processor
+away between tries, and lets the executor have a turn every now and then. When nothing comes for a
+while the loop blocks in the executor, and an idle node costs nothing.
+"""
+
+import os
+import time
+from collections import deque
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from msgs_config.topics import Topic
+
+_SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
+_PATIENCE = 0.003  # s of taking turns with other processes before the loop blocks
+
+
+class DirectSubscription:
+    """A subscription whose serialised messages a loop takes one by one, oldest first."""
+
+    def __init__(self, node: Node, topic: Topic) -> None:
+        self._pending: deque[tuple[bytes, int]] = deque()
+        # When the loop blocks in the executor, it is the executor that takes the message. It
+        # hands a callback of two arguments the message's info too, which rclpy's types leave out.
+        self._subscription = node.create_subscription(
+            topic.message_type,
+            topic.name,
+            self._keep,  # type: ignore[arg-type]
+            topic.qos,
+            raw=True,
+        )
+
+    def _keep(self, raw: bytes, info: dict[str, int]) -> None:
+        self._pending.append((raw, info["source_timestamp"]))
+
+    def take(self) -> bytes | None:
+        """The next serialised message; None if there is none now."""
+        received = self.take_stamped()
+        return None if received is None else received[0]
+
+    def take_stamped(self) -> tuple[bytes, int] | None:
+        """The next serialised message and when it was published, ns of wall time; or None."""
+        if self._pending:
+            return self._pending.popleft()
+        handle = self._subscription.handle
+        with handle:
+            taken = handle.take_message(self._subscription.msg_type, True)
+        return None if taken is None else (taken[0], taken[1]["source_timestamp"])
+
+
+class Spinner:
+    """Gives a loop's idle moments to other processes and to the node's executor."""
+
+    def __init__(self, node: Node) -> None:
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self._busy_until = 0.0
+        self._next_service = 0.0
+
+    def received(self) -> None:
+        """Say that a message came: the next one is worth waiting for without blocking."""
+        self._busy_until = time.monotonic() + _PATIENCE
+
+    def rest(self) -> None:
+        """Let others work; at most about 20 ms."""
+        if time.monotonic() > self._busy_until:
+            self._executor.spin_once(timeout_sec=_SERVICE_PERIOD)
+        else:
+            self.serve()
+            os.sched_yield()
+
+    def serve(self) -> None:
+        """Give the executor its turn if it is due, without waiting for anything."""
+        now = time.monotonic()
+        if now > self._next_service:
+            self._next_service = now + _SERVICE_PERIOD
+            self._executor.spin_once(timeout_sec=0.0)
+
+    def close(self) -> None:
+        """End the executor."""
+        self._executor.shutdown()

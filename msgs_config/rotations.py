@@ -1,0 +1,137 @@
+"""Rotations as unit quaternions (xyzw) and rotation vectors, on arrays of any batch shape.
+
+A quaternion `q` of shape (..., 4) turns coordinates of the child frame into the parent frame.
+`exp` and `log` below are those of SO(3) (Solà, Deray and Atchuthan 2018, "A micro Lie theory").
+"""
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+
+IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
+_TINY = 1e-150  # keeps 0 / 0 away; the product with a vector of length zero is zero all the same
+
+
+def _product_table() -> FloatArray:
+    """The table (4, 16) with `(a @ table).reshape(4, 4) @ b` the Hamilton product `a b`."""
+    table = np.zeros((4, 4, 4))  # [a's component, product's component, b's component]
+    x, y, z, w = range(4)
+    for i, j, k in ((x, y, z), (y, z, x), (z, x, y)):
+        table[i, k, j], table[j, k, i] = 1.0, -1.0  # i j = k, j i = -k
+        table[w, i, i] = table[i, i, w] = 1.0
+        table[i, w, i] = -1.0
+    table[w, w, w] = 1.0
+    return table.reshape(4, 16)
+
+
+def _matrix_table(product_table: FloatArray) -> FloatArray:
+    """The table (16, 9) that takes the products of q's components to its rotation matrix.
+
+    Column j of the matrix is the vector part of `q e_j q^-1`.
+    """
+    product = product_table.reshape(4, 4, 4)  # [a's component, product's component, b's component]
+    times_axis = product[:, :, :3]  # [q's component, component of q e_j, j]
+    by_conjugate = product * _CONJUGATE  # [a's component, product's component, q's component]
+    turned: FloatArray = np.einsum("pmj,mkq->pqkj", times_axis, by_conjugate)
+    return turned[:, :, :3].reshape(16, 9)
+
+
+_CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
+_PRODUCT = _product_table()
+_MATRIX = _matrix_table(_PRODUCT)
+
+
+def multiply(a_xyzw: FloatArray, b_xyzw: FloatArray) -> FloatArray:
+    """Hamilton product `a b`: turn by b first, then by a; (..., 4) each, broadcast.
+
+    By a table, because a few array operations cost less than the sixteen products one by one.
+    """
+    left = (a_xyzw @ _PRODUCT).reshape(*a_xyzw.shape[:-1], 4, 4)
+    return apply(left, b_xyzw)
+
+
+def conjugate(q_xyzw: FloatArray) -> FloatArray:
+    """The inverse of unit quaternions (..., 4)."""
+    inverse: FloatArray = q_xyzw * _CONJUGATE
+    return inverse
+
+
+def matrix(q_xyzw: FloatArray) -> FloatArray:
+    """Rotation matrices (..., 3, 3): their columns are the child's axes in the parent frame."""
+    squares = q_xyzw[..., :, np.newaxis] * q_xyzw[..., np.newaxis, :]
+    flat = squares.reshape(*q_xyzw.shape[:-1], 16) @ _MATRIX
+    return flat.reshape(*q_xyzw.shape[:-1], 3, 3)
+
+
+def apply(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Each vector (..., m) multiplied by its matrix (..., k, m): (..., k)."""
+    product: FloatArray = np.matmul(matrices, vectors[..., np.newaxis])
+    return product[..., 0]
+
+
+def _length(vectors: FloatArray) -> FloatArray:
+    """Lengths (..., 1) of vectors (..., m)."""
+    squares: FloatArray = np.einsum("...i,...i->...", vectors, vectors)
+    lengths: FloatArray = np.sqrt(squares)[..., np.newaxis]
+    return lengths
+
+
+def rotate(q_xyzw: FloatArray, vector: FloatArray) -> FloatArray:
+    """Vectors (..., 3) given in the child frame, in the parent frame; same unit as given."""
+    return apply(matrix(q_xyzw), vector)
+
+
+def exp(rotation_vector: FloatArray) -> FloatArray:
+    """Unit quaternions xyzw (..., 4) of rotation vectors (..., 3) in rad."""
+    half_angle = 0.5 * _length(rotation_vector)
+    q_xyzw = np.empty((*rotation_vector.shape[:-1], 4))
+    q_xyzw[..., :3] = rotation_vector * (0.5 * np.sin(half_angle) / np.maximum(half_angle, _TINY))
+    q_xyzw[..., 3:] = np.cos(half_angle)
+    return q_xyzw
+
+
+def log(q_xyzw: FloatArray) -> FloatArray:
+    """Rotation vectors (..., 3) in rad, of norm at most pi, of unit quaternions (..., 4).
+
+    Of the two quaternions of a rotation the one with w >= 0 is meant, so that the angle is the
+    shorter one.
+    """
+    axis, w = q_xyzw[..., :3], q_xyzw[..., 3:]
+    sine = _length(axis)
+    angle = 2.0 * np.arctan2(sine, np.abs(w))
+    return axis * np.copysign(angle / np.maximum(sine, _TINY), w)
+
+
+def normalised(q_xyzw: FloatArray) -> FloatArray:
+    """Quaternions (..., 4) scaled to length one."""
+    return q_xyzw / _length(q_xyzw)
+
+
+def angle_between(a_xyzw: FloatArray, b_xyzw: FloatArray) -> FloatArray:
+    """Angle (...) in rad, 0 to pi, that turns a into b."""
+    return _length(log(multiply(conjugate(a_xyzw), b_xyzw)))[..., 0]
+
+
+def yaw(q_xyzw: FloatArray) -> FloatArray:
+    """Angle (...) in rad about the parent's z axis: the twist of the swing-twist decomposition."""
+    angle: FloatArray = 2.0 * np.arctan2(q_xyzw[..., 2], q_xyzw[..., 3])
+    return angle
+
+
+def about_z(angle: float) -> FloatArray:
+    """The quaternion xyzw (4,) of a turn by `angle` rad about z."""
+    return np.array([0.0, 0.0, np.sin(0.5 * angle), np.cos(0.5 * angle)])
+
+
+ABOUT_X_QUARTER_TURN_XYZW = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
+"""Turns a y-up model or clip into the z-up world."""
+
+
+def xyzw_from_wxyz(q_wxyz: FloatArray) -> FloatArray:
+    """Reorder quaternions (..., 4), scalar first to scalar last."""
+    return np.roll(q_wxyz, -1, axis=-1)
+
+
+def wxyz_from_xyzw(q_xyzw: FloatArray) -> FloatArray:
+    """Reorder quaternions (..., 4), scalar last to scalar first."""
+    return np.roll(q_xyzw, 1, axis=-1)

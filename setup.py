@@ -1,0 +1,66 @@
+"""Packaging for both installs: pip (``pip install -e '.[wheels]'``) and ROS (``colcon build``)."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+PACKAGE = "actuated_characters"
+ROOTS = ("msgs_config", "sim_node", "controller_node", "experiment")
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="Physically simulated characters, actuated by torques over ROS 2 topics.",
+    maintainer="actuated_characters developers",
+    maintainer_email="maintainers@example.org",
+    license="Apache-2.0",
+    python_requires=">=3.11,<3.13",
+    packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),
+    package_data={"msgs_config": ["characters/*.yaml", "characters/*.urdf"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+        (f"share/{PACKAGE}/launch", sorted(glob("launch/*.py"))),
+        (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
+    ],
+    zip_safe=False,
+    # What every install takes from pip. ROS itself is not among it: in a full ROS install rclpy and
+    # the messages are there already (under other names), pip would put a second, different copy
+    # beside them, and a requirement that is not met stops a program that imports pkg_resources.
+    install_requires=[
+        "matplotlib>=3.6,<4",
+        "mujoco-core>=4.0,<5",
+        "numpy>=1.26,<3",
+        "pybullet>=3.2.7,<3.3",
+        "PyYAML>=6.0,<7",
+        "rich>=13.7,<16",
+        "rosbags>=0.11.9,<0.12",
+    ],
+    extras_require={
+        # ROS 2 Jazzy for a machine without ROS; the Makefile installs this extra.
+        "wheels": [
+            "ros-jazzy-common-interfaces>=5.3.6,<5.4",
+            "ros-jazzy-rclpy>=7.1.6,<7.2",
+            "ros-rclpy[fastrtps]>=7.1.6,<7.2",
+        ],
+        # `colcon test` chooses pytest because this extra, of this name, lists it.
+        # The linters are held to one minor version: a new one may have new rules.
+        "test": [
+            "hypothesis>=6.98,<7",
+            "mcap>=1.2,<2",
+            "mcap-ros2-support>=0.5.5,<0.7",
+            "mypy>=2.4,<2.5",
+            "pytest>=7.4,<10",
+            "ruff>=0.17.5,<0.18",
+            "types-PyYAML>=6.0.12",
+        ],
+    },
+    entry_points={
+        "console_scripts": [
+            "sim_node = sim_node.main:main",
+            "controller_node = controller_node.main:main",
+            "recorder = experiment.recorder_main:main",
+            "actuated_characters = experiment.cli:main",
+        ],
+    },
+)

@@ -1,0 +1,215 @@
+"""One character in the engine: its state read and its efforts applied, in URDF link frames.
+
+PyBullet's base pose and velocity, and a ball joint's rotation, velocity and torque, are those of
+*inertial* frames. With `o` the orientation of a link's inertial frame in its link frame, a ball
+joint's rotation `q` in the engine is `o q o^-1` here, its velocity `w` is `o w`; the base's
+orientation `q` in the engine is `q o^-1` here.
+"""
+
+from itertools import chain
+
+import numpy as np
+
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.bullet import load_urdf, pybullet
+from msgs_config.character import Character
+from msgs_config.joint_layout import JointType
+
+_UNLIMITED_SPEED = 1e9  # Bullet clamps at 100 otherwise, and a divergence would stay unseen
+
+
+class Body:
+    """A character loaded into an engine. Positions, velocities and efforts are (n,) arrays."""
+
+    def __init__(self, client: int, character: Character, friction: float) -> None:
+        self._client = client
+        self._layout = character.layout
+        self._body = load_urdf(client, character.loading)
+        self._floating = self._layout.has_floating_base
+        base = character.links[0]
+        self._base_offset = np.array(base.inertial_pose.position)
+        self._base_turn = np.array(base.inertial_pose.orientation_xyzw)
+        self._base_turn_back = rotations.conjugate(self._base_turn)
+        self._find_joints(character)
+        self._remove_motors_and_damping(friction)
+        if not self._floating:
+            pose = base.joint.pose_in_parent
+            self._place_base(np.array(pose.position), np.array(pose.orientation_xyzw))
+
+    def _find_joints(self, character: Character) -> None:
+        """Where each joint of the layout is in the engine, and its entries in what it returns."""
+        count = pybullet.getNumJoints(self._body, physicsClientId=self._client)
+        infos = [
+            pybullet.getJointInfo(self._body, i, physicsClientId=self._client) for i in range(count)
+        ]
+        numbers = {info[1].decode(): info[0] for info in infos}
+        self._links = [-1, *numbers.values()]
+        joints = [j for j in self._layout.joints if j.type is not JointType.FLOATING]
+        self._joint_start = self._layout.size - sum(len(j.dof_names) for j in joints)
+        self._joints = [numbers[joint.name] for joint in joints]
+        self._entries = [joint.entries for joint in joints]
+        self._balls = [numbers[j.name] for j in joints if j.type is JointType.SPHERICAL]
+        self._scalar_entries = np.array(
+            [j.start for j in joints if j.type is not JointType.SPHERICAL], dtype=np.intp
+        )
+        self._ball_entries = self._layout.rotation_entries[int(self._floating) :]
+        widths = [4 if joint.type is JointType.SPHERICAL else 1 for joint in joints]
+        starts = np.cumsum([0, *widths])[:-1]
+        is_ball = np.array(widths) == 4
+        self._scalar_columns = starts[~is_ball]
+        self._ball_columns = starts[is_ball][:, np.newaxis] + np.arange(4)
+        turns = {link.joint.name: link.inertial_pose.orientation_xyzw for link in character.links}
+        balls = [turns[j.name] for j in joints if j.type is JointType.SPHERICAL]
+        self._ball_turns = rotations.matrix(np.array(balls).reshape(-1, 4))
+
+    def _remove_motors_and_damping(self, friction: float) -> None:
+        """Take away what the engine adds of its own, and set the friction."""
+        for link in self._links:
+            pybullet.changeDynamics(
+                self._body,
+                link,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                lateralFriction=friction,
+                maxJointVelocity=_UNLIMITED_SPEED,
+                physicsClientId=self._client,
+            )
+        for index in self._joints:
+            pybullet.setJointMotorControl2(
+                self._body,
+                index,
+                pybullet.POSITION_CONTROL,
+                positionGain=0.0,
+                targetVelocity=0.0,
+                force=0.0,
+                physicsClientId=self._client,
+            )
+        for index in self._balls:  # a ball joint has a second default motor
+            pybullet.setJointMotorControlMultiDof(
+                self._body,
+                index,
+                pybullet.POSITION_CONTROL,
+                targetPosition=rotations.IDENTITY_XYZW,
+                positionGain=0.0,
+                velocityGain=1.0,
+                force=(0.0, 0.0, 0.0),
+                physicsClientId=self._client,
+            )
+
+    def read(self) -> tuple[FloatArray, FloatArray]:
+        """Position and velocity (n,), message form."""
+        position, velocity = np.empty(self._layout.size), np.empty(self._layout.size)
+        if self._floating:
+            position[:6], velocity[:6] = self._read_base()
+        states = pybullet.getJointStatesMultiDof(
+            self._body, self._joints, physicsClientId=self._client
+        )
+        joint_positions = np.array(list(chain.from_iterable(state[0] for state in states)))
+        position[self._scalar_entries] = joint_positions[self._scalar_columns]
+        velocity[self._joint_start :] = list(chain.from_iterable(state[1] for state in states))
+        if self._balls:
+            turned = rotations.log(joint_positions[self._ball_columns])
+            position[self._ball_entries] = rotations.apply(self._ball_turns, turned)
+            velocity[self._ball_entries] = rotations.apply(
+                self._ball_turns, velocity[self._ball_entries]
+            )
+        return position, velocity
+
+    def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Put the character into a state given as `read` gives it."""
+        if self._floating:
+            self._place_base(position[:3], rotations.exp(position[3:6]))
+            self._set_base_velocity(velocity[:3], velocity[3:6])
+        back = np.swapaxes(self._ball_turns, -1, -2)
+        balls = dict(
+            zip(
+                self._balls,
+                zip(
+                    rotations.exp(rotations.apply(back, position[self._ball_entries])),
+                    rotations.apply(back, velocity[self._ball_entries]),
+                    strict=True,
+                ),
+                strict=True,
+            )
+        )
+        for index, entries in zip(self._joints, self._entries, strict=True):
+            value, speed = balls.get(index, (position[entries], velocity[entries]))
+            pybullet.resetJointStateMultiDof(
+                self._body,
+                index,
+                targetValue=value,
+                targetVelocity=speed,
+                physicsClientId=self._client,
+            )
+
+    def apply(self, effort: FloatArray) -> None:
+        """Apply a generalised effort (n,) during the engine's next step, and only then."""
+        joint_effort = effort.copy()
+        if self._balls:
+            back = np.swapaxes(self._ball_turns, -1, -2)
+            joint_effort[self._ball_entries] = rotations.apply(back, effort[self._ball_entries])
+        values = joint_effort.tolist()
+        pybullet.setJointMotorControlMultiDofArray(
+            self._body,
+            self._joints,
+            pybullet.TORQUE_CONTROL,
+            forces=[values[entries] for entries in self._entries],
+            physicsClientId=self._client,
+        )
+        if self._floating and any(values[:6]):
+            self._apply_to_base(effort[:3], effort[3:6])
+
+    def _apply_to_base(self, force: FloatArray, torque_in_base: FloatArray) -> None:
+        """Apply a force (N, world) at the base link's origin, and a torque (N m, base frame)."""
+        origin, _, axes = self._base_frame()
+        pybullet.applyExternalForce(
+            self._body, -1, force, origin, pybullet.WORLD_FRAME, physicsClientId=self._client
+        )
+        torque = axes @ torque_in_base
+        pybullet.applyExternalTorque(
+            self._body, -1, torque, pybullet.WORLD_FRAME, physicsClientId=self._client
+        )
+
+    def _base_frame(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Origin (3,) in m, orientation xyzw (4,) and axes (3, 3) of the base link in the world."""
+        com, inertial_turn = pybullet.getBasePositionAndOrientation(
+            self._body, physicsClientId=self._client
+        )
+        turn = rotations.multiply(np.array(inertial_turn), self._base_turn_back)
+        axes = rotations.matrix(turn)
+        return com - axes @ self._base_offset, turn, axes
+
+    def _read_base(self) -> tuple[FloatArray, FloatArray]:
+        """Position and velocity (6,) of the floating base, message form."""
+        origin, turn, axes = self._base_frame()
+        linear, angular = pybullet.getBaseVelocity(self._body, physicsClientId=self._client)
+        angular_in_base = np.array(angular) @ axes
+        position = np.concatenate((origin, rotations.log(turn)))
+        arm_velocity = axes @ _cross(angular_in_base, self._base_offset)
+        return position, np.concatenate((linear - arm_velocity, angular_in_base))
+
+    def _place_base(self, origin: FloatArray, turn_xyzw: FloatArray) -> None:
+        pybullet.resetBasePositionAndOrientation(
+            self._body,
+            origin + rotations.rotate(turn_xyzw, self._base_offset),
+            rotations.multiply(turn_xyzw, self._base_turn),
+            physicsClientId=self._client,
+        )
+
+    def _set_base_velocity(self, linear: FloatArray, angular_in_base: FloatArray) -> None:
+        _, _, axes = self._base_frame()
+        pybullet.resetBaseVelocity(
+            self._body,
+            linear + axes @ _cross(angular_in_base, self._base_offset),
+            axes @ angular_in_base,
+            physicsClientId=self._client,
+        )
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product (3,); on three numbers each a fraction of the time of `numpy.cross`."""
+    ax, ay, az = a.tolist()
+    bx, by, bz = b.tolist()
+    return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))

@@ -1,0 +1,45 @@
+"""What is due while the simulator waits for commands, by the wall clock. No ROS in here."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Due(Enum):
+    """What a long wait calls for."""
+
+    REPUBLISH = "republish"  # somebody may have joined too late for the state
+    EXPLAIN = "explain"  # somebody should hear what is missing
+    TIMEOUT = "timeout"  # the wait has been too long
+
+
+@dataclass
+class Patience:
+    """Times in s of wall time, counted from `restart`; a timeout of 0 never comes."""
+
+    republish_period: float
+    explain_after: float
+    timeout: float
+    _republish_at: float = math.inf
+    _explain_at: float = math.inf
+    _timeout_at: float = math.inf
+
+    def restart(self, now: float) -> None:
+        """A new state was published."""
+        self._republish_at = now + self.republish_period
+        self._explain_at = now + self.explain_after
+        self._timeout_at = now + self.timeout if self.timeout > 0.0 else math.inf
+
+    def due(self, now: float) -> list[Due]:
+        """What has become due since it was last asked, each explanation and timeout once."""
+        events = []
+        if now >= self._republish_at:
+            events.append(Due.REPUBLISH)
+            self._republish_at = now + self.republish_period
+        if now >= self._explain_at:
+            events.append(Due.EXPLAIN)
+            self._explain_at = math.inf
+        if now >= self._timeout_at:
+            events.append(Due.TIMEOUT)
+            self._timeout_at = math.inf
+        return events

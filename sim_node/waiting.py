@@ -1,0 +1,33 @@
+"""What to tell a user whose simulator waits: what is missing, and who could send it."""
+
+from rclpy.node import Node
+from rclpy.qos import QoSCompatibility, qos_check_compatible
+
+from msgs_config.topics import Topic
+
+_NAMES_SHOWN = 6
+
+
+def describe_waiting(node: Node, topic: Topic, missing: list[str]) -> str:
+    """One sentence: the entries that lack a command, and the publishers that there are."""
+    shown = ", ".join(missing[:_NAMES_SHOWN])
+    more = f" and {len(missing) - _NAMES_SHOWN} more" if len(missing) > _NAMES_SHOWN else ""
+    return f"waiting for commands of {shown}{more}; {_describe_publishers(node, topic)}"
+
+
+def publisher_names(node: Node, topic: Topic) -> list[str]:
+    """Full names of the nodes that publish on a topic."""
+    infos = node.get_publishers_info_by_topic(topic.name)
+    return sorted({f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos})
+
+
+def _describe_publishers(node: Node, topic: Topic) -> str:
+    infos = node.get_publishers_info_by_topic(topic.name)
+    if not infos:
+        return f"nobody publishes on '{topic.name}'"
+    sentence = f"'{topic.name}' is published by {', '.join(publisher_names(node, topic))}"
+    for info in infos:
+        compatibility, reason = qos_check_compatible(info.qos_profile, topic.qos)
+        if compatibility == QoSCompatibility.ERROR:
+            sentence += f"; the QoS of {info.node_name} does not fit: {reason.strip()}"
+    return sentence

@@ -1,0 +1,272 @@
+"""The layers of the design, read from the import statements; and what packaging says twice."""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+PROJECT = Path(__file__).parents[1]
+MAY_IMPORT = {  # of the project's own packages
+    "msgs_config": set(),
+    "sim_node": {"msgs_config"},
+    "controller_node": {"msgs_config"},
+    "experiment": {"msgs_config", "sim_node", "controller_node"},
+}
+ROS_NAMES = re.compile(
+    r"rclpy|rpyutils|rosidl_\w+|ament_\w+|builtin_interfaces|rcl_interfaces|\w+_(msgs|srvs)"
+)
+EDGE = {  # the files that speak ROS, beside all of experiment/
+    "msgs_config/diagnostics.py",
+    "msgs_config/messages.py",
+    "msgs_config/node_parameters.py",
+    "msgs_config/polling.py",
+    "msgs_config/process.py",
+    "msgs_config/topics.py",
+    "sim_node/node.py",
+    "sim_node/outputs.py",
+    "sim_node/waiting.py",
+    "controller_node/node.py",
+}
+FINDS_PACKAGES = "msgs_config/files.py"  # ament_index_python, to resolve package://
+ENGINES = {
+    "pybullet": {"msgs_config/bullet.py"},
+    "mujoco": {"controller_node/dynamics.py"},
+}
+MAY_USE_BULLET = {
+    "msgs_config/character_loading.py",
+    "sim_node/body.py",
+    "sim_node/world.py",
+}
+KNOW_NO_ROS = [
+    "msgs_config.arrays",
+    "msgs_config.character",
+    "msgs_config.character_loading",
+    "msgs_config.joint_layout",
+    "msgs_config.parameters",
+    "msgs_config.rotations",
+    "msgs_config.tick_clock",
+    "sim_node.lockstep",
+    "sim_node.parameters",
+    "sim_node.patience",
+    "sim_node.simulation",
+    "controller_node.control_laws",
+    "controller_node.controller",
+    "controller_node.parameters",
+]
+KNOW_NO_ENGINE = [
+    "msgs_config.joint_layout",
+    "msgs_config.messages",
+    "msgs_config.parameters",
+    "msgs_config.rotations",
+    "msgs_config.tick_clock",
+    "sim_node.lockstep",
+    "sim_node.patience",
+    "controller_node.control_laws",
+]
+
+SOURCES = sorted(
+    path.relative_to(PROJECT).as_posix()
+    for package in MAY_IMPORT
+    for path in (PROJECT / package).rglob("*.py")
+)
+
+
+@cache
+def imports_of(source: str) -> frozenset[str]:
+    """Every module that a file imports, anywhere in it; `from a import b` counts as `a.b` too."""
+    return frozenset(_imports(ast.parse((PROJECT / source).read_text(encoding="utf-8"))))
+
+
+def _imports(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0 and node.module, "relative imports hide the layer"
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def roots_of(source: str) -> set[str]:
+    """The packages that a file imports from."""
+    return {module.split(".")[0] for module in imports_of(source)}
+
+
+def file_of(module: str) -> str | None:
+    """The file of one of the project's own modules; None for anything else."""
+    path = module.replace(".", "/")
+    return next((file for file in (f"{path}.py", f"{path}/__init__.py") if file in SOURCES), None)
+
+
+def reached_from(module: str) -> set[str]:
+    """The project's files that come with a module, itself included."""
+    first = file_of(module)
+    assert first is not None, f"{module} does not exist"
+    reached, pending = set[str](), [first]
+    while pending:
+        source = pending.pop()
+        if source not in reached:
+            reached.add(source)
+            pending += [file for name in imports_of(source) if (file := file_of(name))]
+    return reached
+
+
+def ros_packages(source: str) -> set[str]:
+    return {root for root in roots_of(source) if ROS_NAMES.fullmatch(root)}
+
+
+def test_there_are_sources_to_read() -> None:
+    assert {source.split("/")[0] for source in SOURCES} == set(MAY_IMPORT)
+    assert "pybullet" in roots_of("msgs_config/bullet.py")
+    assert "rclpy" in roots_of("msgs_config/process.py")  # imported inside a function
+
+
+# The layers
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_imports_run_one_way_between_the_packages(source: str) -> None:
+    package = source.split("/")[0]
+    others = roots_of(source) & (set(MAY_IMPORT) - {package})
+
+    assert others <= MAY_IMPORT[package]
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_nothing_that_runs_imports_the_tests(source: str) -> None:
+    assert not roots_of(source) & {"tests", "pytest", "hypothesis", "benchmarks", "examples"}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_each_engine_is_imported_by_the_one_file_named_for_it(engine: str) -> None:
+    importers = {source for source in SOURCES if engine in roots_of(source)}
+
+    assert importers == ENGINES[engine]
+
+
+def test_the_simulators_engine_is_used_by_the_files_around_it_alone() -> None:
+    users = {source for source in SOURCES if "msgs_config.bullet.pybullet" in imports_of(source)}
+
+    assert users == MAY_USE_BULLET
+    importers = {source for source in SOURCES if "msgs_config.bullet" in imports_of(source)}
+    assert importers == MAY_USE_BULLET
+
+
+def test_ros_is_spoken_at_the_edge_alone() -> None:
+    speakers = {source for source in SOURCES if ros_packages(source) - {"ament_index_python"}}
+    packages_found_by = {source for source in SOURCES if "ament_index_python" in roots_of(source)}
+
+    assert {source for source in speakers if not source.startswith("experiment/")} <= EDGE
+    assert {source for source in packages_found_by if not source.startswith("experiment/")} <= {
+        FINDS_PACKAGES
+    }
+
+
+@pytest.mark.parametrize("edge", sorted(EDGE))
+def test_every_file_at_the_edge_speaks_ros(edge: str) -> None:
+    assert ros_packages(edge), f"{edge} is not at the edge any more"
+
+
+@pytest.mark.parametrize("module", KNOW_NO_ROS)
+def test_what_knows_no_ros_does_not_reach_it_by_way_of_another_file(module: str) -> None:
+    assert not reached_from(module) & EDGE
+
+
+@pytest.mark.parametrize("module", KNOW_NO_ENGINE)
+def test_what_knows_no_engine_does_not_reach_it_by_way_of_another_file(module: str) -> None:
+    assert not reached_from(module) & set.union(*ENGINES.values())
+
+
+def test_the_simulator_reaches_no_model_and_the_controller_no_simulator() -> None:
+    simulator, controller = reached_from("sim_node.node"), reached_from("controller_node.node")
+
+    assert not any(source.startswith("controller_node/") for source in simulator)
+    assert not any(source.startswith("sim_node/") for source in controller)
+
+
+@pytest.mark.parametrize("main", ["sim_node/main.py", "controller_node/main.py"])
+def test_a_process_can_limit_its_threads_before_numpy_loads(main: str) -> None:
+    assert not _roots_at_import(main) & {"numpy", "rclpy"}
+
+
+def _roots_at_import(source: str) -> set[str]:
+    """The packages that a file loads when it is imported itself, functions left aside."""
+    roots, pending, seen = set[str](), [source], set[str]()
+    while pending:
+        file = pending.pop()
+        if file in seen:
+            continue
+        seen.add(file)
+        tree = ast.parse((PROJECT / file).read_text(encoding="utf-8"))
+        top = ast.Module([node for node in tree.body if not _is_definition(node)], [])
+        for name in _imports(top):
+            roots.add(name.split(".")[0])
+            own = file_of(name)
+            pending += [own] if own else []
+    return roots
+
+
+def _is_definition(node: ast.stmt) -> bool:
+    return isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef))
+
+
+# What packaging says twice
+
+
+def package_xml() -> ElementTree.Element:
+    return ElementTree.fromstring((PROJECT / "package.xml").read_bytes())
+
+
+def setup_arguments() -> dict[str, ast.expr]:
+    tree = ast.parse((PROJECT / "setup.py").read_text(encoding="utf-8"))
+    calls = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "setup"
+    ]
+    (call,) = calls
+    return {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg}
+
+
+def test_both_package_files_have_one_version_and_one_licence() -> None:
+    arguments = setup_arguments()
+
+    assert package_xml().findtext("version") == ast.literal_eval(arguments["version"])
+    assert package_xml().findtext("license") == ast.literal_eval(arguments["license"])
+    assert package_xml().findtext("maintainer") == ast.literal_eval(arguments["maintainer"])
+
+
+def test_every_ros_package_that_is_imported_is_a_dependency() -> None:
+    declared = {element.text for element in package_xml().iter("exec_depend")}
+    imported = set.union(*(ros_packages(source) for source in SOURCES))
+
+    assert imported <= declared
+
+
+def test_every_python_package_that_is_imported_is_required() -> None:
+    distributions = {"PyYAML": "yaml", "mujoco-core": "mujoco"}
+    requirements = ast.literal_eval(setup_arguments()["install_requires"])
+    names = {re.split(r"[<>=]", requirement)[0] for requirement in requirements}
+    required = {distributions.get(name, name) for name in names}
+    imported = {
+        root
+        for source in SOURCES
+        for root in roots_of(source) - ros_packages(source)
+        if root not in sys.stdlib_module_names and root not in MAY_IMPORT
+    }
+
+    assert imported <= required
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_every_folder_with_sources_is_a_package(package: str) -> None:
+    folders = {path.parent for path in (PROJECT / package).rglob("*.py")}
+
+    assert all((folder / "__init__.py").exists() for folder in folders)
