@@ -81,13 +81,18 @@ class DynamicsModel:
 
 
 def _compile(character: Character, gravity: float) -> mujoco.MjModel:
+    """MuJoCo's model of a character, its bodies in the order of the character's links."""
     spec = mujoco.MjSpec()
     spec.option.gravity = (0.0, 0.0, -gravity)
     spec.compiler.balanceinertia = False
     bodies = [spec.worldbody]
     for link in character.links:
         bodies.append(_add_body(bodies[link.parent + 1], link))
-    return spec.compile()
+    model = spec.compile()
+    # set afterwards: the compiler refuses a link with mass but without inertia, which is sound
+    # wherever the joints above it cannot turn it about its centre of mass alone
+    model.body_inertia[1:] = [link.inertia_diagonal for link in character.links]
+    return model
 
 
 def _add_body(parent: mujoco.MjsBody, link: Link) -> mujoco.MjsBody:
@@ -99,7 +104,7 @@ def _add_body(parent: mujoco.MjsBody, link: Link) -> mujoco.MjsBody:
         mass=link.mass,
         ipos=inertial.position,
         iquat=rotations.wxyz_from_xyzw(np.array(inertial.orientation_xyzw)),
-        inertia=link.inertia_diagonal,
+        inertia=(1.0, 1.0, 1.0),
         explicitinertial=True,
     )
     if link.joint.type is not JointType.FIXED:

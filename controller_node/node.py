@@ -112,10 +112,21 @@ class ControllerNode(Node):
             episode_ns = self._episode_of(state)
             if episode_ns is None:
                 return  # the simulator publishes the state again
+            self._check_rate(state)
             self._answer = self._compute(state, episode_ns)
         if self._references.get_subscription_count():
             self._references.publish(self._answer.reference)
         self._torques.publish(self._answer.torques)
+
+    def _check_rate(self, state: StampedState) -> None:
+        """Say so if states come several ticks apart: their stamps fit any multiple of the rate."""
+        if self._answer is None or state.effort is None:
+            return
+        clock = self._controller.clock
+        apart = clock.tick(state.stamp_ns) - clock.tick(self._answer.stamp_ns)
+        if apart > 1:
+            rate = f"{clock.rate_hz} Hz"
+            self._tell_once(f"states come {apart} ticks apart at {rate}; is that the simulator's?")
 
     def _compute(self, state: StampedState, episode_ns: int) -> _Answer:
         effort, reference = self._controller.answer(state, episode_ns)

@@ -7,6 +7,7 @@ orientation `q` in the engine is `q o^-1` here.
 """
 
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -73,8 +74,11 @@ class Body:
                 angularDamping=0.0,
                 jointDamping=0.0,
                 lateralFriction=friction,
-                maxJointVelocity=_UNLIMITED_SPEED,
                 physicsClientId=self._client,
+            )
+            # in one call with this, the engine overlooks the joint damping
+            pybullet.changeDynamics(
+                self._body, link, maxJointVelocity=_UNLIMITED_SPEED, physicsClientId=self._client
             )
         for index in self._joints:
             pybullet.setJointMotorControl2(
@@ -103,10 +107,14 @@ class Body:
         position, velocity = np.empty(self._layout.size), np.empty(self._layout.size)
         if self._floating:
             position[:6], velocity[:6] = self._read_base()
-        states = pybullet.getJointStatesMultiDof(
-            self._body, self._joints, physicsClientId=self._client
+        states: tuple[Any, ...] = ()
+        if self._joints:
+            states = pybullet.getJointStatesMultiDof(
+                self._body, self._joints, physicsClientId=self._client
+            )
+        joint_positions = np.array(
+            list(chain.from_iterable(state[0] for state in states)), dtype=float
         )
-        joint_positions = np.array(list(chain.from_iterable(state[0] for state in states)))
         position[self._scalar_entries] = joint_positions[self._scalar_columns]
         velocity[self._joint_start :] = list(chain.from_iterable(state[1] for state in states))
         if self._balls:

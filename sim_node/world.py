@@ -23,6 +23,7 @@ class World:
 
     `save` and `restore` keep the engine's contact caches, so that what follows a restored state
     is what followed the saved one, to the bit; setting positions and velocities alone is not.
+    Restore right after a step: the engine keeps an effort that was applied but not stepped yet.
     """
 
     def __init__(self, character: Character, settings: WorldSettings) -> None:

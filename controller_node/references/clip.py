@@ -75,7 +75,9 @@ class ClipReference:
 
     def _closed(self, frames: ClipFrames) -> tuple[FloatArray, FloatArray]:
         """The frames with the last ones led towards the first one of the next cycle."""
-        progress = np.clip((frames.times - self._period) / _BLEND_TIME + 1.0, 0.0, 1.0)
+        progress = np.clip(
+            (frames.times - self._period) / min(_BLEND_TIME, self._period) + 1.0, 0.0, 1.0
+        )
         weight = (progress * progress * (3.0 - 2.0 * progress))[:, np.newaxis]
         positions, orientations = frames.positions, frames.orientations_xyzw
         gap = positions[0] - positions[-1]
@@ -86,7 +88,8 @@ class ClipReference:
             goal[0] = rotations.multiply(rotations.about_z(self._turn), orientations[0, 0])
         turn = rotations.log(rotations.multiply(rotations.conjugate(orientations[-1]), goal))
         correction = rotations.exp(weight[:, :, np.newaxis] * turn)
-        return positions + weight * gap, rotations.multiply(orientations, correction)
+        within = np.clip(positions + weight * gap, *frames.bounds)
+        return within, rotations.multiply(orientations, correction)
 
     def _segment_velocities(self) -> FloatArray:
         """Velocity (f - 1, n) between each frame and the next; a rotation's in the child frame."""

@@ -19,6 +19,7 @@ from msgs_config.joint_layout import JointType
 
 _ROOT_COLUMNS = 8  # duration, position, quaternion
 _SHORTEST_QUATERNION = 0.1
+_LARGEST_NUMBER = 1e6  # m or s
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class ClipFrames:
     positions: FloatArray  # (f, n) message form, save that rotations are in `orientations_xyzw`
     orientations_xyzw: FloatArray  # (f, k, 4)
     wraps: bool  # whether it goes on from its end
+    bounds: tuple[FloatArray, FloatArray]  # (n,) each, the joint limits
     clamped: tuple[str, ...]  # degrees of freedom that had to be kept within their limits
 
 
@@ -68,7 +70,7 @@ def _parse(path: Path, text: str) -> tuple[str, FloatArray]:
     try:
         content = json.loads(text)
         loop, frames = content["Loop"], np.array(content["Frames"], dtype=float)
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise ClipError(
             f"{path}: not a motion clip; it must be JSON with 'Loop' and with 'Frames' of equal "
             "length"
@@ -77,20 +79,23 @@ def _parse(path: Path, text: str) -> tuple[str, FloatArray]:
         raise ClipError(f"{path}: Loop is {loop!r}; it must be 'wrap' or 'none'")
     if frames.ndim != 2 or len(frames) < 2:
         raise ClipError(f"{path}: needs two frames or more")
-    if not np.isfinite(frames).all():
-        raise ClipError(f"{path}: frame {_first_bad_row(frames)} holds a number that is not finite")
+    sound = np.abs(frames) <= _LARGEST_NUMBER  # NaN is not
+    if not sound.all():
+        bad = int(np.argmin(sound.all(axis=1)))
+        raise ClipError(f"{path}: frame {bad} holds a number that is not finite, or over 1e6")
     if not (frames[:-1, 0] > 0.0).all():
         bad = int(np.argmax(frames[:-1, 0] <= 0.0))
         raise ClipError(f"{path}: frame {bad} lasts {frames[bad, 0]} s; it must last some time")
     return loop, frames
 
 
-def _first_bad_row(frames: FloatArray) -> int:
-    return int(np.argmin(np.isfinite(frames).all(axis=1)))
-
-
 def _in_layout(character: Character, path: Path, loop: str, frames: FloatArray) -> ClipFrames:
     layout, column = character.layout, _ROOT_COLUMNS
+    if frames.shape[1] != _width(character):
+        raise ClipError(
+            f"{path}: frames have {frames.shape[1]} numbers; "
+            f"character '{character.name}' needs {_width(character)}"
+        )
     positions = np.tile(np.array(character.rest_position), (len(frames), 1))
     orientations = rotations.exp(positions[:, layout.rotation_entries])
     rotation_of = {int(start): k for k, start in enumerate(layout.rotation_entries[:, 0])}
@@ -102,20 +107,15 @@ def _in_layout(character: Character, path: Path, loop: str, frames: FloatArray) 
         width = 4 if joint.type is JointType.SPHERICAL else 1
         values = frames[:, column : column + width]
         column += width
-        if values.shape[1] < width:
-            break
         if width == 4:
             orientations[:, rotation_of[joint.start]] = _quaternions(path, name, values)
         else:
             positions[:, joint.start] = values[:, 0]
-    if column != frames.shape[1]:
-        raise ClipError(
-            f"{path}: frames have {frames.shape[1]} numbers; "
-            f"character '{character.name}' needs {_width(character)}"
-        )
     positions, clamped = _within_limits(character, positions)
     times = np.concatenate(([0.0], np.cumsum(frames[:-1, 0])))
-    return ClipFrames(times, positions, orientations, loop == "wrap", clamped)
+    return ClipFrames(
+        times, positions, orientations, loop == "wrap", character.position_bounds(), clamped
+    )
 
 
 def _width(character: Character) -> int:

@@ -1,0 +1,246 @@
+"""The controller's answers, and what becomes of characters that it drives, in one process."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from physics import character, controller, run_together, simulation
+
+from controller_node.controller import Controller
+from controller_node.dynamics import DynamicsModel
+from controller_node.references.clip import ClipReference
+from controller_node.references.clip_file import read_clip
+from msgs_config.arrays import FloatArray
+from msgs_config.errors import ClockError
+from msgs_config.joint_layout import ROOT
+from msgs_config.stamped import StampedState
+from sim_node.simulation import Simulation
+
+RATE = 240
+HUMANOID = character("humanoid").layout
+ARM = [f"panda_joint{number}" for number in range(1, 8)]
+
+
+def walker(**given: object) -> Controller:
+    """The humanoid's controller that plays the walk."""
+    return controller("humanoid", reference="clip", clip="walk", **given)
+
+
+def walking(assisted: bool) -> Simulation:
+    """The humanoid in the walk's first state."""
+    start = ClipReference(HUMANOID, read_clip(character("humanoid"), "walk")).sample(0.0)
+    return simulation(
+        "humanoid",
+        rate=RATE,
+        commanded_joints=[ROOT] * assisted + HUMANOID.actuated_joint_names,
+        initial_position=start.configuration.position.tolist(),
+        initial_velocity=start.velocity.tolist(),
+    )
+
+
+def stamp(tick: int) -> int:
+    """The stamp of a tick, ns."""
+    return tick * 10**9 // RATE
+
+
+def states(count: int) -> list[StampedState]:
+    """States of the humanoid near its rest pose, tick after tick."""
+    rng = np.random.default_rng(1)
+    rest = np.array(character("humanoid").rest_position)
+    return [
+        StampedState(
+            stamp_ns=stamp(tick),
+            position=rest + rng.normal(scale=0.1, size=HUMANOID.size),
+            velocity=rng.normal(size=HUMANOID.size),
+            effort=None,
+        )
+        for tick in range(1, count + 1)
+    ]
+
+
+# --- answers -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", ["stable_pd", "pd"])
+def test_the_same_state_gets_the_same_answer_whatever_was_asked_before(law: str) -> None:
+    # Arrange
+    driver = walker(law=law)
+    sequence = states(10)
+    first = [driver.answer(state, stamp(1)) for state in sequence]
+
+    # Act
+    backwards = [driver.answer(state, stamp(1)) for state in reversed(sequence)][::-1]
+    alone = [walker(law=law).answer(state, stamp(1)) for state in sequence]
+
+    # Assert
+    for answers in zip(first, backwards, alone, strict=True):
+        efforts, references = zip(*answers, strict=True)
+        assert len({effort.tobytes() for effort in efforts}) == 1
+        assert len({reference.position.tobytes() for reference in references}) == 1
+        assert len({reference.velocity.tobytes() for reference in references}) == 1
+
+
+def test_an_answer_leaves_the_state_alone() -> None:
+    state = states(1)[0]
+    before = replace(state, position=state.position.copy(), velocity=state.velocity.copy())
+
+    walker().answer(state, stamp(1))
+
+    np.testing.assert_array_equal(state.position, before.position)
+    np.testing.assert_array_equal(state.velocity, before.velocity)
+
+
+def test_later_answers_leave_earlier_ones_alone() -> None:
+    # Arrange
+    driver = walker()
+    effort, reference = driver.answer(states(1)[0], stamp(1))
+    before = effort.copy(), reference.position.copy(), reference.velocity.copy()
+
+    # Act
+    for state in states(5):
+        driver.answer(state, stamp(1))
+
+    # Assert
+    after = effort, reference.position, reference.velocity
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("law", ["stable_pd", "pd"])
+def test_the_reference_is_that_at_the_states_stamp_since_the_episode_began(law: str) -> None:
+    # Arrange
+    driver, episode = walker(law=law), 7
+    clip = ClipReference(HUMANOID, read_clip(character("humanoid"), "walk"))
+    for state in states(30)[episode - 1 :]:
+        # Act
+        _, reference = driver.answer(state, stamp(episode))
+
+        # Assert
+        expected = clip.sample((state.stamp_ns - stamp(episode)) / 1e9)
+        assert reference.stamp_ns == state.stamp_ns
+        np.testing.assert_array_equal(reference.position, expected.configuration.position)
+        np.testing.assert_array_equal(reference.velocity, expected.velocity)
+
+
+@pytest.mark.parametrize("law", ["stable_pd", "pd"])
+def test_without_assistance_nothing_is_asked_of_the_root(law: str) -> None:
+    helped, alone = walker(law=law), walker(law=law, root_assistance=False)
+    for state in states(5):
+        assert np.all(helped.answer(state, stamp(1))[0][:6] != 0.0)
+        assert np.all(alone.answer(state, stamp(1))[0][:6] == 0.0)
+        assert np.all(alone.answer(state, stamp(1))[0][6:] != 0.0)
+
+
+def test_efforts_are_clipped_to_the_controllers_limits() -> None:
+    # Arrange
+    free = walker(law="pd")
+    bound = walker(law="pd", **{"effort_limit.chest": 5.0, "effort_limit.left_knee": 3.0})
+    chest, knee = (HUMANOID.joint(name).entries for name in ("chest", "left_knee"))
+    state = states(1)[0]
+
+    # Act
+    wanted, given = (driver.answer(state, stamp(1))[0] for driver in (free, bound))
+
+    # Assert
+    np.testing.assert_allclose(given[chest], wanted[chest] * 5.0 / np.linalg.norm(wanted[chest]))
+    np.testing.assert_allclose(given[knee], 3.0 * np.sign(wanted[knee]))
+
+
+def test_changed_gains_count_from_the_next_state_on() -> None:
+    # Arrange
+    driver, doubled = walker(law="pd"), walker(law="pd", **{"gain_scale.p": 2.0})
+    first, second = states(2)
+    driver.answer(first, stamp(1))
+
+    # Act
+    driver.gains = doubled.gains
+
+    # Assert
+    effort, _ = driver.answer(second, stamp(1))
+    np.testing.assert_array_equal(effort, doubled.answer(second, stamp(1))[0])
+
+
+def test_a_state_at_another_rate_is_a_clock_error() -> None:
+    with pytest.raises(ClockError, match="4166666 ns is no tick at 1000 Hz"):
+        controller("humanoid", rate=1000).answer(states(1)[0], stamp(1))
+
+
+# --- driven characters ---------------------------------------------------------------------------
+
+
+def test_the_walk_with_assistance_is_tracked_and_stays_up() -> None:
+    errors = []
+    with walking(assisted=True) as run:
+        for state, _, reference in run_together(run, walker(rate=RATE), 2 * RATE):
+            assert state.position[2] > 0.8 * reference.position[2]
+            errors.append(tracking_error(state.position, reference.position))
+
+    assert np.mean(errors) < 0.1
+
+
+def test_the_walk_without_assistance_falls() -> None:
+    heights = []
+    with walking(assisted=False) as run:
+        for state, effort, reference in run_together(
+            run, walker(rate=RATE, root_assistance=False), 2 * RATE
+        ):
+            assert not effort[:6].any()
+            heights.append(state.position[2] / reference.position[2])
+
+    assert min(heights[: RATE // 4]) > 0.8
+    assert min(heights) < 0.5
+
+
+def tracking_error(position: FloatArray, target: FloatArray) -> float:
+    """Mean of the joints' errors, rad, the root's left out."""
+    error = HUMANOID.difference(HUMANOID.configuration(position), HUMANOID.configuration(target))
+    return float(HUMANOID.norms(error)[2:].mean())
+
+
+def test_the_humanoid_stands_in_its_rest_pose_with_assistance() -> None:
+    joints = [ROOT, *HUMANOID.actuated_joint_names]
+    with simulation("humanoid", rate=RATE, commanded_joints=joints) as run:
+        for state, _, reference in run_together(run, controller("humanoid"), 2 * RATE):
+            assert tracking_error(state.position, reference.position) < 0.1
+
+        assert run.state.position[2] == pytest.approx(0.9, abs=0.05)
+        assert np.abs(run.state.velocity).max() < 0.1
+
+
+def test_the_panda_settles_where_its_springs_carry_its_weight() -> None:
+    # Arrange: every joint of the arm 0.3 rad off
+    panda = character("franka_panda")
+    arm = np.array([panda.layout.joint(name).start for name in ARM])
+    rest = np.array(panda.rest_position)
+    start = rest.copy()
+    start[arm] += 0.3
+    driver = controller("franka_panda", rate=RATE)
+    with simulation("franka_panda", rate=RATE, initial_position=start.tolist()) as run:
+        # Act
+        for _ in run_together(run, driver, 6 * RATE):
+            pass
+        last = run.state
+
+    # Assert
+    model = DynamicsModel(panda)
+    model.update(panda.layout.configuration(last.position), np.zeros_like(rest))
+    weight = model.bias_force()[arm]
+    stiffness = driver.gains.stiffness[arm]
+    error = (rest - last.position)[arm]
+    assert np.abs(last.velocity).max() < 1e-4
+    assert np.abs(weight).max() > 10.0
+    np.testing.assert_allclose(error, weight / stiffness, rtol=0.02, atol=1e-4)
+
+
+@pytest.mark.parametrize("law", ["stable_pd", "pd"])
+def test_the_pendulum_settles_where_its_spring_carries_its_weight(law: str) -> None:
+    # Arrange
+    driver = controller("pendulum", rate=RATE, law=law)
+    with simulation("pendulum", rate=RATE, initial_position=[0.9]) as run:
+        # Act
+        for _ in run_together(run, driver, 4 * RATE):
+            pass
+        angle = run.state.position[0]
+
+    # Assert: 1 kg at half of 1 m, 50 N m/rad towards 0.5 rad
+    assert 0.5 - angle == pytest.approx(0.5 * 9.81 * np.sin(angle) / 50.0, rel=1e-4)
