@@ -14,6 +14,7 @@ from sim_node import parameters as simulator_parameters
 
 _SHARED = ("rate", "gravity")  # must be the same on both sides; set on one side, they count on both
 _LARGEST_DURATION = 1e9  # s
+_LOCKSTEP_TIMEOUT = 60.0  # s that one answer may take, on a machine that may be busy
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,9 @@ def make_plan(
         "commanded_joints": controller_parameters.commanded_joints(character, controller),
         "initial_position": first.configuration.position.tolist(),
         "initial_velocity": first.velocity.tolist(),
+        # nobody is there to resume what has paused, or to wait for ever
         "on_fault": "abort",
+        "lockstep_timeout": _LOCKSTEP_TIMEOUT,
     }
     simulator = resolve(
         simulator_parameters.PARAMETERS + simulator_parameters.character_parameters(character),

@@ -21,7 +21,6 @@ from sim_node.parameters import make_settings
 from sim_node.simulation import Simulation
 
 _START_PATIENCE = 120.0  # s until the first tick, on a machine that may be busy with other things
-_LOCKSTEP_TIMEOUT = 60.0  # s that one answer may take
 _POLL_PERIOD = 0.05  # s
 _IN_PROCESS_REPORT = 100  # ticks between reports of progress
 
@@ -52,7 +51,6 @@ def run_over_topics(plan: Plan, directory: Path, *, write_bag: bool, progress: P
         controls = {**plan.controller, "wait_for_subscribers": 2}
         controller = start("controller_node", "controller_node.main", controls)
         simulates = {**plan.simulator, "wait_for_subscribers": 2}
-        simulates.setdefault("lockstep_timeout", _LOCKSTEP_TIMEOUT)
         simulator = start("sim_node", "sim_node.main", simulates)
         _wait_for_end(simulator, [controller, recorder], progress)
     if recorder.exit_code:

@@ -66,20 +66,16 @@ class Body:
 
     def _remove_motors_and_damping(self, friction: float) -> None:
         """Take away what the engine adds of its own, and set the friction."""
+        # One call a setting: a link silently loses some of those that share a call.
+        settings = (
+            {"linearDamping": 0.0, "angularDamping": 0.0},
+            {"jointDamping": 0.0},
+            {"lateralFriction": friction},
+            {"maxJointVelocity": _UNLIMITED_SPEED},
+        )
         for link in self._links:
-            pybullet.changeDynamics(
-                self._body,
-                link,
-                linearDamping=0.0,
-                angularDamping=0.0,
-                jointDamping=0.0,
-                lateralFriction=friction,
-                physicsClientId=self._client,
-            )
-            # in one call with this, the engine overlooks the joint damping
-            pybullet.changeDynamics(
-                self._body, link, maxJointVelocity=_UNLIMITED_SPEED, physicsClientId=self._client
-            )
+            for setting in settings:
+                pybullet.changeDynamics(self._body, link, **setting, physicsClientId=self._client)
         for index in self._joints:
             pybullet.setJointMotorControl2(
                 self._body,

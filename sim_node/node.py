@@ -99,8 +99,12 @@ class SimNode(Node):
 
     def _wait_for_subscribers(self, stop: StopSignal, spinner: Spinner) -> None:
         wanted = self._values.integer("wait_for_subscribers")
-        while not stop and self._outputs.state_subscribers < wanted:
+        self._patience.restart(time.monotonic())
+        while not stop and (found := self._outputs.state_subscribers) < wanted:
             spinner.rest()
+            if Due.EXPLAIN in self._patience.due(time.monotonic()):
+                sentence = f"waiting for {wanted} subscribers of joint_states; there are {found}"
+                self.get_logger().warning(sentence)
 
     def _turn(self, spinner: Spinner) -> None:
         """Take a command or rest, and advance if the tick is complete."""

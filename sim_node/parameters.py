@@ -14,7 +14,13 @@ PARAMETERS = [
     Parameter("rate", 240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000),
     Parameter("substeps", 1, "engine steps a tick", minimum=1, maximum=1000),
     Parameter("gravity", 9.81, "gravity along -z", unit="m/s^2", maximum=1000.0),
-    Parameter("friction", 0.9, "friction of every link and of the ground", maximum=100.0),
+    Parameter(
+        "friction",
+        0.9,
+        "friction of the ground; a contact's is its product with the link's",
+        maximum=100.0,
+    ),
+    Parameter("link_friction", 0.5, "friction of every link", maximum=100.0),
     Parameter("solver_iterations", 10, "contact solver iterations a step", minimum=1, maximum=1000),
     Parameter("speed_limit", 500.0, "a speed beyond it is a divergence", unit="rad/s or m/s"),
     Parameter(
@@ -79,6 +85,7 @@ def make_settings(values: Values) -> SimulationSettings:
         substeps=values.integer("substeps"),
         gravity=values.number("gravity"),
         friction=values.number("friction"),
+        link_friction=values.number("link_friction"),
         solver_iterations=values.integer("solver_iterations"),
         speed_limit=values.number("speed_limit"),
         command_delay_ticks=values.integer("command_delay_ticks"),

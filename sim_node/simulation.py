@@ -23,7 +23,8 @@ class SimulationSettings:
     rate_hz: int
     substeps: int
     gravity: float  # m/s^2, along -z
-    friction: float
+    friction: float  # of the ground; a contact's is the product of both surfaces'
+    link_friction: float
     solver_iterations: int
     speed_limit: float  # rad/s or m/s
     command_delay_ticks: int
@@ -60,6 +61,7 @@ class Simulation:
                 step_s=1.0 / (settings.rate_hz * settings.substeps),
                 gravity=settings.gravity,
                 friction=settings.friction,
+                link_friction=settings.link_friction,
                 solver_iterations=settings.solver_iterations,
             ),
         )

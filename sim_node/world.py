@@ -14,7 +14,8 @@ class WorldSettings:
 
     step_s: float = 1.0 / 240.0  # length of one engine step
     gravity: float = 9.81  # m/s^2, along -z
-    friction: float = 0.9  # of every link and of the ground
+    friction: float = 0.9  # of the ground; a contact's is the product of both surfaces'
+    link_friction: float = 0.5  # of every link
     solver_iterations: int = 10
 
 
@@ -38,7 +39,7 @@ class World:
             physicsClientId=self._client,
         )
         self._add_ground(settings.friction)
-        self.body = Body(self._client, character, settings.friction)
+        self.body = Body(self._client, character, settings.link_friction)
 
     def __enter__(self) -> "World":
         return self

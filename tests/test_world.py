@@ -23,10 +23,27 @@ BOX_URDF = """
 """
 
 
+WELDED_BASE = """
+  <link name="handle">
+    <inertial>
+      <mass value="0.001"/>
+      <inertia ixx="1e-6" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+  </link>
+  <joint name="weld" type="fixed"><parent link="handle"/><child link="box"/></joint>
+</robot>"""
+
+
 @pytest.fixture
 def box(tmp_path: Path) -> Character:
     """A flat box of 2 kg, half a metre to each side of its middle and 0.1 m thick."""
-    (tmp_path / "box.urdf").write_text(BOX_URDF)
+    return box_character(tmp_path, is_base=True)
+
+
+def box_character(tmp_path: Path, is_base: bool) -> Character:
+    """The box as a base link, or welded below a base of next to no mass."""
+    urdf = BOX_URDF if is_base else BOX_URDF.replace("</robot>", WELDED_BASE)
+    (tmp_path / "box.urdf").write_text(urdf)
     (tmp_path / "box.yaml").write_text("urdf: box.urdf\ninertia: file\n")
     return load_character(str(tmp_path / "box.yaml"))
 
@@ -155,12 +172,15 @@ def test_a_step_is_one_step_of_the_length_and_the_gravity_that_were_set(
     assert height == pytest.approx(step_s * speed, abs=1e-14)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("is_base", [True, False], ids=["base", "link"])
+@pytest.mark.parametrize(("ground", "link"), [(0.0, 0.5), (0.3, 0.9), (0.9, 0.3), (0.6, 0.6)])
 def test_a_sliding_box_is_slowed_by_its_friction_times_the_grounds(
-    box: Character, friction: float
+    tmp_path: Path, ground: float, link: float, is_base: bool
 ) -> None:
     # Arrange
-    with World(box, WorldSettings(step_s=1e-3, friction=friction)) as world:
+    box = box_character(tmp_path, is_base)
+    settings = WorldSettings(step_s=1e-3, friction=ground, link_friction=link)
+    with World(box, settings) as world:
         start = np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
         world.body.set_state(start, np.zeros(6))
         advance(world, np.zeros(6), 200)  # it comes to rest on the ground
@@ -172,7 +192,7 @@ def test_a_sliding_box_is_slowed_by_its_friction_times_the_grounds(
         _, velocity = world.body.read()
 
     # Assert
-    assert velocity[0] == pytest.approx(2.0 - friction**2 * 9.81 * 0.2, abs=0.02)
+    assert velocity[0] == pytest.approx(2.0 - ground * link * 9.81 * 0.2, abs=0.02)
 
 
 def test_a_box_rests_on_the_ground_at_z_zero(box: Character) -> None:
