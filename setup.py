@@ -1,7 +1,5 @@
 """Packaging for both installs: pip (``pip install -e '.[wheels]'``) and ROS (``colcon build``)."""
 
-from glob import glob
-
 from setuptools import find_packages, setup
 
 PACKAGE = "actuated_characters"
@@ -20,8 +18,6 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
-        (f"share/{PACKAGE}/launch", sorted(glob("launch/*.py"))),
-        (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
     ],
     zip_safe=False,
     # What every install takes from pip. ROS itself is not among it: in a full ROS install rclpy and

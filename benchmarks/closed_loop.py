@@ -8,33 +8,25 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-from controller_node.parameters import make_controller
+from experiment.figures import PARAMETERS, write_parameters
+from experiment.loop import ticks_in_process
 from experiment.plan import Plan
 from experiment.processes import Child, Children
 from msgs_config import topics
 from msgs_config.arrays import FloatArray
-from sim_node.parameters import make_settings
-from sim_node.simulation import Simulation
 
 _PATIENCE = 120.0  # s for a whole run
 
 
 def in_process(plan: Plan) -> FloatArray:
     """Durations (ticks,) in s of the ticks of a plan, without ROS."""
-    controller = make_controller(plan.character, plan.reference, plan.controller)
-    durations = np.empty(plan.ticks)
-    with Simulation(plan.character, make_settings(plan.simulator)) as simulation:
-        episode_ns = simulation.state.stamp_ns
-        for tick in range(plan.ticks):
-            started = time.perf_counter()
-            effort, _ = controller.answer(simulation.state, episode_ns)
-            simulation.step(np.where(simulation.commanded, effort, 0.0))
-            durations[tick] = time.perf_counter() - started
-    return durations
+    times = [time.perf_counter()]
+    for _ in ticks_in_process(plan):
+        times.append(time.perf_counter())
+    return np.diff(times)[1:]  # the first one builds the world, too
 
 
 def over_topics(plan: Plan) -> dict[str, float]:
@@ -53,6 +45,7 @@ def over_topics(plan: Plan) -> dict[str, float]:
     node.create_subscription(DiagnosticArray, topics.DIAGNOSTICS.name, listen, topics.STREAM_QOS)
     try:
         with tempfile.TemporaryDirectory() as directory, Children() as children:
+            (Path(directory) / PARAMETERS).mkdir()
             simulator = _start(children, Path(directory), "sim_node", plan.simulator)
             _spin(node, lambda: bool(figures), simulator)  # its reports are heard from now on
             _start(children, Path(directory), "controller_node", plan.controller)
@@ -75,9 +68,7 @@ def _spin(node: Node, done: Callable[[], bool], simulator: Child) -> None:
 def _start(
     children: Children, directory: Path, name: str, parameters: Mapping[str, object]
 ) -> Child:
-    file = directory / f"{name}.yaml"
-    file.write_text(yaml.safe_dump({name: {"ros__parameters": dict(parameters)}}))
+    file = write_parameters(directory, name, parameters)
     arguments = ["--ros-args", "--params-file", str(file)]
-    return children.start(
-        Child(name, f"{name}.main", arguments, directory / f"{name}.log", dict(os.environ))
-    )
+    log = directory / f"{name}.log"
+    return children.start(Child(name, f"{name}.main", arguments, log, dict(os.environ)))

@@ -1,15 +1,19 @@
 """The bare round trip: the same bytes as a lockstep tick's, there and back between two processes.
 
-Run as a module it is the far side, which answers every message.
+Measured twice: with messages taken directly, as the nodes of this package do, and through rclpy's
+executor, as most nodes do. Run as a module it is the far side, which answers every message.
 """
 
+import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import rclpy
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from msgs_config import topics
@@ -18,60 +22,98 @@ from msgs_config.joint_layout import JointLayout
 from msgs_config.messages import JointStateEncoder
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal, limit_threads, run_node
+from msgs_config.topics import Topic
 
 _PING = replace(topics.JOINT_STATES, name="ping")
 _PONG = replace(topics.JOINT_TORQUES, name="pong")
 _WARM_UP = 200
+_PATIENCE = 60.0  # s for the other side to appear, and for each answer
+_SIZE, _WAY = "BENCHMARK_ANSWER_BYTES", "BENCHMARK_WAY"
+_DIRECT, _EXECUTOR = "direct", "executor"
 
 
-def round_trips(layout: JointLayout, count: int) -> FloatArray:
+def round_trips(layout: JointLayout, count: int, *, direct: bool) -> FloatArray:
     """Durations (count,) in s of round trips of a state there and a torque back."""
-    there = JointStateEncoder(layout.dof_names)
-    back = JointStateEncoder(layout.dof_names)
-    zeros = np.zeros(layout.size)
-    size = len(back.encode(0, effort=zeros))
-    message = there.encode(0, zeros, zeros, zeros)
-    far = subprocess.Popen([sys.executable, "-m", "benchmarks.round_trip", str(size)])
+    encoder, zeros = JointStateEncoder(layout.dof_names), np.zeros(layout.size)
+    answer_bytes = len(encoder.encode(0, effort=zeros))
+    way = _DIRECT if direct else _EXECUTOR
+    far = subprocess.Popen(
+        [sys.executable, "-m", "benchmarks.round_trip"],
+        env={**os.environ, _SIZE: str(answer_bytes), _WAY: way},
+    )
     rclpy.init()
     node = Node("near_side")
-    inbox = DirectSubscription(node, _PONG)
-    spinner = Spinner(node)
     try:
+        take = _taker(node, _PONG, way)
         publisher = topics.create_publisher(node, _PING)
-        while publisher.get_subscription_count() < 1 or node.count_publishers("pong") < 1:
-            spinner.rest()
+        _wait(lambda: publisher.get_subscription_count() and node.count_publishers("pong"))
+        message = encoder.encode(0, zeros, zeros, zeros)
         durations = np.empty(_WARM_UP + count)
         for index in range(len(durations)):
             started = time.perf_counter()
             publisher.publish(message)
-            while inbox.take() is None:
-                spinner.rest()
-            spinner.received()
+            _wait(take)
             durations[index] = time.perf_counter() - started
         return durations[_WARM_UP:]
     finally:
-        spinner.close()
         node.destroy_node()
         rclpy.try_shutdown()
         far.terminate()
         far.wait()
 
 
-def _answer(stop: StopSignal) -> None:
-    node = Node("far_side")
-    inbox, publisher = DirectSubscription(node, _PING), topics.create_publisher(node, _PONG)
-    spinner = Spinner(node)
-    answer = bytes(int(sys.argv[1]))
-    while not stop:
-        if inbox.take() is None:
+def _taker(node: Node, topic: Topic, way: str) -> Callable[[], bool]:
+    """What looks for a message once, and says whether there was one."""
+    if way == _DIRECT:
+        inbox, spinner = DirectSubscription(node, topic), Spinner(node)
+
+        def take_directly() -> bool:
+            if inbox.take() is not None:
+                spinner.received()
+                return True
             spinner.rest()
-        else:
-            spinner.received()
-            publisher.publish(answer)
-    spinner.close()
-    node.destroy_node()
+            return False
+
+        return take_directly
+
+    arrived: list[bytes] = []
+
+    def keep(raw: bytes) -> None:
+        arrived.append(raw)
+
+    node.create_subscription(topic.message_type, topic.name, keep, topic.qos, raw=True)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+
+    def take_by_executor() -> bool:
+        executor.spin_once(timeout_sec=0.1)
+        return bool(arrived and arrived.pop())
+
+    return take_by_executor
+
+
+def _wait(condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + _PATIENCE
+    while not condition():
+        if time.monotonic() > deadline:
+            raise TimeoutError("the other side of the round trip does not answer")
+
+
+class _FarSide(Node):
+    """Answers every message with one of the size that its environment says."""
+
+    def __init__(self) -> None:
+        super().__init__("far_side")
+        self._take = _taker(self, _PING, os.environ[_WAY])
+        self._publisher = topics.create_publisher(self, _PONG)
+        self._answer = bytes(int(os.environ[_SIZE]))
+
+    def run(self, stop: StopSignal) -> None:
+        while not stop:
+            if self._take():
+                self._publisher.publish(self._answer)
 
 
 if __name__ == "__main__":
     limit_threads()
-    sys.exit(run_node(_answer))
+    sys.exit(run_node(_FarSide))

@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from controller_node.control_laws import pd_effort, stable_pd_effort
 from controller_node.dynamics import DynamicsModel
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.errors import CharacterError
 from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock
 
@@ -37,14 +40,30 @@ class Controller:
         rate_hz: int,
         gravity: float,
     ) -> None:
-        """Build the model of the dynamics; `law` is 'stable_pd' or 'pd'."""
+        """Build the model of the dynamics; `law` is 'stable_pd' or 'pd'.
+
+        Raises:
+            CharacterError: a joint moves neither mass nor inertia.
+        """
         self.layout = character.layout
         self.gains = gains
         self.clock = TickClock(rate_hz)
         self._reference = reference
         self._law = _LAWS[law]
         self._model = DynamicsModel(character, gravity)
+        self._check_inertia(character)
         self._next: tuple[int, ReferenceState] | None = None
+
+    def _check_inertia(self, character: Character) -> None:
+        """A joint that moves no inertia would make the mass matrix singular."""
+        rest = self.layout.configuration(np.array(character.rest_position))
+        self._model.update(rest, np.zeros(self.layout.size))
+        diagonal = np.diag(self._model.mass_matrix())
+        if self.layout.size and diagonal.min() <= 0.0:
+            name = self.layout.dof_names[int(diagonal.argmin())]
+            raise CharacterError(
+                f"{character.file}: nothing with mass or inertia moves at '{name}'"
+            )
 
     def answer(self, state: StampedState, episode_ns: int) -> tuple[FloatArray, StampedReference]:
         """The effort (n,) that answers a state, and the reference at the state's stamp.

@@ -92,6 +92,7 @@ def _compile(character: Character, gravity: float) -> mujoco.MjModel:
     # set afterwards: the compiler refuses a link with mass but without inertia, which is sound
     # wherever the joints above it cannot turn it about its centre of mass alone
     model.body_inertia[1:] = [link.inertia_diagonal for link in character.links]
+    model.dof_simplenum[:] = 0  # else a simple body's mass matrix is the one compiled
     return model
 
 

@@ -2,23 +2,19 @@
 
 import sys
 
-from msgs_config.process import StopSignal, limit_threads, run_node
+from msgs_config.process import RunnableNode, limit_threads, run_node
 
 
 def main() -> int:
     """Run the controller until a signal; returns the exit code."""
     limit_threads()
-    return run_node(_work)
+    return run_node(_make_node)
 
 
-def _work(stop: StopSignal) -> None:
+def _make_node() -> RunnableNode:
     from controller_node.node import ControllerNode
 
-    node = ControllerNode()
-    try:
-        node.run(stop)
-    finally:
-        node.destroy_node()
+    return ControllerNode()
 
 
 if __name__ == "__main__":

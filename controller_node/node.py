@@ -10,7 +10,6 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header, String
 
 from controller_node.parameters import (
-    DEFAULT_CHARACTER,
     PARAMETERS,
     character_parameters,
     commanded_joints,
@@ -27,17 +26,20 @@ from msgs_config.node_parameters import declare, given_parameters
 from msgs_config.parameters import Values, resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
-from msgs_config.stamped import StampedState
+from msgs_config.shared_parameters import DEFAULT_CHARACTER
+from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
+from msgs_config.warnings import Warnings
 
 
 @dataclass(frozen=True)
 class _Answer:
     """The last answer: a state that comes again gets it again, and nothing is computed anew."""
 
+    raw_state: bytes
     stamp_ns: int
     torques: bytes
-    reference: bytes
+    reference: StampedReference
 
 
 class ControllerNode(Node):
@@ -61,10 +63,10 @@ class ControllerNode(Node):
             self.get_logger().warning(f"kept within joint limits: {', '.join(frames.clamped)}")
         reference = make_reference(self._character, frames)
         self._controller = make_controller(self._character, reference, self._values)
-        self._open_topics()
         self._answer: _Answer | None = None
         self._episode_ns: int | None = None
-        self._told: set[str] = set()
+        self._warnings = Warnings(self)
+        self._open_topics()
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._take_parameters)
 
@@ -79,8 +81,14 @@ class ControllerNode(Node):
         self._episodes = DirectSubscription(self, topics.EPISODE)
         self._references = topics.create_publisher(self, topics.REFERENCE)
         self._torques = topics.create_publisher(self, topics.JOINT_TORQUES)
-        description = configuration.describe(self._character, self._values)
-        topics.create_publisher(self, topics.CONFIGURATION).publish(String(data=description))
+        self._configurations = topics.create_publisher(self, topics.CONFIGURATION)
+        self._publish_configuration()
+
+    def _publish_configuration(self) -> None:
+        """Publish the parameters in force, and since which state they are."""
+        since_ns = None if self._answer is None else self._answer.stamp_ns
+        description = configuration.describe(self._character, self._values, since_ns)
+        self._configurations.publish(String(data=description))
 
     def run(self, stop: StopSignal) -> None:
         """Answer states until `stop`.
@@ -101,22 +109,39 @@ class ControllerNode(Node):
             spinner.close()
 
     def _take_state(self, raw: bytes) -> None:
-        if self._torques.get_subscription_count() < self._values.integer("wait_for_subscribers"):
+        if not self._is_heard():
             return  # the simulator publishes the state again
+        if self._answer is not None and self._answer.raw_state == raw:
+            self._publish(self._answer)
+            return
         try:
             state = state_in_layout(self._layout, self._decoder.decode(raw))
         except (MessageError, LayoutError) as error:
-            self._tell_once(f"state ignored: {error}")
+            self._warnings.say_once(f"state ignored: {error}")
             return
-        if self._answer is None or self._answer.stamp_ns != state.stamp_ns:
-            episode_ns = self._episode_of(state)
-            if episode_ns is None:
-                return  # the simulator publishes the state again
-            self._check_rate(state)
-            self._answer = self._compute(state, episode_ns)
+        episode_ns = self._episode_of(state)
+        if episode_ns is None:
+            return  # the simulator publishes the state again
+        self._check_rate(state)
+        self._answer = self._compute(raw, state, episode_ns)
+        self._publish(self._answer)
+
+    def _is_heard(self) -> bool:
+        """Whether all who are to hear the first answer are there; later ones wait for nobody."""
+        if self._answer is not None:
+            return True
+        wanted = self._values.integer("wait_for_subscribers")
+        return bool(self._torques.get_subscription_count() >= wanted)
+
+    def _publish(self, answer: _Answer) -> None:
         if self._references.get_subscription_count():
-            self._references.publish(self._answer.reference)
-        self._torques.publish(self._answer.torques)
+            reference = answer.reference
+            self._references.publish(
+                self._reference_encoder.encode(
+                    reference.stamp_ns, reference.position, reference.velocity
+                )
+            )
+        self._torques.publish(answer.torques)
 
     def _check_rate(self, state: StampedState) -> None:
         """Say so if states come several ticks apart: their stamps fit any multiple of the rate."""
@@ -126,17 +151,14 @@ class ControllerNode(Node):
         apart = clock.tick(state.stamp_ns) - clock.tick(self._answer.stamp_ns)
         if apart > 1:
             rate = f"{clock.rate_hz} Hz"
-            self._tell_once(f"states come {apart} ticks apart at {rate}; is that the simulator's?")
+            self._warnings.say_once(
+                f"states come {apart} ticks of {rate} apart; set 'rate' to the simulator's"
+            )
 
-    def _compute(self, state: StampedState, episode_ns: int) -> _Answer:
+    def _compute(self, raw: bytes, state: StampedState, episode_ns: int) -> _Answer:
         effort, reference = self._controller.answer(state, episode_ns)
-        return _Answer(
-            stamp_ns=state.stamp_ns,
-            torques=self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded]),
-            reference=self._reference_encoder.encode(
-                reference.stamp_ns, reference.position, reference.velocity
-            ),
-        )
+        torques = self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded])
+        return _Answer(raw, state.stamp_ns, torques, reference)
 
     def _episode_of(self, state: StampedState) -> int | None:
         """Stamp of the first state of the state's episode; None if it is not known yet.
@@ -164,13 +186,8 @@ class ControllerNode(Node):
         """Take changed gains, all at once; they count from the next state on."""
         self._values = self._changed_values(changes)
         self._controller.gains = make_gains(self._character, self._values)
+        self._publish_configuration()
 
     def _changed_values(self, changes: list[RosParameter]) -> Values:
         given = {change.name: change.value for change in changes}
         return resolve(self._declared, {**self._values, **given})
-
-    def _tell_once(self, sentence: str) -> None:
-        """Warn of what may come again at every tick."""
-        if sentence not in self._told:
-            self._told.add(sentence)
-            self.get_logger().warning(sentence)

@@ -11,21 +11,12 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character import ROOT_TORQUE, Character
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Parameter, Values
-
-DEFAULT_CHARACTER = "humanoid"
+from msgs_config.shared_parameters import CHARACTER, GRAVITY, RATE
 
 PARAMETERS = [
-    Parameter(
-        "character", DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml file"
-    ),
-    Parameter(
-        "rate",
-        240,
-        "control ticks a second, the simulator's",
-        unit="Hz",
-        minimum=1,
-        maximum=100_000,
-    ),
+    CHARACTER,
+    RATE,
+    GRAVITY,
     Parameter("law", "stable_pd", "the control law", choices=LAWS),
     Parameter(
         "reference",
@@ -36,9 +27,6 @@ PARAMETERS = [
     Parameter("clip", "walk", "name of a clip of the character, or path of a .txt file"),
     Parameter(
         "root_assistance", True, "drive a floating base by the lecture's root force and torque"
-    ),
-    Parameter(
-        "gravity", 9.81, "gravity in the model of the dynamics", unit="m/s^2", maximum=1000.0
     ),
     Parameter(
         "wait_for_subscribers", 1, "answer when this many subscribe to joint_torques", maximum=1000

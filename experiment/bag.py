@@ -97,7 +97,7 @@ class BagWriter:
         )
 
     def write(self, topic: str, raw: bytes, log_time_ns: int) -> None:
-        """Append a message, serialised as CDR; `log_time_ns` is when it was received, in ns.
+        """Append a message, serialised as CDR; `log_time_ns` is when it was published, ns.
 
         Raises:
             RecordingError: The recording is closed, the topic was never added, the time is out of

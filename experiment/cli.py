@@ -30,8 +30,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ActuatedCharactersError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_ERROR
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_ERROR
     except KeyboardInterrupt:
-        print("interrupted; what had been recorded is kept", file=sys.stderr)
+        print("interrupted", file=sys.stderr)
         return _EXIT_INTERRUPTED
     return 0
 
@@ -128,7 +131,7 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _settings(texts: Sequence[str]) -> dict[str, dict[str, object]]:
-    """What `--set NODE.NAME:=VALUE` says, by node; values are YAML, as ROS reads them."""
+    """What `--set NODE.NAME:=VALUE` says, by node; values are YAML."""
     settings: dict[str, dict[str, object]] = {node: {} for node in _NODES}
     for text in texts:
         name, assigns, value = text.partition(":=")
@@ -139,7 +142,7 @@ def _settings(texts: Sequence[str]) -> dict[str, dict[str, object]]:
             raise ConfigurationError(f"--set {text}: {one_of('node', node, list(_NODES))}")
         try:
             settings[node][parameter] = yaml.safe_load(value)
-        except yaml.YAMLError as error:
+        except (yaml.YAMLError, ValueError, RecursionError) as error:
             raise ConfigurationError(f"--set {text}: the value is not valid YAML") from error
     return settings
 

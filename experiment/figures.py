@@ -2,10 +2,12 @@
 
 import json
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from experiment.metrics import COLUMNS
 from msgs_config.arrays import FloatArray
@@ -33,7 +35,7 @@ def prepare_directory(directory: Path, *, overwrite: bool) -> None:
         (directory / PARAMETERS).mkdir(parents=True)
         (directory / LOGS).mkdir()
     except OSError as error:
-        raise RunError(f"cannot write to {directory}: {error.strerror}") from error
+        raise RunError(f"cannot write to {directory}: {error.strerror or error}") from error
 
 
 def write_figures(directory: Path, summary: dict[str, object], series: FloatArray) -> None:
@@ -52,6 +54,14 @@ def write_figures(directory: Path, summary: dict[str, object], series: FloatArra
         )
     except OSError as error:
         raise RecordingError(f"cannot write the figures: {error}") from error
+
+
+def write_parameters(directory: Path, name: str, parameters: Mapping[str, object]) -> Path:
+    """Write a node's parameter file, as `--params-file` takes it; returns its path."""
+    file = directory / PARAMETERS / f"{name}.yaml"
+    content = {name: {"ros__parameters": dict(parameters)}}
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return file
 
 
 def read_figures(directory: Path) -> tuple[dict[str, Any], FloatArray]:
@@ -84,7 +94,7 @@ def plot_figures(directory: Path) -> None:
         ("root height (m)", {"simulated": "root_height_m", "reference": "reference_root_height_m"}),
         ("effort", {"assistance / weight": "assist", "largest joint effort / limit": "effort"}),
     )
-    columns["assist"] = columns["assist_force_n"] / summary["body_weight_n"]
+    columns["assist"] = columns["assist_force_n"] / (summary["body_weight_n"] or np.nan)
     columns["effort"] = columns["effort_of_limit_max"]
     for panel, (label, lines) in zip(panels, curves, strict=True):
         for name, column in lines.items():

@@ -1,11 +1,11 @@
-"""Reads the serialised messages of a run and measures it, live or from a bag."""
+"""Reads the serialised messages of a run and measures it."""
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from experiment.metrics import Measurement
-from experiment.recording import TickAssembler
+from experiment.tick_assembler import TickAssembler
 from msgs_config import configuration, topics
 from msgs_config.arrays import FloatArray
 from msgs_config.configuration import RunConfiguration
@@ -17,6 +17,7 @@ from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
 COMMAND_COUNTS = ("rejected", "duplicate")
+_MOST_EARLY = 20_000  # messages
 
 
 class RunListener:
@@ -29,15 +30,16 @@ class RunListener:
     def __init__(self) -> None:
         self._decoder = JointStateDecoder()
         self._configuration: RunConfiguration | None = None
+        self._configuration_text = ""
         self._early: list[tuple[str, bytes, int]] = []
-        self._counts = dict.fromkeys(COMMAND_COUNTS, 0)
+        self._counts: dict[str, int | None] = dict.fromkeys(COMMAND_COUNTS)
         self._first_command_ns: int | None = None
         self._last_state_ns = 0
 
     @property
-    def ticks(self) -> int:
-        """Ticks seen so far."""
-        return 0 if self._configuration is None else self._assembler.ticks
+    def last_tick(self) -> int:
+        """Number of the last tick whose state came; 0 before the first."""
+        return 0 if self._configuration is None else self._assembler.last_tick
 
     @property
     def missing_ticks(self) -> int:
@@ -50,9 +52,11 @@ class RunListener:
         Raises:
             ActuatedCharactersError: the message is not what its topic should carry.
         """
-        if topic == CONFIGURATION and self._configuration is None:
-            self._configure(configuration.parse(deserialize_message(raw, String).data))
+        if topic == CONFIGURATION:
+            self._configure(deserialize_message(raw, String).data)
         elif self._configuration is None:
+            if len(self._early) == _MOST_EARLY:
+                raise RecordingError(f"nothing on '{CONFIGURATION}', which says what states mean")
             self._early.append((topic, raw, published_ns))
         elif topic == topics.JOINT_STATES.name:
             self._take_state(self._configuration, raw, published_ns)
@@ -63,8 +67,8 @@ class RunListener:
         elif topic == topics.DIAGNOSTICS.name:
             self._take_counts(deserialize_message(raw, DiagnosticArray))
 
-    def summary(self) -> dict[str, object]:
-        """The figures of the run.
+    def results(self) -> tuple[dict[str, object], FloatArray]:
+        """The figures of the run, and its series: one row a tick, see `metrics.COLUMNS`.
 
         Raises:
             RecordingError: there was no simulator to listen to.
@@ -75,14 +79,17 @@ class RunListener:
         wall_ns = self._last_state_ns - (self._first_command_ns or self._last_state_ns)
         figures = self._measurement.summary(wall_ns / NANOSECONDS_PER_SECOND)
         counts = {f"{name}_commands": count for name, count in self._counts.items()}
-        return {"character": self._configuration.character} | figures | counts
+        head = {"character": self._configuration.character}
+        missing = {"missing_ticks": self.missing_ticks}
+        return head | figures | counts | missing, self._measurement.series()
 
-    def series(self) -> FloatArray:
-        """The series of the run, one row a tick; see `metrics.COLUMNS`."""
-        return self._measurement.series()
-
-    def _configure(self, found: RunConfiguration) -> None:
-        self._configuration = found
+    def _configure(self, text: str) -> None:
+        if self._configuration is not None:
+            if text != self._configuration_text:
+                raise RecordingError("another simulator, or the same one started anew, was heard")
+            return
+        found = configuration.parse(text)
+        self._configuration, self._configuration_text = found, text
         self._measurement = Measurement(found)
         self._assembler = TickAssembler(self._measurement, int(found.parameters["rate"]))
         early, self._early = self._early, []
@@ -90,9 +97,9 @@ class RunListener:
             self.take(*message)
 
     def _take_state(self, known: RunConfiguration, raw: bytes, published_ns: int) -> None:
-        before = self._assembler.ticks
+        before = self._assembler.last_tick
         self._assembler.add_state(state_in_layout(known.layout, self._decoder.decode(raw)))
-        if self._assembler.ticks > before:
+        if self._assembler.last_tick > before:
             self._last_state_ns = published_ns
 
     def _take_reference(self, known: RunConfiguration, raw: bytes) -> None:
@@ -103,6 +110,6 @@ class RunListener:
 
     def _take_counts(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name == topics.SIM_NODE:
+            if status.name.rpartition("/")[2] == topics.SIM_NODE:
                 values = {item.key: item.value for item in status.values}
                 self._counts |= {name: int(values[name]) for name in self._counts if name in values}

@@ -30,10 +30,10 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Tick:
-    """One tick: a state, the effort that was applied to it, and its reference if there is one."""
+    """One tick: a state, the next one with the effort that led there, and the state's reference."""
 
     state: StampedState
-    applied: FloatArray  # (n,)
+    following: StampedState
     reference: StampedReference | None
 
 
@@ -120,8 +120,10 @@ class Measurement:
             "state_hash": self.state_hash,
         }
 
-    def _fell(self, columns: dict[str, FloatArray]) -> bool:
+    def _fell(self, columns: dict[str, FloatArray]) -> bool | None:
         height, desired = columns["root_height_m"], columns["reference_root_height_m"]
+        if np.isnan(desired).all():
+            return None
         stands = desired > _LEAST_HEIGHT  # false where it is NaN
         return bool(np.any(stands & (height < _FALL_FRACTION * desired)))
 
@@ -135,7 +137,9 @@ class Measurement:
         desired = np.stack(
             [missing if tick.reference is None else tick.reference.position for tick in block]
         )
-        applied = np.stack([tick.applied for tick in block])
+        applied = np.stack(
+            [tick.following.effort for tick in block if tick.following.effort is not None]
+        )
         stamps = np.array([tick.state.stamp_ns - (self._first_stamp or 0) for tick in block])
         rows = np.full((len(block), len(COLUMNS)), np.nan)
         rows[:, 0] = stamps / NANOSECONDS_PER_SECOND
@@ -160,7 +164,12 @@ class Measurement:
         if self._layout.has_floating_base:
             rows[:, 6] = norms[:, 0]
         limits = self._configuration.effort_limits[self._actuated]
-        of_limit = norms[:, self._actuated] / limits
+        of_limit = np.divide(
+            norms[:, self._actuated],
+            limits,
+            out=np.ones((len(rows), len(limits))),
+            where=limits > 0.0,
+        )
         rows[:, 7] = of_limit.max(axis=1, initial=0.0)
         self._saturated += int((of_limit >= _AT_LIMIT).sum())
 

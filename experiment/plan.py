@@ -14,6 +14,11 @@ from sim_node import parameters as simulator_parameters
 
 _SHARED = ("rate", "gravity")  # must be the same on both sides; set on one side, they count on both
 _LARGEST_DURATION = 1e9  # s
+_SET_BY_RUN = {
+    "character": "--character, for both nodes",
+    "max_ticks": "--duration",
+    "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",
+}
 _LOCKSTEP_TIMEOUT = 60.0  # s that one answer may take, on a machine that may be busy
 
 
@@ -53,10 +58,11 @@ def make_plan(
         ActuatedCharactersError: a name or value is wrong; says which, and what there is.
     """
     simulator_given, controller_given = _shared(simulator_settings, controller_settings)
+    for name, option in _SET_BY_RUN.items():
+        if name in simulator_given or name in controller_given:
+            raise ConfigurationError(f"parameter '{name}' is set by {option}")
     for given in (simulator_given, controller_given):
-        given.setdefault("character", character_name)
-        if given["character"] != character_name:
-            raise ConfigurationError("the character is set by --character, for both nodes")
+        given["character"] = character_name
     character = load_character(character_name)
     controller_given = {**reference, **controller_given}
     _keep_assistance_in_step(character, simulator_given, controller_given)
@@ -67,8 +73,9 @@ def make_plan(
     frames = controller_parameters.read_frames(character, controller)
     motion = controller_parameters.make_reference(character, frames)
     first = motion.sample(0.0)
+    commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {
-        "commanded_joints": controller_parameters.commanded_joints(character, controller),
+        "commanded_joints": commanded,
         "initial_position": first.configuration.position.tolist(),
         "initial_velocity": first.velocity.tolist(),
         # nobody is there to resume what has paused, or to wait for ever
@@ -79,8 +86,9 @@ def make_plan(
         simulator_parameters.PARAMETERS + simulator_parameters.character_parameters(character),
         {**defaults, **simulator_given},
     )
-    if "max_ticks" not in simulator_given:
-        simulator["max_ticks"] = _ticks(duration, simulator.integer("rate"))
+    simulator["max_ticks"] = _ticks(duration, simulator.integer("rate"))
+    character.layout.mask(simulator.texts("commanded_joints"))  # they exist
+    _check_commanded(simulator, commanded)
     clamped = () if frames is None else frames.clamped
     notes = (f"kept within joint limits: {', '.join(clamped)}",) if clamped else ()
     return Plan(character, motion, simulator, controller, notes)
@@ -111,9 +119,24 @@ def _keep_assistance_in_step(
         controller.setdefault("root_assistance", ROOT in commanded)
 
 
+def _check_commanded(simulator: Values, commanded: list[str]) -> None:
+    """Both sides must mean the same joints, or the simulator would wait for ever."""
+    required = set(simulator.texts("commanded_joints"))
+    if required != set(commanded):
+        raise ConfigurationError(
+            f"sim_node's commanded_joints are {_listed(required)}; controller_node commands "
+            f"{_listed(set(commanded))} (its root_assistance decides on 'root')"
+        )
+
+
+def _listed(names: set[str]) -> str:
+    return ", ".join(sorted(names)) or "none"
+
+
 def _ticks(duration: float, rate_hz: int) -> int:
     if not 1.0 / rate_hz <= duration <= _LARGEST_DURATION:
         raise ConfigurationError(
-            f"duration is {duration} s; it must be {1.0 / rate_hz:g} s (one tick) or more"
+            f"duration is {duration} s; it must be {1.0 / rate_hz:g} s (one tick) to "
+            f"{_LARGEST_DURATION:g} s"
         )
     return round(duration * rate_hz)

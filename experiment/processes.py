@@ -11,10 +11,11 @@ from types import TracebackType
 
 _END_PATIENCE = 10.0  # s that a child has to end after SIGINT, before it is killed
 _PR_SET_PDEATHSIG = 1  # prctl(2)
+_LIBC = ctypes.CDLL(None)  # loaded before a fork, not after
 
 
 class Child:
-    """One process, its standard output kept for reading, its standard error in a log file."""
+    """One process: its standard output can be read, its standard error goes to a log file."""
 
     def __init__(
         self,
@@ -29,7 +30,8 @@ class Child:
         self._log = log
         with log.open("wb") as sink:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", module, *arguments],
+                # -P: no module of the same name from the directory where the user stands
+                [sys.executable, "-P", "-m", module, *arguments],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
@@ -105,4 +107,4 @@ class Children:
 
 def _end_with_parent() -> None:
     """Let the kernel send SIGTERM to this child when its parent is gone, even killed."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -53,6 +53,7 @@ class RecorderNode(Node):
         self._listener = RunListener()
         self._failure: str | None = None
         self._recorded_names: dict[str, str] = {}
+        self._published: dict[str, int] = {}  # ns of wall time, of each topic's last message
         self._inboxes: list[tuple[str, DirectSubscription]] = []
         for topic in _TOPICS:
             resolved = self._recorded_names[topic.name] = self.resolve_topic_name(topic.name)
@@ -74,15 +75,14 @@ class RecorderNode(Node):
                 spinner.serve()
                 if self._progress_period > 0.0 and next_progress <= time.monotonic():
                     next_progress = time.monotonic() + self._progress_period
-                    print(f"tick {self._listener.ticks}", flush=True)
+                    print(f"tick {self._listener.last_tick}", flush=True)
                 time.sleep(_DRAIN_PERIOD)
             while self._drain():
                 pass
         finally:
             spinner.close()
-            if self._bag is not None:
-                self._bag.close()
-        write_figures(self._directory, self._listener.summary(), self._listener.series())
+            self._close_bag()
+        write_figures(self._directory, *self._listener.results())
         if self._listener.missing_ticks:
             raise RecordingError(f"{self._listener.missing_ticks} ticks were missed")
         if self._failure is not None:
@@ -93,7 +93,9 @@ class RecorderNode(Node):
         batch = []
         for name, inbox in self._inboxes:
             while (received := inbox.take_stamped()) is not None:
-                batch.append((received[1], name, received[0]))
+                # the wall clock may be set back; a topic's own order stays
+                self._published[name] = max(received[1], self._published.get(name, 0))
+                batch.append((self._published[name], name, received[0]))
         batch.sort(key=lambda message: message[0])
         for published_ns, name, raw in batch:
             self._keep(name, raw, published_ns)
@@ -110,6 +112,13 @@ class RecorderNode(Node):
             self._listener.take(name, raw, published_ns)
         except ActuatedCharactersError as error:
             self._fail(f"cannot measure '{name}': {error}")
+
+    def _close_bag(self) -> None:
+        try:
+            if self._bag is not None:
+                self._bag.close()
+        except RecordingError as error:
+            self._fail(str(error))
 
     def _fail(self, sentence: str) -> None:
         if self._failure is None:

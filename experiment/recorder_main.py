@@ -2,23 +2,19 @@
 
 import sys
 
-from msgs_config.process import StopSignal, limit_threads, run_node
+from msgs_config.process import RunnableNode, limit_threads, run_node
 
 
 def main() -> int:
     """Run the recorder until a signal; returns the exit code."""
     limit_threads()
-    return run_node(_work)
+    return run_node(_make_node)
 
 
-def _work(stop: StopSignal) -> None:
+def _make_node() -> RunnableNode:
     from experiment.recorder import RecorderNode
 
-    node = RecorderNode()
-    try:
-        node.run(stop)
-    finally:
-        node.destroy_node()
+    return RecorderNode()
 
 
 if __name__ == "__main__":

@@ -6,21 +6,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-import yaml
-
-from controller_node.parameters import make_controller
 from experiment.domain import own_domain
-from experiment.figures import LOGS, PARAMETERS, write_figures
-from experiment.metrics import Measurement, Tick
+from experiment.figures import LOGS, read_figures, write_figures, write_parameters
+from experiment.loop import ticks_in_process
+from experiment.metrics import Measurement
 from experiment.plan import Plan
 from experiment.processes import Child, Children
 from msgs_config import configuration
 from msgs_config.errors import RunError
-from sim_node.parameters import make_settings
-from sim_node.simulation import Simulation
 
-_START_PATIENCE = 120.0  # s until the first tick, on a machine that may be busy with other things
+_START_PATIENCE = 120.0  # s until the first answer, on a machine that may be busy with other things
 _POLL_PERIOD = 0.05  # s
 _IN_PROCESS_REPORT = 100  # ticks between reports of progress
 
@@ -34,34 +29,37 @@ def run_over_topics(plan: Plan, directory: Path, *, write_bag: bool, progress: P
     Raises:
         RunError: one of the processes failed; with its own message.
     """
-    with _environment() as environment, Children() as children:
+    with _environment(directory) as environment, Children() as children:
 
-        def start(name: str, module: str, parameters: Mapping[str, object]) -> Child:
-            file = directory / PARAMETERS / f"{name}.yaml"
-            file.write_text(yaml.safe_dump({name: {"ros__parameters": dict(parameters)}}))
-            arguments = ["--ros-args", "--params-file", str(file)]
+        def start(name: str, module: str, parameters: Mapping[str, object], *more: str) -> Child:
+            file = write_parameters(directory, name, parameters)
             log = directory / LOGS / f"{name}.log"
+            arguments = ["--ros-args", "--params-file", str(file), *more]
             return children.start(Child(name, module, arguments, log, environment))
 
-        listening = {"directory": str(directory), "write_bag": write_bag}
-        recorder = start(
-            "recorder", "experiment.recorder_main", {**listening, "progress_period": 0.1}
-        )
-        # simulator and recorder must be there before the first answer, lest a tick go unrecorded
-        controls = {**plan.controller, "wait_for_subscribers": 2}
-        controller = start("controller_node", "controller_node.main", controls)
-        simulates = {**plan.simulator, "wait_for_subscribers": 2}
-        simulator = start("sim_node", "sim_node.main", simulates)
+        listening = {"directory": str(directory), "write_bag": write_bag, "progress_period": 0.1}
+        recorder = start("recorder", "experiment.recorder_main", listening)
+        # both must be there before the first answer, lest a tick go unrecorded
+        both = ("-p", "wait_for_subscribers:=2")
+        controller = start("controller_node", "controller_node.main", plan.controller, *both)
+        simulator = start("sim_node", "sim_node.main", plan.simulator, *both)
         _wait_for_end(simulator, [controller, recorder], progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
+    recorded, _ = read_figures(directory)
+    if recorded["ticks"] != plan.ticks:
+        raise RunError(f"{recorded['ticks']} of {plan.ticks} ticks were recorded")
 
 
 @contextmanager
-def _environment() -> Iterator[dict[str, str]]:
+def _environment(directory: Path) -> Iterator[dict[str, str]]:
     """An environment that keeps the run's traffic on this machine, and to itself."""
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
-    if "ROS_DOMAIN_ID" in environment:
+    environment = {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_LOG_DIR": str(directory / LOGS),
+        **os.environ,
+    }
+    if environment.get("ROS_DOMAIN_ID"):
         yield environment
         return
     with own_domain() as domain:
@@ -80,9 +78,9 @@ def _wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> 
                 raise RunError(f"{child.name} failed: {child.last_words()}")
         ticks = _last_tick(recorder.read_output()) or ticks
         progress(ticks)
-        if ticks < 1 and time.monotonic() > start_deadline:
+        if ticks < 2 and time.monotonic() > start_deadline:
             raise RunError(
-                f"no tick within {_START_PATIENCE:g} s; sim_node says: {simulator.last_words()}"
+                f"no answer within {_START_PATIENCE:g} s; sim_node says: {simulator.last_words()}"
             )
         time.sleep(_POLL_PERIOD)
     if simulator.exit_code:
@@ -102,23 +100,19 @@ def run_in_process(plan: Plan, directory: Path, *, progress: Progress) -> None:
     Raises:
         SimulationError: the simulation diverged.
     """
+    write_parameters(directory, "sim_node", plan.simulator)
+    write_parameters(directory, "controller_node", plan.controller)
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     measurement = Measurement(known)
-    controller = make_controller(plan.character, plan.reference, plan.controller)
-    with Simulation(plan.character, make_settings(plan.simulator)) as simulation:
-        episode_ns = simulation.state.stamp_ns
-        measurement.add_state(simulation.state)
-        started = time.perf_counter()
-        for tick in range(1, plan.ticks + 1):
-            state = simulation.state
-            effort, reference = controller.answer(state, episode_ns)
-            following = simulation.step(np.where(simulation.commanded, effort, 0.0))
-            assert following.effort is not None
-            measurement.add_state(following)
-            measurement.add_tick(Tick(state, following.effort, reference))
-            if tick % _IN_PROCESS_REPORT == 0:
-                progress(tick)
-        wall_time = time.perf_counter() - started
-    summary = {"character": known.character} | measurement.summary(wall_time)
-    counts = {"rejected_commands": 0, "duplicate_commands": 0}
-    write_figures(directory, summary | counts, measurement.series())
+    started = time.perf_counter()
+    for count, tick in enumerate(ticks_in_process(plan), start=1):
+        if count == 1:
+            measurement.add_state(tick.state)
+        measurement.add_state(tick.following)
+        measurement.add_tick(tick)
+        if count % _IN_PROCESS_REPORT == 0:
+            progress(count)
+    figures = measurement.summary(wall_time=time.perf_counter() - started)
+    counts = {"rejected_commands": 0, "duplicate_commands": 0, "missing_ticks": 0}
+    summary = {"character": known.character} | figures | counts
+    write_figures(directory, summary, measurement.series())

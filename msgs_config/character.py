@@ -89,6 +89,7 @@ class Character:
 
     name: str
     file: Path
+    file_text: str = field(repr=False)
     loading: Loading
     links: tuple[Link, ...]
     gains: dict[str, Gains]  # by joint; the base's force and torque under `root` and `root_r`

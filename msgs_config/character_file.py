@@ -33,6 +33,7 @@ class CharacterFile:
 
     name: str
     path: Path
+    text: str
     loading: Loading
     up_axis: str
     rest_pose: dict[str, float]  # DoF name -> m or rad
@@ -70,7 +71,8 @@ def read_character_file(name_or_path: str) -> CharacterFile:
         CharacterError: names the file, the key and what would be right.
     """
     path = character_path(name_or_path)
-    reader = _Reader(path, files.read_yaml_mapping(path, CharacterError))
+    text = files.read_text(path, CharacterError)
+    reader = _Reader(path, files.parse_yaml_mapping(path, text, CharacterError))
     reader.check_keys(_KEYS)
     joints = reader.parts("joints")
     for joint in joints.values():
@@ -81,6 +83,7 @@ def read_character_file(name_or_path: str) -> CharacterFile:
     return CharacterFile(
         name=path.stem,
         path=path,
+        text=text,
         loading=_loading(reader),
         up_axis=reader.choice("up_axis", ["z", "y"]),
         rest_pose={name: rest_pose.number(name) for name in rest_pose.content},

@@ -51,6 +51,12 @@ def load_character(name_or_path: str) -> Character:
     finally:
         pybullet.disconnect(client)
     links = _depth_first(links)
+    for link in links[1:]:
+        if link.joint.name in (ROOT, ROOT_TORQUE) and link.joint.type is not JointType.FIXED:
+            raise CharacterError(
+                f"{file.loading.urdf_path}: a joint is named '{link.joint.name}', which is the "
+                "floating base's"
+            )
     try:
         layout = JointLayout((link.joint.name, link.joint.type) for link in links)
     except LayoutError as error:
@@ -59,6 +65,7 @@ def load_character(name_or_path: str) -> Character:
     return Character(
         name=file.name,
         file=file.path,
+        file_text=file.text,
         loading=file.loading,
         links=tuple(links),
         gains=_gains(file, layout),

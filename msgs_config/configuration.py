@@ -1,6 +1,7 @@
 """What `~/configuration` says: all that a run depends on, as JSON, so that a bag can repeat it."""
 
 import json
+import math
 import platform
 from dataclasses import dataclass
 from importlib import metadata
@@ -12,26 +13,35 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import MessageError
 from msgs_config.joint_layout import JointLayout, JointType
-from msgs_config.parameters import Values
+from msgs_config.parameters import Value, Values
 
 _PACKAGES = ["actuated_characters", "pybullet", "mujoco-core", "numpy", "ros-jazzy-rclpy"]
 
 
-def describe(character: Character, values: Values) -> str:
-    """The JSON text: the character with its files, the parameters in force, and the versions."""
+def describe(character: Character, values: Values, since_ns: int | None = None) -> str:
+    """The JSON text: the character with its files, the parameters in force, and the versions.
+
+    `since_ns` is the stamp of the last state that was answered with other parameters, if any.
+    """
     content = {
         "character": character.name,
-        "character_file": character.file.read_text(encoding="utf-8"),
+        "character_file": character.file_text,
         "urdf": character.loading.urdf_text,
         "joints": [
             {"name": joint.name, "type": joint.type.value} for joint in character.layout.joints
         ],
-        "effort_limits": character.effort_limits().tolist(),
+        "effort_limits": [_finite(limit) for limit in character.effort_limits().tolist()],
         "mass": character.mass,
-        "parameters": values,
+        "parameters_after_stamp_ns": since_ns,
+        "parameters": {name: _finite(value) for name, value in values.items()},
         "versions": {"python": platform.python_version()} | _versions(),
     }
-    return json.dumps(content)
+    return json.dumps(content, allow_nan=False)
+
+
+def _finite(value: Value) -> Value | None:
+    """What JSON can say: no limit is null, not infinity."""
+    return None if isinstance(value, float) and math.isinf(value) else value
 
 
 def _versions() -> dict[str, str]:
@@ -67,7 +77,9 @@ def parse(text: str) -> RunConfiguration:
         return RunConfiguration(
             character=str(content["character"]),
             layout=JointLayout(joints),
-            effort_limits=np.array(content["effort_limits"], dtype=float),
+            effort_limits=np.array(
+                [np.inf if limit is None else limit for limit in content["effort_limits"]]
+            ),
             mass=float(content["mass"]),
             parameters=dict(content["parameters"]),
         )

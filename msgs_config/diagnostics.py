@@ -30,6 +30,6 @@ class DiagnosticsPublisher:
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
 
-    def flush(self, seconds: float) -> None:
-        """Wait until every subscriber has what was published, for some seconds at the most."""
-        self._publisher.wait_for_all_acked(Duration(seconds=seconds))
+    def flush(self, seconds: float) -> bool:
+        """Wait until every subscriber has the last report, at most `seconds`; whether it has."""
+        return bool(self._publisher.wait_for_all_acked(Duration(seconds=max(seconds, 0.0))))

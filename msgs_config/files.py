@@ -54,14 +54,16 @@ def read_text(path: Path, error: type[ActuatedCharactersError]) -> str:
         raise error(f"{path}: {reason}") from cause
 
 
-def read_yaml_mapping(path: Path, error: type[ActuatedCharactersError]) -> dict[str, Any]:
-    """The mapping at the top of a YAML file.
+def parse_yaml_mapping(
+    path: Path, text: str, error: type[ActuatedCharactersError]
+) -> dict[str, Any]:
+    """The mapping at the top of a YAML file's text.
 
     Raises:
-        error: the file cannot be read, is no YAML, nests too deep, or holds no mapping.
+        error: the text is no YAML, nests too deep, or holds no mapping.
     """
     try:
-        content = yaml.safe_load(read_text(path, error))
+        content = yaml.safe_load(text)
     except (yaml.YAMLError, RecursionError, ValueError) as cause:  # ValueError: no such date
         where = getattr(cause, "problem_mark", None)
         line = f", line {where.line + 1}" if where is not None else ""

@@ -150,12 +150,12 @@ def state_in_layout(layout: JointLayout, arrays: JointArrays) -> StampedState:
     if len(indices) != layout.size:
         missing = next(name for name in layout.dof_names if name not in arrays.names)
         raise LayoutError(f"degree of freedom '{missing}' is missing")
+    parts = [arrays.position, arrays.velocity, arrays.effort]
     lengths = {len(arrays.position), len(arrays.velocity), len(arrays.effort) or layout.size}
     if lengths != {layout.size}:
         raise MessageError(f"{layout.size} names but arrays of {sorted(lengths)} entries")
-    ordered = np.empty((3, layout.size))
-    ordered[0, indices], ordered[1, indices] = arrays.position, arrays.velocity
-    if len(arrays.effort):
-        ordered[2, indices] = arrays.effort
-    effort = ordered[2] if len(arrays.effort) else None
-    return StampedState(arrays.stamp_ns, ordered[0], ordered[1], effort)
+    if arrays.names != layout.dof_names:
+        order = np.argsort(indices)
+        parts = [part[order] if len(part) else part for part in parts]
+    position, velocity, effort = parts
+    return StampedState(arrays.stamp_ns, position, velocity, effort if len(effort) else None)

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
 
 from msgs_config.parameters import Parameter, Values
 
@@ -14,7 +15,9 @@ def given_parameters(node: Node) -> dict[str, object]:
     rclpy has no public list of them, and silently ignores names that nobody declares; a user's
     misspelt parameter must not pass unseen.
     """
-    return {name: parameter.value for name, parameter in node._parameter_overrides.items()}
+    overrides = node._parameter_overrides
+    empty = RosParameter.Type.NOT_SET  # what an empty list arrives as
+    return {name: [] if p.type_ is empty else p.value for name, p in overrides.items()}
 
 
 def declare(node: Node, parameters: Iterable[Parameter], values: Values) -> None:

@@ -8,10 +8,16 @@ import signal
 import sys
 from collections.abc import Callable
 from types import FrameType
+from typing import Protocol
 
-from msgs_config.errors import ActuatedCharactersError
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 
 EXIT_ERROR = 1
+_PARAMETERS_ARE_SET = (
+    "parameters are set by --ros-args -p NAME:=VALUE or --params-file FILE, and listed by "
+    "'actuated_characters parameters'"
+)
+_USAGE = "usage: {name} [--ros-args ...]\n\n" + _PARAMETERS_ARE_SET
 
 
 def limit_threads() -> None:
@@ -39,24 +45,53 @@ class StopSignal:
         self._received = True
 
 
-def run_node(work: Callable[[StopSignal], None]) -> int:
-    """Run a node's work between rclpy's start and end; returns the process's exit code.
+class RunnableNode(Protocol):
+    """A node whose work ends by itself or at a stop signal."""
+
+    def run(self, stop: StopSignal) -> None:
+        """Work until the end or until `stop`."""
+
+    def destroy_node(self) -> object:
+        """Leave the graph."""
+
+
+def run_node(make_node: Callable[[], RunnableNode]) -> int:
+    """Make a node and run it between rclpy's start and end; returns the process's exit code.
 
     rclpy's own signal handlers would end the context under a loop that still has something to
-    publish or to write, so the work is handed a `StopSignal` instead.
+    publish or to write, so the node is handed a `StopSignal` instead.
     """
-    import rclpy
-    from rclpy.signals import SignalHandlerOptions
-
     stop = StopSignal()
     try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        work(stop)
+        _start_ros()
+        node = make_node()
+        try:
+            node.run(stop)
+        finally:
+            node.destroy_node()
     except ActuatedCharactersError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
         return EXIT_ERROR
-    except rclpy.exceptions.ROSInterruptException:
-        return 0
     finally:
+        import rclpy
+
         rclpy.try_shutdown()
     return 0
+
+
+def _start_ros() -> None:
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    try:
+        others = remove_ros_args(sys.argv)[1:]
+        if {"-h", "--help"} & set(others):
+            print(_USAGE.format(name=os.path.basename(sys.argv[0])))
+            raise SystemExit(0)
+        if others:
+            raise ConfigurationError(f"unknown argument {others[0]!r}; {_PARAMETERS_ARE_SET}")
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # rclpy's own, of several types: a bad file or argument
+        reason = " ".join(str(error).split())
+        raise ConfigurationError(f"ROS does not take the arguments: {reason}") from error

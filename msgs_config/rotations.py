@@ -113,8 +113,9 @@ def angle_between(a_xyzw: FloatArray, b_xyzw: FloatArray) -> FloatArray:
 
 
 def yaw(q_xyzw: FloatArray) -> FloatArray:
-    """Angle (...) in rad about the parent's z axis: the twist of the swing-twist decomposition."""
-    angle: FloatArray = 2.0 * np.arctan2(q_xyzw[..., 2], q_xyzw[..., 3])
+    """Angle (...) in rad, -pi to pi, about the parent's z: the twist of swing and twist."""
+    z, w = q_xyzw[..., 2], q_xyzw[..., 3]
+    angle: FloatArray = 2.0 * np.arctan2(z * np.copysign(1.0, w), np.abs(w))
     return angle
 
 

@@ -34,7 +34,6 @@ class Topic:
     name: str
     message_type: type
     qos: QoSProfile
-    meaning: str
 
     def of(self, node_name: str) -> "Topic":
         """The topic as another node names it: `~` is the node that publishes it."""
@@ -46,13 +45,13 @@ def create_publisher(node: Node, topic: Topic) -> Publisher:
     return node.create_publisher(topic.message_type, topic.name, topic.qos)
 
 
-JOINT_STATES = Topic("joint_states", JointState, STREAM_QOS, "the state at each tick")
-JOINT_TORQUES = Topic("joint_torques", JointState, STREAM_QOS, "the answer to each state")
-REFERENCE = Topic("~/reference", JointState, STREAM_QOS, "the desired state at each tick")
-CLOCK = Topic("/clock", Clock, STREAM_QOS, "simulation time, each tick")
-EPISODE = Topic("episode", Header, LATCHED_QOS, "stamp of the episode's first state")
-CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS, "all that a run depends on, JSON")
-DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, STREAM_QOS, "counts and faults")
+JOINT_STATES = Topic("joint_states", JointState, STREAM_QOS)
+JOINT_TORQUES = Topic("joint_torques", JointState, STREAM_QOS)
+REFERENCE = Topic("~/reference", JointState, STREAM_QOS)
+CLOCK = Topic("/clock", Clock, STREAM_QOS)
+EPISODE = Topic("episode", Header, LATCHED_QOS)
+CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS)
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, STREAM_QOS)
 
 SIM_NODE = "sim_node"
 CONTROLLER_NODE = "controller_node"

@@ -114,4 +114,5 @@ class LockstepBarrier:
             raise CommandError(f"effort of '{name}' is {effort[worst]}; it must be finite")
         if not self._required[indices].all():
             name = self._dof_names[indices[int(np.argmin(self._required[indices]))]]
-            raise CommandError(f"'{name}' is not among the commanded joints")
+            hint = "; root_assistance of controller_node is on" if name.startswith("root_") else ""
+            raise CommandError(f"'{name}' is not among the commanded joints{hint}")

@@ -2,23 +2,19 @@
 
 import sys
 
-from msgs_config.process import StopSignal, limit_threads, run_node
+from msgs_config.process import RunnableNode, limit_threads, run_node
 
 
 def main() -> int:
     """Run the simulator until its end or a signal; returns the exit code."""
     limit_threads()
-    return run_node(_work)
+    return run_node(_make_node)
 
 
-def _work(stop: StopSignal) -> None:
+def _make_node() -> RunnableNode:
     from sim_node.node import SimNode
 
-    node = SimNode()
-    try:
-        node.run(stop)
-    finally:
-        node.destroy_node()
+    return SimNode()
 
 
 if __name__ == "__main__":

@@ -15,14 +15,11 @@ from msgs_config.node_parameters import declare, given_parameters
 from msgs_config.parameters import resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
+from msgs_config.shared_parameters import DEFAULT_CHARACTER
+from msgs_config.warnings import Warnings
 from sim_node.lockstep import LockstepBarrier, Verdict
 from sim_node.outputs import Outputs
-from sim_node.parameters import (
-    DEFAULT_CHARACTER,
-    PARAMETERS,
-    character_parameters,
-    make_settings,
-)
+from sim_node.parameters import PARAMETERS, character_parameters, make_settings
 from sim_node.patience import Due, Patience
 from sim_node.simulation import FIRST_TICK, Simulation
 from sim_node.tick_times import TickTimes
@@ -30,8 +27,8 @@ from sim_node.waiting import describe_waiting, publisher_names
 
 _EXPLAIN_AFTER = 2.0  # s without a complete command before the node says what is missing
 _DIAGNOSTICS_PERIOD = 1.0  # s of wall time
-_MOST_TOLD = 100  # different warnings, lest a malicious sender fill the log
-_FLUSH_TIME = 10.0  # s that a subscriber may take to acknowledge the last messages
+_FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
+_STOP_FLUSH_TIME = 0.5  # s, after a signal or an error
 
 
 class SimNode(Node):
@@ -71,7 +68,8 @@ class SimNode(Node):
         self._last_effort = self._barrier.effort
         self._timeouts = 0
         self._tick_times = TickTimes()
-        self._told: set[str] = set()
+        self._warnings = Warnings(self)
+        self._begun = False
 
     def run(self, stop: StopSignal) -> None:
         """Simulate until `max_ticks`, or until `stop`.
@@ -86,16 +84,15 @@ class SimNode(Node):
             self._begin_tick()
             while not stop and not self._finished:
                 self._turn(spinner)
-            self._publish_diagnostics()
-            self._outputs.flush(_FLUSH_TIME)
-            self._diagnostics.flush(_FLUSH_TIME)
         finally:
+            self._flush(_FLUSH_TIME if self._finished else _STOP_FLUSH_TIME)
             spinner.close()
             self._simulation.close()
 
     @property
     def _finished(self) -> bool:
-        return 0 < self._max_ticks <= self._simulation.tick - FIRST_TICK
+        ticks = self._simulation.tick - FIRST_TICK
+        return not self._diverged and 0 < self._max_ticks <= ticks
 
     def _wait_for_subscribers(self, stop: StopSignal, spinner: Spinner) -> None:
         wanted = self._values.integer("wait_for_subscribers")
@@ -111,14 +108,24 @@ class SimNode(Node):
         raw = self._commands.take()
         if raw is None:
             spinner.rest()
-            self._look_at_the_clock()
         else:
             spinner.received()
+            spinner.serve()  # a flood of commands must not keep services waiting
             self._take_command(raw)
+        self._look_at_the_clock()
         if self._barrier.complete and not self._paused:
             self._advance()
 
+    def _flush(self, seconds: float) -> None:
+        """Publish the last report, and wait until every subscriber has all that was published."""
+        self._publish_diagnostics()
+        deadline = time.monotonic() + seconds
+        flushed = self._outputs.flush(seconds)
+        if not (flushed and self._diagnostics.flush(deadline - time.monotonic())):
+            self.get_logger().warning("a subscriber has not acknowledged the last messages")
+
     def _begin_tick(self) -> None:
+        self._begun = True
         state = self._simulation.state
         self._barrier.open(state.stamp_ns)
         self._patience.restart(time.monotonic())
@@ -142,8 +149,13 @@ class SimNode(Node):
             verdict = self._barrier.offer(command.stamp_ns, indices, command.effort)
         except (MessageError, LayoutError, CommandError) as error:
             self._barrier.count_rejected()
-            self._tell_once(f"command rejected: {error}")
+            self._warnings.say_once(f"command rejected: {error}")
             return
+        if verdict is Verdict.FUTURE or command.stamp_ns == 0:
+            self._warnings.say_once(
+                f"command dropped: it answers {command.stamp_ns} ns, the state is of "
+                f"{self._barrier.stamp_ns} ns; the stamp must be that of the state"
+            )
         if verdict is Verdict.CONFLICT:
             senders = ", ".join(publisher_names(self, topics.JOINT_TORQUES))
             self._raise_fault(
@@ -170,6 +182,7 @@ class SimNode(Node):
         sentence = describe_waiting(self, topics.JOINT_TORQUES, self._barrier.missing)
         sentence = f"no command within {self._patience.timeout:g} s; {sentence}"
         if action == "abort":
+            self._fault = sentence
             raise SimulationError(sentence)
         self.get_logger().warning(f"{sentence}; on_timeout: {action}")
         if action == "pause":
@@ -180,9 +193,11 @@ class SimNode(Node):
             self._timeouts += 1
 
     def _raise_fault(self, sentence: str) -> None:
+        self._fault = sentence
         if self._values.text("on_fault") == "abort":
             raise SimulationError(sentence)
-        self.get_logger().error(f"{sentence}; paused")
+        if not self._paused:
+            self.get_logger().error(f"{sentence}; paused")
         self._pause(sentence)
 
     def _pause(self, fault: str) -> None:
@@ -196,8 +211,9 @@ class SimNode(Node):
             return response
         resumes = self._paused and not request.data
         self._paused = request.data
-        if resumes:
+        if resumes and self._begun:
             self._fault = None
+            self._tick_times.resume()
             self._begin_tick()  # what was collected before the pause is asked for again
         response.success, response.message = True, "paused" if self._paused else "running"
         return response
@@ -209,9 +225,3 @@ class SimNode(Node):
         values["timeouts"] = self._timeouts
         values |= self._tick_times.summary()
         self._diagnostics.publish(values, self._fault)
-
-    def _tell_once(self, sentence: str) -> None:
-        """Warn of what may come again at every tick."""
-        if sentence not in self._told and len(self._told) < _MOST_TOLD:
-            self._told.add(sentence)
-            self.get_logger().warning(sentence)

@@ -50,6 +50,7 @@ class Outputs:
         """Publish the last state again, the same bytes."""
         self._states.publish(self._last_state)
 
-    def flush(self, seconds: float) -> None:
-        """Wait until every subscriber has the last state, for some seconds at the most."""
-        self._states.wait_for_all_acked(Duration(seconds=seconds))
+    def flush(self, seconds: float) -> bool:
+        """Wait until every subscriber has the last tick, at the most `seconds`; whether it has."""
+        streams = (self._clock, self._states)
+        return all(stream.wait_for_all_acked(Duration(seconds=seconds)) for stream in streams)

@@ -2,18 +2,16 @@
 
 from msgs_config.character import Character
 from msgs_config.parameters import Parameter, Values
+from msgs_config.shared_parameters import CHARACTER, GRAVITY, RATE
 from sim_node.simulation import SimulationSettings
 
 _LARGEST_COUNT = 2**62
-DEFAULT_CHARACTER = "humanoid"
 
 PARAMETERS = [
-    Parameter(
-        "character", DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml file"
-    ),
-    Parameter("rate", 240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000),
+    CHARACTER,
+    RATE,
     Parameter("substeps", 1, "engine steps a tick", minimum=1, maximum=1000),
-    Parameter("gravity", 9.81, "gravity along -z", unit="m/s^2", maximum=1000.0),
+    GRAVITY,
     Parameter(
         "friction",
         0.9,

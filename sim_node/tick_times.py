@@ -28,6 +28,10 @@ class TickTimes:
             self._count += 1
         self._last = now
 
+    def resume(self) -> None:
+        """Say that the next tick begins now, after a pause that counts as none."""
+        self._last = None
+
     def summary(self) -> dict[str, float]:
         """Ticks a second, and percentiles of a tick's duration in microseconds."""
         if not self._durations:

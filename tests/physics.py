@@ -30,7 +30,8 @@ from sim_node.world import World, WorldSettings
 DATA = Path(__file__).parent / "data"
 TURNED_FRAMES = [str(path) for path in sorted(DATA.glob("turned_frames*.yaml"))]
 FLOATING_TURNED_FRAMES = str(DATA / "turned_frames.yaml")
-EVERY_CHARACTER = [*shipped_characters(), *TURNED_FRAMES]
+SIMPLE_BODIES = [str(DATA / "free_box.yaml"), str(DATA / "wheel.yaml")]
+EVERY_CHARACTER = [*shipped_characters(), *TURNED_FRAMES, *SIMPLE_BODIES]
 FLOATING_CHARACTERS = ["humanoid", FLOATING_TURNED_FRAMES]
 
 INSTANT = 1e-7

@@ -27,6 +27,7 @@ EDGE = {  # the files that speak ROS, beside all of experiment/
     "msgs_config/polling.py",
     "msgs_config/process.py",
     "msgs_config/topics.py",
+    "msgs_config/warnings.py",
     "sim_node/node.py",
     "sim_node/outputs.py",
     "sim_node/waiting.py",

@@ -25,8 +25,8 @@ class TickAssembler:
         self.missing_ticks = 0
 
     @property
-    def ticks(self) -> int:
-        """Ticks seen from the first state to the last."""
+    def last_tick(self) -> int:
+        """Number of the last tick whose state came; 0 before the first."""
         return self._last_tick or 0
 
     def add_state(self, state: StampedState) -> None:
@@ -60,4 +60,4 @@ class TickAssembler:
                 return
             self._states.popleft()
             if following.effort is not None:
-                self._measurement.add_tick(Tick(state, following.effort, reference))
+                self._measurement.add_tick(Tick(state, following, reference))
