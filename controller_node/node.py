@@ -6,7 +6,6 @@ import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header, String
 
 from controller_node.parameters import (
@@ -21,7 +20,7 @@ from controller_node.parameters import (
 from msgs_config import configuration, topics
 from msgs_config.character_loading import load_character
 from msgs_config.errors import ActuatedCharactersError, LayoutError, MessageError
-from msgs_config.messages import JointStateDecoder, JointStateEncoder, state_in_layout
+from msgs_config.messages import JointStateDecoder, JointStateEncoder, decode, state_in_layout
 from msgs_config.node_parameters import declare, given_parameters
 from msgs_config.parameters import Values, resolve
 from msgs_config.polling import DirectSubscription, Spinner
@@ -116,10 +115,10 @@ class ControllerNode(Node):
             return
         try:
             state = state_in_layout(self._layout, self._decoder.decode(raw))
+            episode_ns = self._episode_of(state)
         except (MessageError, LayoutError) as error:
             self._warnings.say_once(f"state ignored: {error}")
             return
-        episode_ns = self._episode_of(state)
         if episode_ns is None:
             return  # the simulator publishes the state again
         self._check_rate(state)
@@ -167,7 +166,7 @@ class ControllerNode(Node):
         """
         raw = self._episodes.take()
         if raw is not None:
-            stamp = deserialize_message(raw, Header).stamp
+            stamp = decode(raw, Header).stamp
             self._episode_ns = stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
         if state.effort is None:
             self._episode_ns = state.stamp_ns

@@ -11,7 +11,8 @@ from pathlib import Path
 from msgs_config.errors import ConfigurationError
 
 _DOMAINS = range(1, 102)  # above 101 the ports lie among those that Linux gives out by itself
-_FIRST_PORT, _PORTS_A_DOMAIN = 7400, 250  # DDSI-RTPS 2.3, section 9.6.1.1
+_FIRST_PORT, _PORTS_A_DOMAIN, _UNICAST = 7400, 250, 10  # DDSI-RTPS 2.3, section 9.6.1.1
+_LOOKED_FOR = 4  # participants of a domain; without multicast there is no port of all
 
 
 @contextmanager
@@ -55,10 +56,16 @@ def _lock(path: Path) -> int | None:
 
 
 def _is_silent(domain: int) -> bool:
-    """Whether no process on this machine takes part in the domain."""
+    """Whether none of the ports is taken where the domain's first participants listen."""
+    first = _FIRST_PORT + _PORTS_A_DOMAIN * domain
+    meeting_points = [first] + [first + _UNICAST + 2 * index for index in range(_LOOKED_FOR)]
+    return all(_is_free(port) for port in meeting_points)
+
+
+def _is_free(port: int) -> bool:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.bind(("", _FIRST_PORT + _PORTS_A_DOMAIN * domain))
+            probe.bind(("", port))
         except OSError:
             return False
     return True

@@ -1,7 +1,6 @@
 """Reads the serialised messages of a run and measures it."""
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from experiment.metrics import Measurement
@@ -10,7 +9,7 @@ from msgs_config import configuration, topics
 from msgs_config.arrays import FloatArray
 from msgs_config.configuration import RunConfiguration
 from msgs_config.errors import RecordingError
-from msgs_config.messages import JointStateDecoder, state_in_layout
+from msgs_config.messages import JointStateDecoder, decode, state_in_layout
 from msgs_config.stamped import StampedReference
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 
@@ -53,7 +52,7 @@ class RunListener:
             ActuatedCharactersError: the message is not what its topic should carry.
         """
         if topic == CONFIGURATION:
-            self._configure(deserialize_message(raw, String).data)
+            self._configure(decode(raw, String).data)
         elif self._configuration is None:
             if len(self._early) == _MOST_EARLY:
                 raise RecordingError(f"nothing on '{CONFIGURATION}', which says what states mean")
@@ -65,7 +64,7 @@ class RunListener:
         elif topic == topics.JOINT_TORQUES.name:
             self._first_command_ns = self._first_command_ns or published_ns
         elif topic == topics.DIAGNOSTICS.name:
-            self._take_counts(deserialize_message(raw, DiagnosticArray))
+            self._take_counts(decode(raw, DiagnosticArray))
 
     def results(self) -> tuple[dict[str, object], FloatArray]:
         """The figures of the run, and its series: one row a tick, see `metrics.COLUMNS`.

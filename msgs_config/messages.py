@@ -11,6 +11,7 @@ its size, counted from the end of the four bytes of encapsulation header.
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from rclpy.serialization import deserialize_message
@@ -56,6 +57,18 @@ def _cdr_names(names: Sequence[str]) -> bytes:
         text = name.encode() + b"\0"
         content += bytes(_padding(len(content), 4)) + struct.pack("<I", len(text)) + text
     return bytes(content + bytes(_padding(len(content), 4)))
+
+
+def decode(raw: bytes, message_type: type) -> Any:
+    """A message of any type from its serialised form.
+
+    Raises:
+        MessageError: the bytes are no such message.
+    """
+    try:
+        return deserialize_message(raw, message_type)
+    except Exception as error:  # rclpy has no type of its own for what cannot be decoded
+        raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
 
 
 class JointStateEncoder:
@@ -104,10 +117,7 @@ class JointStateDecoder:
         return self._decode_slowly(raw)
 
     def _decode_slowly(self, raw: bytes) -> JointArrays:
-        try:
-            message = deserialize_message(raw, JointState)
-        except Exception as error:  # rclpy has no type of its own for what cannot be decoded
-            raise MessageError(f"{len(raw)} bytes that are no JointState") from error
+        message = decode(raw, JointState)
         names = tuple(message.name)
         head = _cdr_names(names)
         if raw.startswith(head, _NAMES_START) and len(self._kept) < _MAX_KEPT_SENDERS:

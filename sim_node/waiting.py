@@ -1,11 +1,15 @@
 """What to tell a user whose simulator waits: what is missing, and who could send it."""
 
+import time
+
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
 from msgs_config.topics import Topic
 
 _NAMES_SHOWN = 6
+_UNKNOWN = "_UNKNOWN_"  # in what ROS says of a node whose name has not come yet
+_NAME_PATIENCE, _NAME_POLL = 1.0, 0.01  # s
 
 
 def describe_waiting(node: Node, topic: Topic, missing: list[str]) -> str:
@@ -16,9 +20,18 @@ def describe_waiting(node: Node, topic: Topic, missing: list[str]) -> str:
 
 
 def publisher_names(node: Node, topic: Topic) -> list[str]:
-    """Full names of the nodes that publish on a topic."""
-    infos = node.get_publishers_info_by_topic(topic.name)
-    return sorted({f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos})
+    """Full names of the nodes that publish on a topic.
+
+    A publisher is discovered a moment before the name of its node, which is worth a short wait.
+    """
+    deadline = time.monotonic() + _NAME_PATIENCE
+    while True:
+        infos = node.get_publishers_info_by_topic(topic.name)
+        names = {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}
+        unknown = {name for name in names if _UNKNOWN in name}
+        if not unknown or time.monotonic() > deadline:
+            return sorted(names - unknown) + ["a node whose name is not known"] * bool(unknown)
+        time.sleep(_NAME_POLL)
 
 
 def _describe_publishers(node: Node, topic: Topic) -> str:

@@ -1,0 +1,58 @@
+"""Fixtures of the tests that start nodes: a ROS domain of their own, processes, clients."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from ros import DDS_PROFILES, ControllerClient, Processes, SimulatorClient
+
+from experiment.domain import own_domain
+
+# It is read once, when a process makes its first node, which may be in any test.
+os.environ[DDS_PROFILES] = str(Path(__file__).parent / "data" / "prompt_heartbeats.xml")
+
+
+@pytest.fixture(scope="session")
+def domain() -> Iterator[int]:
+    """A ROS domain that nobody else on this machine uses; the tests' processes inherit it."""
+    with own_domain() as number, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(number))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield number
+
+
+@pytest.fixture(scope="session")
+def context(domain: int) -> Iterator[Context]:
+    """The test process's own part in the domain."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def processes(domain: int, tmp_path: Path) -> Iterator[Processes]:
+    """Starts processes that end with the test."""
+    del domain
+    started = Processes(tmp_path)
+    yield started
+    started.end()
+
+
+@pytest.fixture
+def client(context: Context) -> Iterator[SimulatorClient]:
+    """A node that stands where a controller stands."""
+    client = SimulatorClient(context)
+    yield client
+    client.close()
+
+
+@pytest.fixture
+def simulator(context: Context) -> Iterator[ControllerClient]:
+    """A node that stands where the simulator stands."""
+    client = ControllerClient(context)
+    yield client
+    client.close()

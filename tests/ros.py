@@ -1,0 +1,390 @@
+"""What the tests of the nodes share: processes that are always ended, and a node in the test.
+
+Everything waits for a condition with a deadline; nothing sleeps to let something happen.
+"""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool
+
+from msgs_config import topics
+from msgs_config.joint_layout import ROOT
+from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
+from msgs_config.topics import Topic
+
+PATIENCE = 30.0
+"""s that a condition may take to come true, on a machine that may be busy with other things."""
+
+RETRY_PERIOD = 0.1
+"""s after which a volatile message, whose reader may not have been there, is sent again."""
+
+DDS_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+"""What sets the middleware of the test's own process; the processes under test do not get it."""
+
+MODULES = {
+    topics.SIM_NODE: "sim_node.main",
+    topics.CONTROLLER_NODE: "controller_node.main",
+    topics.RECORDER_NODE: "experiment.recorder_main",
+}
+_PR_SET_PDEATHSIG = 1  # prctl(2)
+
+
+def stamp_ns(message: Any) -> int:
+    """Stamp of a message with a header, or of one that is a header itself."""
+    stamp = getattr(message, "header", message).stamp
+    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
+
+
+def tick_of(message: Any, rate_hz: int = 240) -> int:
+    """The tick whose stamp a message has."""
+    return round(stamp_ns(message) * rate_hz / NANOSECONDS_PER_SECOND)
+
+
+def wait_until(
+    condition: Callable[[], Any],
+    what: str,
+    patience: float = PATIENCE,
+    step: Callable[[], object] = lambda: time.sleep(0.01),
+) -> Any:
+    """Take a step again and again until the condition gives something true, which is returned."""
+    deadline = time.monotonic() + patience
+    while not (result := condition()):
+        assert time.monotonic() < deadline, f"not within {patience:g} s: {what}"
+        step()
+    return result
+
+
+class Process:
+    """A process with its output in files; `end` ends it, whatever happens."""
+
+    def __init__(
+        self,
+        arguments: Sequence[str],
+        log: Path,
+        cwd: Path | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """Start `python arguments`, to be killed should the test's own process be."""
+        self._errors = log.with_suffix(".stderr")
+        self._output = log.with_suffix(".stdout")
+        inherited = dict(os.environ if environment is None else environment)
+        inherited.pop(DDS_PROFILES, None)
+        with self._errors.open("wb") as errors, self._output.open("wb") as output:
+            self._process = subprocess.Popen(
+                [sys.executable, *arguments],
+                cwd=cwd,
+                env={**inherited, "PYTHONUNBUFFERED": "1"},
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=errors,
+                start_new_session=True,
+                preexec_fn=_be_killed_with_parent,
+            )
+        self.pid = self._process.pid
+
+    @property
+    def exit_code(self) -> int | None:
+        """The exit code, None while the process runs."""
+        return self._process.poll()
+
+    @property
+    def stderr(self) -> str:
+        """What it has written to its standard error so far."""
+        return self._errors.read_text(errors="replace")
+
+    @property
+    def stdout(self) -> str:
+        """What it has written to its standard output so far."""
+        return self._output.read_text(errors="replace")
+
+    def send(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def wait(self, patience: float = PATIENCE) -> int:
+        """Its exit code, once it has ended by itself."""
+        try:
+            return self._process.wait(patience)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(
+                f"process {self.pid} did not end within {patience:g} s:\n{self.stderr}"
+            ) from None
+
+    def end(self) -> None:
+        """End it if it has not ended yet."""
+        if self.exit_code is None:
+            self._process.terminate()
+        try:
+            self._process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+def _be_killed_with_parent() -> None:
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+class Processes:
+    """Starts processes in a folder, and ends them all, the last one first."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._started: list[Process] = []
+
+    def node(self, name: str, **parameters: object) -> Process:
+        """Start one of the package's nodes; a name's dots are written as double underscores."""
+        given = {name.replace("__", "."): value for name, value in parameters.items()}
+        file = self._folder / f"{len(self._started)}_{name}.yaml"
+        file.write_text(yaml.safe_dump({name: {"ros__parameters": given}}))
+        return self.python("-m", MODULES[name], "--ros-args", "--params-file", str(file))
+
+    def simulator(self, character: str = "pendulum", **parameters: object) -> Process:
+        """Start `sim_node`."""
+        return self.node(topics.SIM_NODE, character=character, **parameters)
+
+    def controller(self, character: str = "pendulum", **parameters: object) -> Process:
+        """Start `controller_node`."""
+        return self.node(topics.CONTROLLER_NODE, character=character, **parameters)
+
+    def command(self, *arguments: str, environment: Mapping[str, str] | None = None) -> Process:
+        """Start the command line `actuated_characters`."""
+        return self.python("-m", "experiment.cli", *arguments, environment=environment)
+
+    def python(self, *arguments: str, environment: Mapping[str, str] | None = None) -> Process:
+        """Start Python in the folder."""
+        log = self._folder / f"process_{len(self._started)}"
+        process = Process(arguments, log, cwd=self._folder, environment=environment)
+        self._started.append(process)
+        return process
+
+    def end(self) -> None:
+        """End all, and print what they said: pytest shows it where a test has failed."""
+        for process in reversed(self._started):
+            process.end()
+        for process in self._started:
+            print(f"--- process {process.pid}, exit code {process.exit_code}")
+            print(process.stdout, process.stderr, sep="")
+
+
+@dataclass
+class Inbox:
+    """What has come on a topic, oldest first."""
+
+    messages: list[Any]
+    raw: list[bytes]
+
+    def __len__(self) -> int:
+        return len(self.messages)
+
+    @property
+    def last(self) -> Any:
+        """The newest message."""
+        return self.messages[-1]
+
+
+class Client:
+    """A node in the test's own process."""
+
+    def __init__(self, context: Context, name: str = "test_client") -> None:
+        self.node = Node(name, context=context)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self.node)
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+    def listen(self, topic: Topic, qos: QoSProfile | None = None) -> Inbox:
+        """Subscribe to a topic."""
+        inbox = Inbox([], [])
+
+        def keep(raw: bytes) -> None:
+            inbox.raw.append(raw)
+            inbox.messages.append(deserialize_message(raw, topic.message_type))
+
+        self.node.create_subscription(
+            topic.message_type, topic.name, keep, qos or topic.qos, raw=True
+        )
+        return inbox
+
+    def speak(self, topic: Topic, qos: QoSProfile | None = None) -> Publisher:
+        """Publish on a topic."""
+        return self.node.create_publisher(topic.message_type, topic.name, qos or topic.qos)
+
+    def spin_until(
+        self, condition: Callable[[], Any], what: str, patience: float = PATIENCE
+    ) -> Any:
+        """Receive messages until the condition gives something true, which is returned."""
+        return wait_until(condition, what, patience, lambda: self._executor.spin_once(0.02))
+
+    def spin_sending(
+        self, send: Callable[[], None], condition: Callable[[], Any], what: str
+    ) -> Any:
+        """Send something again and again until the condition gives something true."""
+        next_time = 0.0
+
+        def step() -> None:
+            nonlocal next_time
+            if time.monotonic() >= next_time:
+                send()
+                next_time = time.monotonic() + RETRY_PERIOD
+            self._executor.spin_once(0.02)
+
+        return wait_until(condition, what, step=step)
+
+    def call(self, service_type: Any, name: str, request: Any) -> Any:
+        """Call a service, and return its response."""
+        client = self.node.create_client(service_type, name)
+        try:
+            self.spin_until(client.service_is_ready, f"service {name}")
+            future = client.call_async(request)
+            self.spin_until(future.done, f"response of {name}")
+            return future.result()
+        finally:
+            self.node.destroy_client(client)
+
+    def get_parameters(self, node: str, names: list[str]) -> list[Any]:
+        """Values of a node's parameters."""
+        request = GetParameters.Request(names=names)
+        response = self.call(GetParameters, f"{node}/get_parameters", request)
+        return [Parameter.from_parameter_msg(_named(value)).value for value in response.values]
+
+    def list_parameters(self, node: str) -> list[str]:
+        """Names of a node's parameters."""
+        response = self.call(ListParameters, f"{node}/list_parameters", ListParameters.Request())
+        return list(response.result.names)
+
+    def set_parameter(self, node: str, name: str, value: object) -> tuple[bool, str]:
+        """Set a node's parameter; whether it was taken, and the reason if not."""
+        message = Parameter(name, value=value).to_parameter_msg()
+        request = SetParameters.Request(parameters=[message])
+        (result,) = self.call(SetParameters, f"{node}/set_parameters", request).results
+        return result.successful, result.reason
+
+
+def _named(value: Any) -> ParameterMessage:
+    return ParameterMessage(name="", value=value)
+
+
+def joint_state(
+    stamp: int,
+    names: Sequence[str],
+    position: Sequence[float] = (),
+    velocity: Sequence[float] = (),
+    effort: Sequence[float] = (),
+) -> JointState:
+    """A JointState stamped in ns."""
+    message = JointState(
+        name=list(names),
+        position=array("d", position),
+        velocity=array("d", velocity),
+        effort=array("d", effort),
+    )
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, NANOSECONDS_PER_SECOND)
+    return message
+
+
+class SimulatorClient(Client):
+    """Stands where a controller stands: hears the simulator, and commands it."""
+
+    def __init__(self, context: Context, name: str = "test_client") -> None:
+        super().__init__(context, name)
+        self.clock = self.listen(topics.CLOCK)
+        self.episodes = self.listen(topics.EPISODE)
+        self.configuration = self.listen(topics.CONFIGURATION.of(topics.SIM_NODE))
+        self.diagnostics = self.listen(topics.DIAGNOSTICS)
+        self.torques = self.speak(topics.JOINT_TORQUES)
+        self.states = self.listen(topics.JOINT_STATES)
+
+    def state(self, tick: int) -> JointState:
+        """The state of a tick, once it has come."""
+        return self.spin_until(lambda: self._found(tick), f"state of tick {tick}")
+
+    def _found(self, tick: int) -> JointState | None:
+        return next((s for s in self.states.messages if tick_of(s) == tick), None)
+
+    def first_state(self) -> JointState:
+        """The state of tick 1, once the simulator hears commands as well."""
+        self.spin_until(self.torques.get_subscription_count, "a simulator that listens")
+        return self.state(1)
+
+    def command(self, stamp: int, efforts: Mapping[str, float]) -> None:
+        """Command some degrees of freedom."""
+        self.torques.publish(joint_state(stamp, list(efforts), effort=list(efforts.values())))
+
+    def answer(self, state: JointState, efforts: Mapping[str, float]) -> JointState:
+        """Command every motor, with zero where nothing is said; gives the state that follows."""
+        motors = [name for name in state.name if not name.startswith(f"{ROOT}_")]
+        self.command(stamp_ns(state), dict.fromkeys(motors, 0.0) | dict(efforts))
+        return self.state(tick_of(state) + 1)
+
+    def reported(self, **expected: object) -> Any:
+        """The first report on /diagnostics with these values (as texts), once it has come."""
+
+        def found() -> Any:
+            for array_message in self.diagnostics.messages:
+                for status in array_message.status:
+                    values = {item.key: item.value for item in status.values}
+                    if values.items() >= {k: str(v) for k, v in expected.items()}.items():
+                        return status
+            return None
+
+        return self.spin_until(found, f"a report of {expected}")
+
+    def pause(self, paused: bool) -> SetBool.Response:
+        """Call the simulator's service `~/pause`."""
+        return self.call(SetBool, f"{topics.SIM_NODE}/pause", SetBool.Request(data=paused))
+
+
+class ControllerClient(Client):
+    """Stands where the simulator stands: publishes states, and hears what answers them."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context, "test_simulator")
+        self.references = self.listen(topics.REFERENCE.of(topics.CONTROLLER_NODE))
+        self.configuration = self.listen(topics.CONFIGURATION.of(topics.CONTROLLER_NODE))
+        self.torques = self.listen(topics.JOINT_TORQUES)
+        self.states = self.speak(topics.JOINT_STATES)
+        self.episodes = self.speak(topics.EPISODE)
+
+    def ask(self, state: JointState) -> JointState:
+        """The torques that answer a state, which is sent until it is answered."""
+        self.send(state, lambda: self._found(self.torques, state))
+        return self._found(self.torques, state)
+
+    def reference(self, state: JointState) -> JointState:
+        """The reference of a state that was answered."""
+        return self.spin_until(lambda: self._found(self.references, state), "its reference")
+
+    def send(self, state: JointState, condition: Callable[[], Any]) -> Any:
+        """Send a state again and again until the condition gives something true."""
+        stamp = stamp_ns(state)
+        return self.spin_sending(
+            lambda: self.states.publish(state), condition, f"an answer to the state of {stamp} ns"
+        )
+
+    def _found(self, inbox: Inbox, state: JointState) -> JointState | None:
+        return next((m for m in inbox.messages if stamp_ns(m) == stamp_ns(state)), None)
