@@ -2,6 +2,8 @@
 
 A quaternion `q` of shape (..., 4) turns coordinates of the child frame into the parent frame.
 `exp` and `log` below are those of SO(3) (Solà, Deray and Atchuthan 2018, "A micro Lie theory").
+Products go through `einsum`, which uses no BLAS: the last bits of a BLAS depend on the kernels that
+it picks, and what the simulator reads must not.
 """
 
 import numpy as np
@@ -13,27 +15,24 @@ _TINY = 1e-150  # keeps 0 / 0 away; the product with a vector of length zero is 
 
 
 def _product_table() -> FloatArray:
-    """The table (4, 16) with `(a @ table).reshape(4, 4) @ b` the Hamilton product `a b`."""
-    table = np.zeros((4, 4, 4))  # [a's component, product's component, b's component]
+    """The table (4, 4, 4): of a's component, b's component, and the Hamilton product's."""
+    table = np.zeros((4, 4, 4))
     x, y, z, w = range(4)
     for i, j, k in ((x, y, z), (y, z, x), (z, x, y)):
-        table[i, k, j], table[j, k, i] = 1.0, -1.0  # i j = k, j i = -k
-        table[w, i, i] = table[i, i, w] = 1.0
-        table[i, w, i] = -1.0
+        table[i, j, k], table[j, i, k] = 1.0, -1.0  # i j = k, j i = -k
+        table[w, i, i] = table[i, w, i] = 1.0
+        table[i, i, w] = -1.0
     table[w, w, w] = 1.0
-    return table.reshape(4, 16)
+    return table
 
 
-def _matrix_table(product_table: FloatArray) -> FloatArray:
-    """The table (16, 9) that takes the products of q's components to its rotation matrix.
+def _matrix_table(product: FloatArray) -> FloatArray:
+    """The table (4, 4, 3, 3) that takes the products of q's components to its rotation matrix.
 
     Column j of the matrix is the vector part of `q e_j q^-1`.
     """
-    product = product_table.reshape(4, 4, 4)  # [a's component, product's component, b's component]
-    times_axis = product[:, :, :3]  # [q's component, component of q e_j, j]
-    by_conjugate = product * _CONJUGATE  # [a's component, product's component, q's component]
-    turned: FloatArray = np.einsum("pmj,mkq->pqkj", times_axis, by_conjugate)
-    return turned[:, :, :3].reshape(16, 9)
+    turned: FloatArray = np.einsum("pjm,mqk->pqkj", product, product * _CONJUGATE[:, np.newaxis])
+    return turned[:, :, :3, :3].copy()
 
 
 _CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
@@ -42,12 +41,9 @@ _MATRIX = _matrix_table(_PRODUCT)
 
 
 def multiply(a_xyzw: FloatArray, b_xyzw: FloatArray) -> FloatArray:
-    """Hamilton product `a b`: turn by b first, then by a; (..., 4) each, broadcast.
-
-    By a table, because a few array operations cost less than the sixteen products one by one.
-    """
-    left = (a_xyzw @ _PRODUCT).reshape(*a_xyzw.shape[:-1], 4, 4)
-    return apply(left, b_xyzw)
+    """Hamilton product `a b`: turn by b first, then by a; (..., 4) each, broadcast."""
+    product: FloatArray = np.einsum("...i,...j,ijk->...k", a_xyzw, b_xyzw, _PRODUCT)
+    return product
 
 
 def conjugate(q_xyzw: FloatArray) -> FloatArray:
@@ -58,15 +54,14 @@ def conjugate(q_xyzw: FloatArray) -> FloatArray:
 
 def matrix(q_xyzw: FloatArray) -> FloatArray:
     """Rotation matrices (..., 3, 3): their columns are the child's axes in the parent frame."""
-    squares = q_xyzw[..., :, np.newaxis] * q_xyzw[..., np.newaxis, :]
-    flat = squares.reshape(*q_xyzw.shape[:-1], 16) @ _MATRIX
-    return flat.reshape(*q_xyzw.shape[:-1], 3, 3)
+    axes: FloatArray = np.einsum("...i,...j,ijkl->...kl", q_xyzw, q_xyzw, _MATRIX)
+    return axes
 
 
 def apply(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
     """Each vector (..., m) multiplied by its matrix (..., k, m): (..., k)."""
-    product: FloatArray = np.matmul(matrices, vectors[..., np.newaxis])
-    return product[..., 0]
+    product: FloatArray = np.einsum("...ij,...j->...i", matrices, vectors)
+    return product
 
 
 def _length(vectors: FloatArray) -> FloatArray:

@@ -171,7 +171,7 @@ class Body:
         pybullet.applyExternalForce(
             self._body, -1, force, origin, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
-        torque = axes @ torque_in_base
+        torque = rotations.apply(axes, torque_in_base)
         pybullet.applyExternalTorque(
             self._body, -1, torque, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
@@ -183,15 +183,15 @@ class Body:
         )
         turn = rotations.multiply(np.array(inertial_turn), self._base_turn_back)
         axes = rotations.matrix(turn)
-        return com - axes @ self._base_offset, turn, axes
+        return com - rotations.apply(axes, self._base_offset), turn, axes
 
     def _read_base(self) -> tuple[FloatArray, FloatArray]:
         """Position and velocity (6,) of the floating base, message form."""
         origin, turn, axes = self._base_frame()
         linear, angular = pybullet.getBaseVelocity(self._body, physicsClientId=self._client)
-        angular_in_base = np.array(angular) @ axes
+        angular_in_base = rotations.apply(axes.T, np.array(angular))
         position = np.concatenate((origin, rotations.log(turn)))
-        arm_velocity = axes @ _cross(angular_in_base, self._base_offset)
+        arm_velocity = rotations.apply(axes, _cross(angular_in_base, self._base_offset))
         return position, np.concatenate((linear - arm_velocity, angular_in_base))
 
     def _place_base(self, origin: FloatArray, turn_xyzw: FloatArray) -> None:
@@ -206,8 +206,8 @@ class Body:
         _, _, axes = self._base_frame()
         pybullet.resetBaseVelocity(
             self._body,
-            linear + axes @ _cross(angular_in_base, self._base_offset),
-            axes @ angular_in_base,
+            linear + rotations.apply(axes, _cross(angular_in_base, self._base_offset)),
+            rotations.apply(axes, angular_in_base),
             physicsClientId=self._client,
         )
 

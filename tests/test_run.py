@@ -254,8 +254,9 @@ def test_the_parameters_left_behind_start_the_nodes_alone_into_the_same_states(
         states = client.listen(topics.JOINT_STATES)
 
         for node in ("controller_node", "sim_node"):
-            file = walk / "parameters" / f"{node}.yaml"
-            processes.python("-m", f"{node}.main", "--ros-args", "--params-file", str(file))
+            file = str(walk / "parameters" / f"{node}.yaml")
+            both = ("-p", "wait_for_subscribers:=2")  # each other, and the test's node
+            processes.python("-m", f"{node}.main", "--ros-args", "--params-file", file, *both)
 
         client.spin_until(lambda: states.messages and tick_of(states.last) > 100, "states")
         for message in states.messages:
