@@ -16,10 +16,13 @@ class DiagnosticsPublisher:
         self._node = node
         self._publisher = create_publisher(node, DIAGNOSTICS)
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody listens; if not, there is no need to gather anything."""
+        return bool(self._publisher.get_subscription_count())
+
     def publish(self, values: Mapping[str, object], fault: str | None = None) -> None:
         """Publish the values by name; with a fault the level is ERROR and its text the message."""
-        if self._publisher.get_subscription_count() == 0:
-            return
         status = DiagnosticStatus(
             level=DiagnosticStatus.OK if fault is None else DiagnosticStatus.ERROR,
             name=self._node.get_fully_qualified_name().lstrip("/"),

@@ -219,6 +219,8 @@ class SimNode(Node):
         return response
 
     def _publish_diagnostics(self) -> None:
+        if not self._diagnostics.is_heard:
+            return
         counts = self._barrier.counts
         values: dict[str, object] = {"tick": self._simulation.tick, "paused": self._paused}
         values |= {verdict.value: counts[verdict] for verdict in Verdict}
