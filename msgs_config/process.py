@@ -7,12 +7,14 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
 from typing import Protocol
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 
 EXIT_ERROR = 1
+_DDS_PROFILES = Path(__file__).with_name("fastdds.xml")
 _PARAMETERS_ARE_SET = (
     "parameters are set by --ros-args -p NAME:=VALUE or --params-file FILE, and listed by "
     "'actuated_characters parameters'"
@@ -80,6 +82,8 @@ def run_node(make_node: Callable[[], RunnableNode]) -> int:
 
 
 def _start_ros() -> None:
+    # the name that Fast DDS 2.14, Jazzy's, knows; other vendors ignore it
+    os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(_DDS_PROFILES))
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args

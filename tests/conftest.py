@@ -12,7 +12,7 @@ from ros import DDS_PROFILES, ControllerClient, Processes, SimulatorClient
 from experiment.domain import own_domain
 
 # It is read once, when a process makes its first node, which may be in any test.
-os.environ[DDS_PROFILES] = str(Path(__file__).parent / "data" / "prompt_heartbeats.xml")
+os.environ[DDS_PROFILES] = str(Path(__file__).parents[1] / "msgs_config" / "fastdds.xml")
 
 
 @pytest.fixture(scope="session")

@@ -97,6 +97,7 @@ def test_who_comes_late_hears_configuration_and_episode_too(
 ) -> None:
     processes.simulator(republish_period=SOON)
     client.answer(client.first_state(), {})
+    client.spin_until(lambda: client.configuration.messages, "configuration")
 
     late = SimulatorClient(context, "late")
     try:
