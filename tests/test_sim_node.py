@@ -210,7 +210,7 @@ def test_a_controller_that_comes_late_is_not_too_late(
 
     processes.controller()
 
-    client.state(100)
+    assert tick_of(client.state(100)) == 100
 
 
 # Commands that it does not take
