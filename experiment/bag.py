@@ -56,7 +56,9 @@ class BagWriter:
             self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.open()
         except WriterError as error:
-            raise RecordingError(f"recording {path} exists already, not overwritten") from error
+            raise RecordingError(
+                f"recording {path} exists already; remove it or choose another directory"
+            ) from error
         except OSError as error:
             raise RecordingError(f"cannot create recording {path}: {error.strerror}") from error
         self._is_open = True

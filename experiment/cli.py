@@ -14,16 +14,19 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, one_of
+from msgs_config.parameters import Parameter
 from msgs_config.process import EXIT_ERROR, limit_threads
 
 _NODES = ("sim_node", "controller_node")
+_interrupted = False
 _EXIT_INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     limit_threads()
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     options = _parser().parse_args(arguments)
     try:
         options.command(options)
@@ -33,14 +36,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_ERROR
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+    except (KeyboardInterrupt, ImportError):
+        if not _interrupted:
+            raise
+        print("interrupted", file=sys.stderr)  # a module's import may have swallowed how
         return _EXIT_INTERRUPTED
     return 0
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
+    global _interrupted
     del number, frame
+    _interrupted = True
     raise KeyboardInterrupt
 
 
@@ -89,7 +96,7 @@ def _parser() -> argparse.ArgumentParser:
         "parameters", help="list a node's parameters", description="List a node's parameters."
     )
     parameters.set_defaults(command=_parameters)
-    parameters.add_argument("node", choices=_NODES)
+    parameters.add_argument("node", choices=(*_NODES, "recorder"))
     parameters.add_argument("--character", default="humanoid", help="name or .yaml file")
     return parser
 
@@ -121,10 +128,14 @@ def _run(options: argparse.Namespace) -> None:
         def progress(ticks: int) -> None:
             bar.update(bar.task_ids[0], completed=min(ticks, plan.ticks))
 
-        if options.in_process:
-            run_in_process(plan, directory, progress=progress)
-        else:
-            run_over_topics(plan, directory, write_bag=not options.no_record, progress=progress)
+        try:
+            if options.in_process:
+                run_in_process(plan, directory, progress=progress)
+            else:
+                run_over_topics(plan, directory, write_bag=not options.no_record, progress=progress)
+        except KeyboardInterrupt:
+            print(f"the results in {directory} are not complete", file=sys.stderr)
+            raise
         progress(plan.ticks)
     plot_figures(directory)
     _report(directory)
@@ -166,7 +177,7 @@ def _report(directory: Path) -> None:
     summary, _ = read_figures(directory)
     table = Table(title=escape(f"results in {directory}"), title_justify="left")
     table.add_column("figure")
-    table.add_column("value", justify="right")
+    table.add_column("value", justify="right", overflow="fold")
     for name, value in summary.items():
         shown = f"{value:.4g}" if isinstance(value, float) else str(value)
         table.add_row(name, "-" if value is None else shown)
@@ -192,16 +203,11 @@ def _list(options: argparse.Namespace) -> None:
 
 
 def _parameters(options: argparse.Namespace) -> None:
-    from controller_node import parameters as controller
-    from msgs_config.character_loading import load_character
-    from sim_node import parameters as simulator
-
-    side = simulator if options.node == "sim_node" else controller
-    character = load_character(options.character)
+    listed = _parameters_of(options.node, options.character)
     table = Table(title=f"parameters of {options.node}", title_justify="left")
     for column in ("name", "default", "unit", "description"):
         table.add_column(column, overflow="fold")
-    for parameter in side.PARAMETERS + side.character_parameters(character):
+    for parameter in listed:
         choices = f": {' | '.join(parameter.choices)}" if parameter.choices else ""
         live = " (live)" if parameter.live else ""
         default = _shortened(parameter.default)
@@ -209,6 +215,20 @@ def _parameters(options: argparse.Namespace) -> None:
             parameter.name, escape(default), parameter.unit, parameter.description + choices + live
         )
     Console().print(table)
+
+
+def _parameters_of(node: str, character_name: str) -> list[Parameter]:
+    from controller_node import parameters as controller
+    from experiment import recorder
+    from msgs_config.character_loading import load_character
+    from sim_node import parameters as simulator
+
+    if node == "recorder":
+        return recorder.PARAMETERS
+    character = load_character(character_name)
+    if node == "sim_node":
+        return simulator.PARAMETERS + simulator.character_parameters(character)
+    return controller.PARAMETERS + controller.character_parameters(character)
 
 
 def _shortened(value: object) -> str:

@@ -90,7 +90,8 @@ def make_plan(
     character.layout.mask(simulator.texts("commanded_joints"))  # they exist
     _check_commanded(simulator, commanded)
     clamped = () if frames is None else frames.clamped
-    notes = (f"kept within joint limits: {', '.join(clamped)}",) if clamped else ()
+    kept = (f"kept within joint limits: {', '.join(clamped)}",) if clamped else ()
+    notes = character.notes + kept
     return Plan(character, motion, simulator, controller, notes)
 
 

@@ -61,6 +61,8 @@ class RecorderNode(Node):
                 self._bag.add_topic(resolved, topic.message_type, topic.qos)
             self._inboxes.append((topic.name, DirectSubscription(self, topic)))
 
+        self.get_logger().info(f"recording to {self._directory}")
+
     def run(self, stop: StopSignal) -> None:
         """Record until `stop`, then take what is still on its way and write the figures.
 

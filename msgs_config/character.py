@@ -95,6 +95,7 @@ class Character:
     gains: dict[str, Gains]  # by joint; the base's force and torque under `root` and `root_r`
     rest_position: tuple[float, ...]  # (n,), message form
     clips: ClipFormat
+    notes: tuple[str, ...] = ()  # what its author may have overlooked
 
     @cached_property
     def layout(self) -> JointLayout:

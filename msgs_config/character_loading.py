@@ -26,7 +26,7 @@ from msgs_config.character import (
 from msgs_config.character_file import CharacterFile, read_character_file
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.joint_layout import ROOT, JointLayout, JointType
-from msgs_config.urdf_check import check_urdf
+from msgs_config.urdf_check import check_urdf, links_without_inertial
 
 _JOINT_TYPES = {
     pybullet.JOINT_REVOLUTE: JointType.REVOLUTE,
@@ -62,6 +62,7 @@ def load_character(name_or_path: str) -> Character:
     except LayoutError as error:
         raise CharacterError(f"{file.loading.urdf_path}: {error}") from error
     _check_joint_names(file, layout)
+    _check_rest_pose(file, links)
     return Character(
         name=file.name,
         file=file.path,
@@ -71,6 +72,7 @@ def load_character(name_or_path: str) -> Character:
         gains=_gains(file, layout),
         rest_position=_rest_position(file, layout),
         clips=file.clips,
+        notes=_notes(file, layout, links),
     )
 
 
@@ -149,6 +151,29 @@ def _check_joint_names(file: CharacterFile, layout: JointLayout) -> None:
                 raise CharacterError(f"{file.path}: {key}: {sentence}")
     if file.assistance and not layout.has_floating_base:
         raise CharacterError(f"{file.path}: root_assistance is for a floating base, this is fixed")
+
+
+def _check_rest_pose(file: CharacterFile, links: list[Link]) -> None:
+    for joint in (link.joint for link in links):
+        value = file.rest_pose.get(joint.name)
+        if value is not None and not joint.lower <= value <= joint.upper:
+            raise CharacterError(
+                f"{file.path}: rest_pose.{joint.name} is {value:g}; "
+                f"its limits are {joint.lower:g} to {joint.upper:g}"
+            )
+
+
+def _notes(file: CharacterFile, layout: JointLayout, links: list[Link]) -> tuple[str, ...]:
+    limp = [name for name in layout.actuated_joint_names if name not in file.gains]
+    first = 1 if file.loading.fixed_base else 0
+    counted = {link.name for link in links[first:]}
+    unknown = sorted(links_without_inertial(file.loading.urdf_text) & counted)
+    notes = []
+    if limp:
+        notes.append(f"joints without gains in {file.path.name} are limp: {', '.join(limp)}")
+    if unknown:
+        notes.append(f"links without <inertial>, the engine assumes a mass: {', '.join(unknown)}")
+    return tuple(notes)
 
 
 def _gains(file: CharacterFile, layout: JointLayout) -> dict[str, Gains]:

@@ -1,5 +1,7 @@
 """The project's own error types: each one is a line that a user can act on."""
 
+from difflib import get_close_matches
+
 
 class ActuatedCharactersError(Exception):
     """Base of every error that is the user's to mend; its text is one clear line."""
@@ -47,4 +49,6 @@ class SimulationError(ActuatedCharactersError):
 
 def one_of(what: str, value: object, choices: list[str]) -> str:
     """The sentence for a name that is not among the valid ones."""
-    return f"unknown {what} {str(value)!r}; there are: {', '.join(choices)}"
+    close = get_close_matches(str(value), choices, n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    return f"unknown {what} {str(value)!r}; there are: {', '.join(choices)}{hint}"

@@ -16,7 +16,7 @@ def check_urdf(path: Path, text: str) -> None:
         CharacterError: they do not; names the file and the link or joint.
     """
     try:
-        robot = ElementTree.fromstring(text.strip("\0 \t\r\n"))  # PyBullet's own end in a NUL
+        robot = _parse(text)
     except ElementTree.ParseError as error:
         raise CharacterError(f"{path}: not valid XML: {error}") from error
     links = [link.get("name", "") for link in robot.findall("link")]
@@ -31,9 +31,23 @@ def check_urdf(path: Path, text: str) -> None:
                 f"{path}: joint {joint.get('name')!r} is of type {joint.get('type')!r}; "
                 "it must be revolute, continuous, prismatic, spherical or fixed"
             )
+        if joint.get("type") in ("revolute", "prismatic") and joint.find("limit") is None:
+            raise CharacterError(
+                f"{path}: joint {joint.get('name')!r} is {joint.get('type')} and has no <limit>"
+            )
     for name in {name for pair in ends for name in pair} - set(links):
         raise CharacterError(f"{path}: a joint names the link {name!r}, which does not exist")
     _check_tree(path, links, ends)
+
+
+def links_without_inertial(text: str) -> set[str]:
+    """Names of the links to which a URDF, checked before, gives no mass."""
+    links = _parse(text).findall("link")
+    return {link.get("name", "") for link in links if link.find("inertial") is None}
+
+
+def _parse(text: str) -> ElementTree.Element:
+    return ElementTree.fromstring(text.strip("\0 \t\r\n"))  # PyBullet's own end in a NUL
 
 
 def _end(joint: ElementTree.Element, which: str) -> str:

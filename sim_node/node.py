@@ -101,7 +101,7 @@ class SimNode(Node):
             spinner.rest()
             if Due.EXPLAIN in self._patience.due(time.monotonic()):
                 sentence = f"waiting for {wanted} subscribers of joint_states; there are {found}"
-                self.get_logger().warning(sentence)
+                self.get_logger().warning(f"{sentence}; has one not started, or ended?")
 
     def _turn(self, spinner: Spinner) -> None:
         """Take a command or rest, and advance if the tick is complete."""

@@ -317,7 +317,7 @@ def test_a_missing_part_of_a_definition_is_named(workspace: Path) -> None:
 
 def test_an_existing_path_is_not_overwritten(recording: Path) -> None:
     before = (recording / "metadata.yaml").read_bytes()
-    with pytest.raises(RecordingError, match=r"walk\.1 exists already, not overwritten"):
+    with pytest.raises(RecordingError, match=r"walk\.1 exists already; remove it"):
         BagWriter(recording)
     assert (recording / "metadata.yaml").read_bytes() == before
 
