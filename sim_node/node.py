@@ -112,9 +112,9 @@ class SimNode(Node):
             spinner.received()
             spinner.serve()  # a flood of commands must not keep services waiting
             self._take_command(raw)
-        self._look_at_the_clock()
         if self._barrier.complete and not self._paused:
-            self._advance()
+            self._advance()  # before the clock: a command that came in time is no timeout
+        self._look_at_the_clock()
 
     def _flush(self, seconds: float) -> None:
         """Publish the last report, and wait until every subscriber has all that was published."""
@@ -156,7 +156,7 @@ class SimNode(Node):
                 f"command dropped: it answers {command.stamp_ns} ns, the state is of "
                 f"{self._barrier.stamp_ns} ns; the stamp must be that of the state"
             )
-        if verdict is Verdict.CONFLICT:
+        if verdict is Verdict.CONFLICT and not self._paused:
             senders = ", ".join(publisher_names(self, topics.JOINT_TORQUES))
             self._raise_fault(
                 f"two different commands for '{self._barrier.conflict}' at one tick; "
@@ -196,8 +196,7 @@ class SimNode(Node):
         self._fault = sentence
         if self._values.text("on_fault") == "abort":
             raise SimulationError(sentence)
-        if not self._paused:
-            self.get_logger().error(f"{sentence}; paused")
+        self.get_logger().error(f"{sentence}; paused")
         self._pause(sentence)
 
     def _pause(self, fault: str) -> None:
