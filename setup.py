@@ -1,9 +1,12 @@
 """Packaging for both installs: pip (``pip install -e '.[wheels]'``) and ROS (``colcon build``)."""
 
+from glob import glob
+
 from setuptools import find_packages, setup
 
 PACKAGE = "actuated_characters"
 ROOTS = ("msgs_config", "sim_node", "controller_node", "experiment")
+SHARED = {"launch": "*.launch.py", "config": "*.yaml", "examples": "*.py"}
 
 setup(
     name=PACKAGE,
@@ -18,6 +21,10 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
+        *(
+            (f"share/{PACKAGE}/{folder}", glob(f"{folder}/{pattern}"))
+            for folder, pattern in SHARED.items()
+        ),
     ],
     zip_safe=False,
     # What every install takes from pip. ROS itself is not among it: in a full ROS install rclpy and
@@ -47,8 +54,11 @@ setup(
             "mcap-ros2-support>=0.5.5,<0.7",
             "mypy>=2.4,<2.5",
             "pytest>=7.4,<10",
+            "pytest-xdist>=3.5,<4",
             "ruff>=0.17.5,<0.18",
+            "setuptools>=65,<80",  # an environment of Python 3.12 has none; colcon's limit
             "types-PyYAML>=6.0.12",
+            "urdfdom-py>=1.2.1.post1,<2",
         ],
     },
     entry_points={

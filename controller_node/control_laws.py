@@ -23,8 +23,8 @@ def pd_effort(
 
 
 def stable_pd_effort(
-    mass_matrix: FloatArray,  # (n, n)
-    bias: FloatArray,  # (n,) Coriolis, centrifugal and gravity
+    mass_matrix: FloatArray,  # (n, n), with passive damping D that of M + D h
+    bias: FloatArray,  # (n,) Coriolis, centrifugal and gravity, and D v
     stiffness: FloatArray,  # (n,)
     damping: FloatArray,  # (n,)
     next_error: FloatArray,  # (n,) reference at t + h against the state at t

@@ -4,12 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.agreement import check_agreement
 from controller_node.control_laws import pd_effort, stable_pd_effort
 from controller_node.dynamics import DynamicsModel
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import CharacterError
+from msgs_config.probe import Probe
 from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock
 
@@ -65,6 +67,10 @@ class Controller:
                 f"{character.file}: nothing with mass or inertia moves at '{name}'"
             )
 
+    def check_agreement(self, probe: Probe) -> None:
+        """Raise CharacterError if a simulator's probe is not what the model expects; says why."""
+        check_agreement(self._model, self.layout, probe)
+
     def answer(self, state: StampedState, episode_ns: int) -> tuple[FloatArray, StampedReference]:
         """The effort (n,) that answers a state, and the reference at the state's stamp.
 
@@ -102,7 +108,7 @@ class Controller:
         configuration = self.layout.configuration(state.position)
         self._model.update(configuration, state.velocity)
         return stable_pd_effort(
-            self._model.mass_matrix(),
+            self._model.implicit_mass_matrix(self.clock.period_s),
             self._model.bias_force(),
             self.gains.stiffness,
             self.gains.damping,

@@ -32,6 +32,7 @@ class DynamicsModel:
         self._model = _compile(character, gravity)
         self._data = mujoco.MjData(self._model)
         self._mass_matrix = np.zeros((self._layout.size, self._layout.size))
+        self._damping = character.passive_damping()
         address = self._model.jnt_qposadr
         types = [joint.type for joint in self._layout.joints]
         rotation_offset = {JointType.SPHERICAL: 0, JointType.FLOATING: 3}
@@ -64,10 +65,23 @@ class DynamicsModel:
         mujoco.mj_fullM(self._model, self._data, self._mass_matrix)
         return self._mass_matrix.copy()
 
+    def implicit_mass_matrix(self, period: float) -> FloatArray:
+        """`M + D h` (n, n), for the acceleration over a period h in s.
+
+        The passive damping D is then that of the velocity at the period's end.
+        """
+        matrix = self.mass_matrix()
+        np.einsum("ii->i", matrix)[:] += period * self._damping
+        return matrix
+
     def bias_force(self) -> FloatArray:
-        """The bias force C (n,) at the state taken over: Coriolis, centrifugal and gravity."""
+        """The bias force C (n,) at the state taken over.
+
+        Coriolis, centrifugal and gravity, and what the joints' passive damping takes.
+        """
         bias = np.zeros(self._layout.size)
         mujoco.mj_rne(self._model, self._data, 0, bias)
+        bias += self._damping * self._data.qvel
         return bias
 
     def kinetic_energy(self) -> float:

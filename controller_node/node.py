@@ -1,11 +1,11 @@
 """`controller_node`: answers each state with joint torques, the state's stamp echoed."""
 
+import time
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
-from rclpy.parameter import Parameter as RosParameter
 from std_msgs.msg import Header, String
 
 from controller_node.parameters import (
@@ -19,13 +19,21 @@ from controller_node.parameters import (
 )
 from msgs_config import configuration, topics
 from msgs_config.character_loading import load_character
-from msgs_config.errors import ActuatedCharactersError, LayoutError, MessageError
+from msgs_config.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
+from msgs_config.durations import Durations
+from msgs_config.errors import (
+    CharacterError,
+    ClockError,
+    ConfigurationError,
+    LayoutError,
+    MessageError,
+)
 from msgs_config.messages import JointStateDecoder, JointStateEncoder, decode, state_in_layout
-from msgs_config.node_parameters import declare, given_parameters
+from msgs_config.node_parameters import LiveParameters, declare, given_parameters
 from msgs_config.parameters import Values, resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
-from msgs_config.shared_parameters import DEFAULT_CHARACTER
+from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
 from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from msgs_config.warnings import Warnings
@@ -52,7 +60,8 @@ class ControllerNode(Node):
         """
         super().__init__(topics.CONTROLLER_NODE)
         given = given_parameters(self)
-        self._character = load_character(str(given.get("character", DEFAULT_CHARACTER)))
+        loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)))
+        self._character = placed(loaded, given)
         self._layout = self._character.layout
         self._declared = PARAMETERS + character_parameters(self._character)
         self._values = resolve(self._declared, given)
@@ -65,9 +74,13 @@ class ControllerNode(Node):
         self._answer: _Answer | None = None
         self._episode_ns: int | None = None
         self._warnings = Warnings(self)
+        self._simulator_runs_on = False  # it waits for nobody
+        self._diagnostics = DiagnosticsPublisher(self)
+        self._next_report = 0.0
+        self._counts: Counter[str] = Counter(answered=0, repeated=0, ignored=0, overtaken=0)
+        self._answer_times = Durations()
         self._open_topics()
-        self.add_on_set_parameters_callback(self._check_parameters)
-        self.add_post_set_parameters_callback(self._take_parameters)
+        LiveParameters(self, self._declared, self._values, self._take_parameters)
 
     def _open_topics(self) -> None:
         commanded = self._layout.mask(commanded_joints(self._character, self._values))
@@ -78,6 +91,7 @@ class ControllerNode(Node):
         self._reference_encoder = JointStateEncoder(self._layout.dof_names)
         self._states = DirectSubscription(self, topics.JOINT_STATES)
         self._episodes = DirectSubscription(self, topics.EPISODE)
+        self._simulators = DirectSubscription(self, topics.CONFIGURATION.of(topics.SIM_NODE))
         self._references = topics.create_publisher(self, topics.REFERENCE)
         self._torques = topics.create_publisher(self, topics.JOINT_TORQUES)
         self._configurations = topics.create_publisher(self, topics.CONFIGURATION)
@@ -93,36 +107,85 @@ class ControllerNode(Node):
         """Answer states until `stop`.
 
         Raises:
-            ClockError: the states come at another rate than this controller's.
+            ActuatedCharactersError: the simulator simulates something else than this controller
+                was made for.
         """
         spinner = Spinner(self)
         try:
             while not stop:
-                raw = self._states.take()
+                self._report()
+                raw = self._next_state()
                 if raw is None:
+                    self._check_simulator()
                     spinner.rest()
                 else:
                     spinner.received()
                     self._take_state(raw)
         finally:
+            self._report(at_once=True)
             spinner.close()
+
+    def _next_state(self) -> bytes | None:
+        """The next state; in real time the newest, for the others have been overtaken."""
+        raw = self._states.take()
+        while raw is not None and self._simulator_runs_on:
+            newer = self._states.take()
+            if newer is None:
+                break
+            self._counts["overtaken"] += 1
+            raw = newer
+        return raw
+
+    def _check_simulator(self) -> None:
+        """Compare a simulator that says what it simulates with this controller."""
+        raw = self._simulators.take()
+        if raw is None:
+            return
+        try:
+            simulator = configuration.parse(decode(raw, String).data)
+        except MessageError as error:
+            self._warnings.say_once(f"configuration ignored: {error}")
+            return
+        self._simulator_runs_on = simulator.parameters.get("mode") == "realtime"
+        if simulator.probe is None:
+            return
+        if simulator.layout.dof_names != self._layout.dof_names:
+            raise CharacterError(
+                f"the simulator's character '{simulator.character}' has other degrees of freedom "
+                f"than '{self._character.name}'; set 'character' to the simulator's"
+            )
+        self._controller.check_agreement(simulator.probe)
+        for name in ("rate", "placement"):
+            its, own = simulator.parameters.get(name), self._values[name]
+            if its != own:
+                raise ConfigurationError(
+                    f"the simulator's parameter '{name}' is {its}, the controller's is {own}; "
+                    "they must be the same"
+                )
 
     def _take_state(self, raw: bytes) -> None:
         if not self._is_heard():
             return  # the simulator publishes the state again
         if self._answer is not None and self._answer.raw_state == raw:
+            self._counts["repeated"] += 1
             self._publish(self._answer)
             return
         try:
             state = state_in_layout(self._layout, self._decoder.decode(raw))
+            _check_finite(state)
+            self._controller.clock.tick(state.stamp_ns)  # it is one
             episode_ns = self._episode_of(state)
-        except (MessageError, LayoutError) as error:
+        except (MessageError, LayoutError, ClockError) as error:
+            self._counts["ignored"] += 1
             self._warnings.say_once(f"state ignored: {error}")
             return
         if episode_ns is None:
             return  # the simulator publishes the state again
         self._check_rate(state)
+        started = time.perf_counter()
         self._answer = self._compute(raw, state, episode_ns)
+        self._answer_times.add(time.perf_counter() - started)
+        self._counts["answered"] += 1
         self._publish(self._answer)
 
     def _is_heard(self) -> bool:
@@ -144,7 +207,7 @@ class ControllerNode(Node):
 
     def _check_rate(self, state: StampedState) -> None:
         """Say so if states come several ticks apart: their stamps fit any multiple of the rate."""
-        if self._answer is None or state.effort is None:
+        if self._answer is None or state.effort is None or self._simulator_runs_on:
             return
         clock = self._controller.clock
         apart = clock.tick(state.stamp_ns) - clock.tick(self._answer.stamp_ns)
@@ -174,19 +237,23 @@ class ControllerNode(Node):
             return None
         return self._episode_ns
 
-    def _check_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
-        try:
-            self._changed_values(changes)
-        except ActuatedCharactersError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+    def _report(self, *, at_once: bool = False) -> None:
+        """Publish the diagnostics if they are due and anybody listens."""
+        now = time.monotonic()
+        if now < self._next_report and not at_once:
+            return
+        self._next_report = now + DIAGNOSTICS_PERIOD
+        if self._diagnostics.is_heard:
+            times = self._answer_times.percentiles_us("answer", (50, 99))
+            self._diagnostics.publish({**self._counts, **times})
 
-    def _take_parameters(self, changes: list[RosParameter]) -> None:
+    def _take_parameters(self, values: Values) -> None:
         """Take changed gains, all at once; they count from the next state on."""
-        self._values = self._changed_values(changes)
+        self._values = values
         self._controller.gains = make_gains(self._character, self._values)
         self._publish_configuration()
 
-    def _changed_values(self, changes: list[RosParameter]) -> Values:
-        given = {change.name: change.value for change in changes}
-        return resolve(self._declared, {**self._values, **given})
+
+def _check_finite(state: StampedState) -> None:
+    if not (np.isfinite(state.position).all() and np.isfinite(state.velocity).all()):
+        raise MessageError("it is not finite")

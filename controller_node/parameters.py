@@ -11,10 +11,11 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character import ROOT_TORQUE, Character
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Parameter, Values
-from msgs_config.shared_parameters import CHARACTER, GRAVITY, RATE
+from msgs_config.shared_parameters import CHARACTER, GRAVITY, PLACEMENT, RATE
 
 PARAMETERS = [
     CHARACTER,
+    PLACEMENT,
     RATE,
     GRAVITY,
     Parameter("law", "stable_pd", "the control law", choices=LAWS),

@@ -27,8 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     limit_threads()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
-    options = _parser().parse_args(arguments)
     try:
+        options = _parser().parse_args(arguments)
         options.command(options)
     except ActuatedCharactersError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -36,10 +36,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_ERROR
-    except (KeyboardInterrupt, ImportError):
+    except BaseException:  # a module that was being imported may have turned it into its own
         if not _interrupted:
             raise
-        print("interrupted", file=sys.stderr)  # a module's import may have swallowed how
+        print("interrupted", file=sys.stderr)
         return _EXIT_INTERRUPTED
     return 0
 
@@ -48,7 +48,13 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     global _interrupted
     del number, frame
     _interrupted = True
-    raise KeyboardInterrupt
+    raise _Interrupted
+
+
+class _Interrupted(KeyboardInterrupt):
+    """Not KeyboardInterrupt itself: where that goes through code that was made from a text, such
+    as a dataclass's, Python remembers it, and in the end kills a module that was run by `-m`.
+    """
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -64,7 +70,11 @@ def _parser() -> argparse.ArgumentParser:
         epilog="example: actuated_characters run --clip walk --set controller_node.law:=pd",
     )
     run.set_defaults(command=_run)
-    run.add_argument("--character", default="humanoid", help="name or .yaml file (%(default)s)")
+    run.add_argument(
+        "--character",
+        default="humanoid",
+        help="name, or path of a .yaml or .urdf file (%(default)s)",
+    )
     tracked = run.add_mutually_exclusive_group()
     tracked.add_argument("--clip", help="track this motion clip: a name or a file")
     tracked.add_argument("--reference", choices=["hold"], help="hold: the rest pose (the default)")
@@ -97,7 +107,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parameters.set_defaults(command=_parameters)
     parameters.add_argument("node", choices=(*_NODES, "recorder"))
-    parameters.add_argument("--character", default="humanoid", help="name or .yaml file")
+    parameters.add_argument(
+        "--character", default="humanoid", help="name, or path of a .yaml or .urdf file"
+    )
     return parser
 
 
@@ -105,6 +117,7 @@ def _run(options: argparse.Namespace) -> None:
     from experiment.figures import plot_figures, prepare_directory
     from experiment.plan import make_plan
     from experiment.run import run_in_process, run_over_topics
+    from sim_node.parameters import tick_period
 
     settings = _settings(options.set)
     reference = {"reference": "hold"}
@@ -118,6 +131,11 @@ def _run(options: argparse.Namespace) -> None:
         settings["controller_node"],
     )
     motion = options.clip or "hold"
+    if options.in_process and tick_period(plan.simulator):
+        raise ConfigurationError(
+            "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
+            "nor a 'real_time_factor'"
+        )
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     prepare_directory(directory, overwrite=options.overwrite)
@@ -227,7 +245,8 @@ def _parameters_of(node: str, character_name: str) -> list[Parameter]:
         return recorder.PARAMETERS
     character = load_character(character_name)
     if node == "sim_node":
-        return simulator.PARAMETERS + simulator.character_parameters(character)
+        own = simulator.character_parameters(character)
+        return [simulator.CHARACTERS, *simulator.PARAMETERS, *own]
     return controller.PARAMETERS + controller.character_parameters(character)
 
 

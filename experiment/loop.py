@@ -7,7 +7,7 @@ import numpy as np
 from controller_node.parameters import make_controller
 from experiment.metrics import Tick
 from experiment.plan import Plan
-from sim_node.parameters import make_settings
+from sim_node.parameters import make_role, make_settings
 from sim_node.simulation import Simulation
 
 
@@ -20,11 +20,14 @@ def ticks_in_process(plan: Plan) -> Iterator[Tick]:
         SimulationError: the simulation diverged.
     """
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    with Simulation(plan.character, make_settings(plan.simulator)) as simulation:
-        episode_ns = simulation.state.stamp_ns
+    role = make_role(plan.character, plan.simulator)
+    with Simulation([role], make_settings(plan.simulator)) as simulation:
+        (actor,) = simulation.actors
+        episode_ns = actor.state.stamp_ns
         for _ in range(plan.ticks):
-            state = simulation.state
+            state = actor.state
             effort, reference = controller.answer(state, episode_ns)
-            following = simulation.step(np.where(simulation.commanded, effort, 0.0))
+            simulation.step([np.where(actor.commanded, effort, 0.0)])
+            following = actor.state
             assert following.effort is not None
             yield Tick(state, following, reference)

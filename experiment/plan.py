@@ -4,15 +4,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from controller_node import parameters as controller_parameters
+from controller_node.agreement import check_agreement
+from controller_node.dynamics import DynamicsModel
 from controller_node.references.base import Reference
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
 from msgs_config.errors import ConfigurationError
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Values, resolve
+from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
+from sim_node.probe import measure_probe
 
-_SHARED = ("rate", "gravity")  # must be the same on both sides; set on one side, they count on both
+_SHARED = ("rate", "gravity", "placement")  # the same on both sides; set on one, they count on both
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
@@ -63,7 +67,7 @@ def make_plan(
             raise ConfigurationError(f"parameter '{name}' is set by {option}")
     for given in (simulator_given, controller_given):
         given["character"] = character_name
-    character = load_character(character_name)
+    character = placed(load_character(character_name), simulator_given)
     controller_given = {**reference, **controller_given}
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller = resolve(
@@ -88,6 +92,10 @@ def make_plan(
     )
     simulator["max_ticks"] = _ticks(duration, simulator.integer("rate"))
     character.layout.mask(simulator.texts("commanded_joints"))  # they exist
+    gravity = simulator.number("gravity")
+    check_agreement(
+        DynamicsModel(character, gravity), character.layout, measure_probe(character, gravity)
+    )
     _check_commanded(simulator, commanded)
     clamped = () if frames is None else frames.clamped
     kept = (f"kept within joint limits: {', '.join(clamped)}",) if clamped else ()

@@ -5,7 +5,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
@@ -42,6 +43,7 @@ class Child:
         assert self._process.stdout is not None
         self._output = self._process.stdout
         os.set_blocking(self._output.fileno(), False)
+        self.pid = self._process.pid
 
     @property
     def exit_code(self) -> int | None:
@@ -99,10 +101,29 @@ class Children:
             child.interrupt()
             child.end()
 
-    def start(self, child: Child) -> Child:
-        """Take a child under control."""
-        self._children.append(child)
+    def start(self, make_child: Callable[[], Child]) -> Child:
+        """Start a child; a signal waits until the child is one that will be ended."""
+        with _signals_held():
+            child = make_child()
+            self._children.append(child)
         return child
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Keep what comes for afterwards; a mask would hold it back from one thread alone."""
+    received: list[int] = []
+    handlers = {
+        number: signal.signal(number, lambda number, frame: received.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for caught in received:
+            signal.raise_signal(caught)
 
 
 def _end_with_parent() -> None:

@@ -35,7 +35,7 @@ def run_over_topics(plan: Plan, directory: Path, *, write_bag: bool, progress: P
             file = write_parameters(directory, name, parameters)
             log = directory / LOGS / f"{name}.log"
             arguments = ["--ros-args", "--params-file", str(file), *more]
-            return children.start(Child(name, module, arguments, log, environment))
+            return children.start(lambda: Child(name, module, arguments, log, environment))
 
         listening = {"directory": str(directory), "write_bag": write_bag, "progress_period": 0.1}
         recorder = start("recorder", "experiment.recorder_main", listening)

@@ -9,9 +9,11 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import IO
 
 from msgs_config.character import Loading
+from msgs_config.engine_urdf import engine_urdf
 from msgs_config.errors import CharacterError
 
 
@@ -48,8 +50,9 @@ def load_urdf(client: int, loading: Loading) -> int:
     """Load a URDF, each link after its parent; returns the body's number.
 
     Raises:
-        CharacterError: the engine refuses the file.
+        CharacterError: the engine refuses the file, or one of its meshes does not exist.
     """
+    text = engine_urdf(loading)
     # not URDF_MAINTAIN_LINK_ORDER: it crashes where a file lists a link before its parent
     flags = 0
     if loading.self_collision:
@@ -57,13 +60,15 @@ def load_urdf(client: int, loading: Loading) -> int:
         flags |= pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS
     if loading.inertia_from_file:
         flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
-    with captured_output() as output:
+    with tempfile.TemporaryDirectory() as directory, captured_output() as output:
+        copy = Path(directory) / "model.urdf"
+        copy.write_text(text, encoding="utf-8")
         # an engine that caches files would read an old version of a file that was edited
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
         try:
             return int(
                 pybullet.loadURDF(
-                    str(loading.urdf_path),
+                    str(copy),
                     useFixedBase=loading.fixed_base,
                     globalScaling=loading.scale,
                     flags=flags,

@@ -4,12 +4,14 @@ Both sides build theirs from this one description: the simulator its body, the c
 model of the dynamics. All frames are URDF link frames; lengths in m, masses in kg.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.joint_layout import ROOT, JointLayout, JointType
 from msgs_config.rotations import IDENTITY_XYZW
@@ -18,7 +20,8 @@ ROOT_TORQUE = ROOT + "_r"
 """Name of the gains of the floating base's rotation; those of its translation are `root`."""
 
 Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+Quadruple = tuple[float, float, float, float]
+Quaternion = Quadruple
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,52 @@ class Pose:
 
     position: Vector = (0.0, 0.0, 0.0)
     orientation_xyzw: Quaternion = IDENTITY_XYZW
+
+
+class ShapeType(Enum):
+    """What a shape is, and what its `size` says; axes of symmetry are z."""
+
+    BOX = "box"  # edges x, y, z
+    SPHERE = "sphere"  # radius
+    CYLINDER = "cylinder"  # radius, length
+    CAPSULE = "capsule"  # radius, length of the cylinder between the two half spheres
+    MESH = "mesh"  # scale along x, y, z of what the file says
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape that is seen. `pose` is in the link frame, `mesh` an absolute path."""
+
+    type: ShapeType
+    size: tuple[float, ...]  # m; for a mesh factors
+    pose: Pose = Pose()
+    color_rgba: Quadruple = (0.7, 0.7, 0.7, 1.0)
+    mesh: str = ""
+
+    def without_capsule(self) -> tuple["Shape", ...]:
+        """The shape itself, or a capsule's cylinder and two spheres."""
+        if self.type is not ShapeType.CAPSULE:
+            return (self,)
+        radius, length = self.size
+        x, y, z = rotations.rotate(
+            np.array(self.pose.orientation_xyzw), np.array((0.0, 0.0, 0.5 * length))
+        ).tolist()
+        px, py, pz = self.pose.position
+        ends = (px + x, py + y, pz + z), (px - x, py - y, pz - z)
+        spheres = [
+            replace(self, type=ShapeType.SPHERE, size=(radius,), pose=Pose(end)) for end in ends
+        ]
+        return (replace(self, type=ShapeType.CYLINDER), *spheres)
+
+
+@dataclass(frozen=True)
+class SoftLimit:
+    """Bounds of a ball joint's rotation vector, kept by a spring and a damper outside of them."""
+
+    lower: Vector  # rad
+    upper: Vector  # rad
+    stiffness: float  # N m/rad
+    damping: float  # N m s/rad
 
 
 @dataclass(frozen=True)
@@ -40,6 +89,8 @@ class Joint:
     lower: float = -np.inf  # rad or m
     upper: float = np.inf
     effort_limit: float = np.inf  # N m or N, of the vector's norm for a ball joint
+    damping: float = 0.0  # passive; N m s/rad or N s/m
+    soft_limit: SoftLimit | None = None  # of a ball joint
 
 
 @dataclass(frozen=True)
@@ -52,6 +103,7 @@ class Link:
     mass: float
     inertia_diagonal: Vector  # kg m^2, in the inertial frame
     inertial_pose: Pose  # in the link frame
+    shapes: tuple[Shape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,6 +136,28 @@ class Loading:
 
 
 @dataclass(frozen=True)
+class Placement:
+    """Where a character's own world stands in the world: turned about z by `yaw`, then moved."""
+
+    x: float = 0.0  # m
+    y: float = 0.0
+    z: float = 0.0
+    yaw: float = 0.0  # rad
+
+    def moved(
+        self, positions: FloatArray, orientations_xyzw: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Positions (..., 3) in m and orientations (..., 4) of the own world, in the world."""
+        if self == Placement():
+            return positions, orientations_xyzw  # to the last bit
+        turn = rotations.about_z(self.yaw)
+        return (
+            rotations.rotate(turn, positions) + np.array((self.x, self.y, self.z)),
+            rotations.multiply(turn, orientations_xyzw),
+        )
+
+
+@dataclass(frozen=True)
 class Character:
     """A character: its body and its defaults. Links and joints are listed depth-first."""
 
@@ -96,11 +170,30 @@ class Character:
     rest_position: tuple[float, ...]  # (n,), message form
     clips: ClipFormat
     notes: tuple[str, ...] = ()  # what its author may have overlooked
+    placement: Placement = Placement()
 
     @cached_property
     def layout(self) -> JointLayout:
         """The order of the character's degrees of freedom."""
         return JointLayout((link.joint.name, link.joint.type) for link in self.links)
+
+    def placed(self, placement: Placement) -> "Character":
+        """The character as it was loaded, with its fixed base or its rest pose's root moved."""
+        if placement == Placement():
+            return self
+        if self.layout.has_floating_base:
+            rest = np.array(self.rest_position)
+            origin, turn = placement.moved(rest[:3], rotations.exp(rest[3:6]))
+            rest[:3], rest[3:6] = origin, rotations.log(turn)
+            return replace(self, placement=placement, rest_position=tuple(rest.tolist()))
+        base = self.links[0]
+        pose = base.joint.pose_in_parent
+        origin, turn = placement.moved(np.array(pose.position), np.array(pose.orientation_xyzw))
+        x, y, z = origin.tolist()
+        qx, qy, qz, qw = turn.tolist()
+        joint = replace(base.joint, pose_in_parent=Pose((x, y, z), (qx, qy, qz, qw)))
+        links = (replace(base, joint=joint), *self.links[1:])
+        return replace(self, placement=placement, links=links)
 
     @property
     def mass(self) -> float:
@@ -128,6 +221,13 @@ class Character:
         for joint in self.moving_joints:
             limits += [joint.effort_limit] * len(self.layout.joint(joint.name).vectors)
         return np.array(limits)
+
+    def passive_damping(self) -> FloatArray:
+        """Passive damping (n,) of each entry, N m s/rad or N s/m."""
+        damping = np.zeros(self.layout.size)
+        for joint in self.moving_joints:
+            damping[self.layout.joint(joint.name).entries] = joint.damping
+        return damping
 
     def position_bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bound (n,) of each entry; infinite where the joint has none."""

@@ -1,17 +1,21 @@
 """The YAML file of a character, checked key by key."""
 
+import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from msgs_config import files
-from msgs_config.character import ClipFormat, Gains, Loading
+from msgs_config.character import ClipFormat, Gains, Loading, SoftLimit, Vector
 from msgs_config.errors import CharacterError, one_of
+from msgs_config.joint_bounds import with_bounds
+from msgs_config.urdf_check import check_urdf, has_world_base
 
 CHARACTERS_DIRECTORY = Path(__file__).parent / "characters"
 
 _LARGEST = sys.float_info.max
+_SHOWN = 200  # characters
 _KEYS = [
     "urdf",
     "scale",
@@ -19,17 +23,26 @@ _KEYS = [
     "fixed_base",
     "inertia",
     "self_collision",
+    "joint_damping",
     "rest_pose",
     "joints",
     "root_assistance",
     "clips",
 ]
-_JOINT_KEYS = ["stiffness", "damping", "effort_limit"]
+_JOINT_KEYS = [
+    "stiffness",
+    "damping",
+    "effort_limit",
+    "lower",
+    "upper",
+    "passive_damping",
+    "soft_limit",
+]
 
 
 @dataclass(frozen=True)
 class CharacterFile:
-    """The content of a character's YAML file."""
+    """The content of a character's YAML file; of a URDF alone, all keys at their defaults."""
 
     name: str
     path: Path
@@ -39,6 +52,9 @@ class CharacterFile:
     rest_pose: dict[str, float]  # DoF name -> m or rad
     gains: dict[str, Gains]  # joint name -> gains; `force` and `torque` of the root assistance
     effort_limits: dict[str, float]  # joint name -> N m or N
+    urdf_damping: bool  # whether the URDF's passive damping of hinges and sliders counts
+    passive_damping: dict[str, float]  # joint name -> N m s/rad or N s/m
+    soft_limits: dict[str, SoftLimit]  # ball joint name -> its limit
     assistance: dict[str, Gains]
     clips: ClipFormat
 
@@ -49,30 +65,36 @@ def shipped_characters() -> list[str]:
 
 
 def character_path(name_or_path: str) -> Path:
-    """The file of a shipped character, or the path itself if it ends in `.yaml`.
+    """The file of a shipped character, or the one of a path that ends in `.yaml` or `.urdf`.
+
+    A path may be relative to the working directory, absolute, or `package://NAME/...`.
 
     Raises:
-        CharacterError: there is no such character or file.
+        CharacterError: there is no such character or package.
     """
-    if name_or_path.endswith((".yaml", ".yml")):
-        path = Path(name_or_path).absolute()
+    if name_or_path.endswith((".yaml", ".yml", ".urdf")):
+        path = files.resolve(name_or_path, Path.cwd(), CharacterError)
     elif name_or_path in shipped_characters():
         path = CHARACTERS_DIRECTORY / f"{name_or_path}.yaml"
     else:
         sentence = one_of("character", name_or_path, shipped_characters())
-        raise CharacterError(f"{sentence}, or the path of a .yaml file")
+        raise CharacterError(f"{sentence}, or the path of a .yaml or .urdf file")
     return path
 
 
 def read_character_file(name_or_path: str) -> CharacterFile:
-    """Read and check a character's file.
+    """Read and check a character's file, and the URDF that it names.
 
     Raises:
         CharacterError: names the file, the key and what would be right.
     """
     path = character_path(name_or_path)
-    text = files.read_text(path, CharacterError)
-    reader = _Reader(path, files.parse_yaml_mapping(path, text, CharacterError))
+    if path.suffix == ".urdf":
+        text, content = "", {"urdf": path.name}
+    else:
+        text = files.read_text(path, CharacterError)
+        content = files.parse_yaml_mapping(path, text, CharacterError)
+    reader = _Reader(path, content)
     reader.check_keys(_KEYS)
     joints = reader.parts("joints")
     for joint in joints.values():
@@ -84,29 +106,62 @@ def read_character_file(name_or_path: str) -> CharacterFile:
         name=path.stem,
         path=path,
         text=text,
-        loading=_loading(reader),
+        loading=_loading(reader, joints),
         up_axis=reader.choice("up_axis", ["z", "y"]),
         rest_pose={name: rest_pose.number(name) for name in rest_pose.content},
         gains={name: joint.gains() for name, joint in joints.items()},
-        effort_limits={
-            name: joint.number("effort_limit", minimum=0.0)
+        effort_limits=_numbers(joints, "effort_limit"),
+        urdf_damping=reader.choice("joint_damping", ["file", "none"]) == "file",
+        passive_damping=_numbers(joints, "passive_damping"),
+        soft_limits={
+            name: _soft_limit(joint.part("soft_limit"))
             for name, joint in joints.items()
-            if "effort_limit" in joint.content
+            if "soft_limit" in joint.content
         },
         assistance={name: part.gains() for name, part in reader.parts("root_assistance").items()},
         clips=_clip_format(reader.part("clips")),
     )
 
 
-def _loading(reader: "_Reader") -> Loading:
+def _loading(reader: "_Reader", joints: dict[str, "_Reader"]) -> Loading:
     urdf = reader.path_of("urdf")
+    text = files.read_text(urdf, CharacterError)
+    robot = check_urdf(urdf, text)
+    scale = reader.number("scale", default=1.0, minimum=1e-6)
+    bounds = {
+        name: (joint.number_or_none("lower"), joint.number_or_none("upper"))
+        for name, joint in joints.items()
+        if {"lower", "upper"} & set(joint.content)
+    }
     return Loading(
         urdf_path=urdf,
-        urdf_text=files.read_text(urdf, CharacterError),
-        scale=reader.number("scale", default=1.0, minimum=1e-6),
-        fixed_base=reader.flag("fixed_base"),
+        urdf_text=with_bounds(robot, bounds, scale, reader.file) if bounds else text,
+        scale=scale,
+        fixed_base=reader.flag("fixed_base", default=has_world_base(robot)),
         inertia_from_file=reader.choice("inertia", ["file", "shapes"]) == "file",
         self_collision=reader.flag("self_collision"),
+    )
+
+
+def _numbers(joints: dict[str, "_Reader"], key: str) -> dict[str, float]:
+    """The number of each joint that has this key, by the joint's name."""
+    return {
+        name: joint.number(key, minimum=0.0)
+        for name, joint in joints.items()
+        if key in joint.content
+    }
+
+
+def _soft_limit(limit: "_Reader") -> SoftLimit:
+    limit.check_keys(["lower", "upper", "stiffness", "damping"])
+    lower, upper = limit.angles("lower"), limit.angles("upper")
+    if any(low > high for low, high in zip(lower, upper, strict=True)):
+        raise limit.wrong("lower", list(lower), "nowhere above 'upper'")
+    return SoftLimit(
+        lower,
+        upper,
+        stiffness=limit.number("stiffness", minimum=0.0),
+        damping=limit.number("damping", default=0.0, minimum=0.0),
     )
 
 
@@ -128,19 +183,19 @@ class _Reader:
 
     def __init__(self, file: Path, content: dict[str, Any], prefix: str = "") -> None:
         self.content = content
-        self._file = file
+        self.file = file
         self._prefix = prefix  # the keys that lead to this mapping, such as `joints.chest.`
 
     def wrong(self, key: str, value: object, right: str) -> CharacterError:
-        # no content of lists: a few lines of YAML can stand for millions of entries
-        shown = f"a {type(value).__name__}" if isinstance(value, (list, dict)) else repr(value)
-        return CharacterError(f"{self._file}: {self._prefix}{key} is {shown}; it must be {right}")
+        return CharacterError(
+            f"{self.file}: {self._prefix}{key} is {_shown(value)}; it must be {right}"
+        )
 
     def check_keys(self, known: list[str]) -> None:
         for key in self.content:
             if key not in known:
                 sentence = one_of("key", f"{self._prefix}{key}", known)
-                raise CharacterError(f"{self._file}: {sentence}")
+                raise CharacterError(f"{self.file}: {sentence}")
 
     def part(self, key: str) -> "_Reader":
         """The mapping under a key; one that is absent is empty."""
@@ -148,7 +203,7 @@ class _Reader:
         value = {} if value is None else value
         if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
             raise self.wrong(key, value, "a mapping")
-        return _Reader(self._file, value, f"{self._prefix}{key}.")
+        return _Reader(self.file, value, f"{self._prefix}{key}.")
 
     def parts(self, key: str) -> dict[str, "_Reader"]:
         """The mappings in the mapping under a key."""
@@ -166,9 +221,9 @@ class _Reader:
         if "\0" in text:
             raise self.wrong(key, text, "a path")
         try:
-            return files.resolve(text, self._file.parent, CharacterError)
+            return files.resolve(text, self.file.parent, CharacterError)
         except CharacterError as error:
-            raise CharacterError(f"{self._file}: {self._prefix}{key}: {error}") from error
+            raise CharacterError(f"{self.file}: {self._prefix}{key}: {error}") from error
 
     def choice(self, key: str, choices: list[str]) -> str:
         value = self.content.get(key, choices[0])
@@ -176,8 +231,8 @@ class _Reader:
             raise self.wrong(key, value, " or ".join(f"'{choice}'" for choice in choices))
         return str(value)
 
-    def flag(self, key: str) -> bool:
-        value = self.content.get(key, False)
+    def flag(self, key: str, default: bool = False) -> bool:
+        value = self.content.get(key, default)
         if not isinstance(value, bool):
             raise self.wrong(key, value, "true or false")
         return value
@@ -191,8 +246,34 @@ class _Reader:
         bound = "" if minimum == -_LARGEST else f" of at least {minimum:g}"
         raise self.wrong(key, value, f"a finite number{bound}")
 
+    def number_or_none(self, key: str) -> float | None:
+        """The number of a key that may be absent."""
+        return self.number(key) if key in self.content else None
+
+    def angles(self, key: str) -> Vector:
+        """Three numbers, each an angle in rad from -pi to pi."""
+        value = self.content.get(key)
+        right = "a list of three numbers from -pi to pi"
+        if not isinstance(value, list) or len(value) != 3:
+            raise self.wrong(key, value, right)
+        for item in value:
+            is_number = isinstance(item, (int, float)) and not isinstance(item, bool)
+            if not (is_number and abs(item) <= math.pi):  # NaN is not
+                raise self.wrong(key, value, right)
+        x, y, z = (float(item) for item in value)
+        return (x, y, z)
+
     def gains(self) -> Gains:
         return Gains(
             stiffness=self.number("stiffness", default=0.0, minimum=0.0),
             damping=self.number("damping", default=0.0, minimum=0.0),
         )
+
+
+def _shown(value: object) -> str:
+    """A value as an error shows it: a few lines of YAML can stand for millions of entries."""
+    if isinstance(value, (list, dict)):
+        return f"a {type(value).__name__}"
+    if isinstance(value, int) and abs(value) > _LARGEST:
+        return "a number of too many digits"
+    return repr(value)[:_SHOWN]

@@ -6,11 +6,12 @@ the controller's model of the dynamics are built from the same ones.
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from msgs_config import rotations
+from msgs_config import files, rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.bullet import connect, load_urdf, pybullet
 from msgs_config.character import (
@@ -21,12 +22,15 @@ from msgs_config.character import (
     Link,
     Pose,
     Quaternion,
+    SoftLimit,
     Vector,
 )
 from msgs_config.character_file import CharacterFile, read_character_file
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.joint_layout import ROOT, JointLayout, JointType
-from msgs_config.urdf_check import check_urdf, links_without_inertial
+from msgs_config.meshes import resolve_meshes
+from msgs_config.shapes import read_shapes
+from msgs_config.urdf_check import links_without_inertial
 
 _JOINT_TYPES = {
     pybullet.JOINT_REVOLUTE: JointType.REVOLUTE,
@@ -37,30 +41,33 @@ _JOINT_TYPES = {
 
 
 def load_character(name_or_path: str) -> Character:
-    """Load a shipped character by name, or any by the path of its YAML file.
+    """Load a shipped character by name, or any by the path of its YAML file or of its URDF alone.
 
     Raises:
         CharacterError: no such character, or its file or URDF cannot be used; says why.
     """
     file = read_character_file(name_or_path)
-    check_urdf(file.loading.urdf_path, file.loading.urdf_text)
+    urdf = file.loading.urdf_path
+    robot = files.parse_xml(urdf, file.loading.urdf_text, CharacterError)
+    resolve_meshes(robot, urdf)
+    shapes = read_shapes(robot, urdf, file.loading.scale)
     client = connect()
     try:
         body = load_urdf(client, file.loading)
         links = _read_links(client, body, file)
     finally:
         pybullet.disconnect(client)
-    links = _depth_first(links)
+    _check_finite(urdf, links)
+    links = [replace(link, shapes=shapes[link.name]) for link in _depth_first(links)]
     for link in links[1:]:
         if link.joint.name in (ROOT, ROOT_TORQUE) and link.joint.type is not JointType.FIXED:
             raise CharacterError(
-                f"{file.loading.urdf_path}: a joint is named '{link.joint.name}', which is the "
-                "floating base's"
+                f"{urdf}: a joint is named '{link.joint.name}', which is the floating base's"
             )
     try:
         layout = JointLayout((link.joint.name, link.joint.type) for link in links)
     except LayoutError as error:
-        raise CharacterError(f"{file.loading.urdf_path}: {error}") from error
+        raise CharacterError(f"{urdf}: {error}") from error
     _check_joint_names(file, layout)
     _check_rest_pose(file, links)
     return Character(
@@ -72,7 +79,7 @@ def load_character(name_or_path: str) -> Character:
         gains=_gains(file, layout),
         rest_position=_rest_position(file, layout),
         clips=file.clips,
-        notes=_notes(file, layout, links),
+        notes=_notes(file, layout, links, links_without_inertial(robot)),
     )
 
 
@@ -92,9 +99,30 @@ def _read_links(client: int, body: int, file: CharacterFile) -> list[Link]:
             )
         link = _link(client, body, index, info[12].decode(), parent, Joint(name, JointType.FIXED))
         joint = _joint(info, links[parent].inertial_pose, link.inertial_pose)
-        limit = file.effort_limits.get(name, joint.effort_limit)
-        links.append(replace(link, joint=replace(joint, effort_limit=limit)))
+        links.append(replace(link, joint=_with_file(joint, file)))
     return links
+
+
+def _with_file(joint: Joint, file: CharacterFile) -> Joint:
+    """The URDF's joint, with what the character's file says instead of it, or besides."""
+    name = joint.name
+    damping = joint.damping if file.urdf_damping else 0.0
+    if not 0.0 <= damping < math.inf:
+        raise CharacterError(
+            f"{file.loading.urdf_path}: joint '{name}' has a damping of {damping:g}; it must be 0 "
+            f"or more, or not count ('joint_damping: none' in {file.path.name})"
+        )
+    if name in file.soft_limits and joint.type is not JointType.SPHERICAL:
+        raise CharacterError(
+            f"{file.path}: joints.{name}.soft_limit: it is for ball joints, this joint is "
+            f"{joint.type.value}; its limits are the URDF's"
+        )
+    return replace(
+        joint,
+        effort_limit=file.effort_limits.get(name, joint.effort_limit),
+        damping=file.passive_damping.get(name, damping),
+        soft_limit=file.soft_limits.get(name),
+    )
 
 
 def _link(client: int, body: int, index: int, name: str, parent: int, joint: Joint) -> Link:
@@ -117,7 +145,8 @@ def _joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Pose) -
         rotations.multiply(parent_turn, rotations.conjugate(turn)), rotations.conjugate(child_turn)
     )
     joint_type = _JOINT_TYPES[info[2]]
-    limited = joint_type in (JointType.REVOLUTE, JointType.PRISMATIC) and info[8] <= info[9]
+    is_scalar = joint_type in (JointType.REVOLUTE, JointType.PRISMATIC)
+    limited = is_scalar and info[8] <= info[9]
     return Joint(
         name=info[1].decode(),
         type=joint_type,
@@ -126,7 +155,19 @@ def _joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Pose) -
         lower=float(info[8]) if limited else -math.inf,
         upper=float(info[9]) if limited else math.inf,
         effort_limit=float(info[10]) if info[10] > 0.0 else math.inf,
+        damping=float(info[6]) if is_scalar else 0.0,
     )
+
+
+def _check_finite(urdf: Path, links: list[Link]) -> None:
+    """The engine computes inertia and frames; numbers that are too large overflow there."""
+    for link in links:
+        poses = (link.inertial_pose, link.joint.pose_in_parent)
+        numbers = [number for pose in poses for number in (*pose.position, *pose.orientation_xyzw)]
+        if not np.isfinite([link.mass, *link.inertia_diagonal, *numbers]).all():
+            raise CharacterError(
+                f"{urdf}: link '{link.name}' has a mass, an inertia or a frame that is too large"
+            )
 
 
 def _depth_first(links: list[Link]) -> list[Link]:
@@ -161,13 +202,29 @@ def _check_rest_pose(file: CharacterFile, links: list[Link]) -> None:
                 f"{file.path}: rest_pose.{joint.name} is {value:g}; "
                 f"its limits are {joint.lower:g} to {joint.upper:g}"
             )
+        if joint.soft_limit is not None:
+            _check_ball_joint(file, joint.name, joint.soft_limit)
 
 
-def _notes(file: CharacterFile, layout: JointLayout, links: list[Link]) -> tuple[str, ...]:
+def _check_ball_joint(file: CharacterFile, name: str, limit: SoftLimit) -> None:
+    """The rest pose is one that the joint's soft limit leaves alone."""
+    for suffix, lower, upper in zip(
+        JointType.SPHERICAL.suffixes, limit.lower, limit.upper, strict=True
+    ):
+        value = file.rest_pose.get(name + suffix, 0.0)
+        if not lower <= value <= upper:
+            raise CharacterError(
+                f"{file.path}: rest_pose.{name}{suffix} is {value:g}; "
+                f"its soft limits are {lower:g} to {upper:g}"
+            )
+
+
+def _notes(
+    file: CharacterFile, layout: JointLayout, links: list[Link], without_mass: set[str]
+) -> tuple[str, ...]:
     limp = [name for name in layout.actuated_joint_names if name not in file.gains]
     first = 1 if file.loading.fixed_base else 0
-    counted = {link.name for link in links[first:]}
-    unknown = sorted(links_without_inertial(file.loading.urdf_text) & counted)
+    unknown = sorted(without_mass & {link.name for link in links[first:]})
     notes = []
     if limp:
         notes.append(f"joints without gains in {file.path.name} are limp: {', '.join(limp)}")

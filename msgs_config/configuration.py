@@ -10,18 +10,26 @@ from typing import Any
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
-from msgs_config.errors import MessageError
+from msgs_config.character import Character, Loading
+from msgs_config.errors import LayoutError, MessageError
 from msgs_config.joint_layout import JointLayout, JointType
 from msgs_config.parameters import Value, Values
+from msgs_config.probe import Probe, read_probe
 
 _PACKAGES = ["actuated_characters", "pybullet", "mujoco-core", "numpy", "ros-jazzy-rclpy"]
 
 
-def describe(character: Character, values: Values, since_ns: int | None = None) -> str:
+def describe(
+    character: Character,
+    values: Values,
+    since_ns: int | None = None,
+    probe: Probe | None = None,
+    terrain: Loading | None = None,
+) -> str:
     """The JSON text: the character with its files, the parameters in force, and the versions.
 
-    `since_ns` is the stamp of the last state that was answered with other parameters, if any.
+    `since_ns` is the stamp of the last state that was answered with other parameters, if any;
+    `probe` and `terrain` are a simulator's.
     """
     content = {
         "character": character.name,
@@ -32,6 +40,8 @@ def describe(character: Character, values: Values, since_ns: int | None = None) 
         ],
         "effort_limits": [_finite(limit) for limit in character.effort_limits().tolist()],
         "mass": character.mass,
+        "terrain_urdf": None if terrain is None else terrain.urdf_text,
+        "probe": None if probe is None else probe.content(),
         "parameters_after_stamp_ns": since_ns,
         "parameters": {name: _finite(value) for name, value in values.items()},
         "versions": {"python": platform.python_version()} | _versions(),
@@ -63,6 +73,7 @@ class RunConfiguration:
     effort_limits: FloatArray  # (b,) N m or N
     mass: float  # kg
     parameters: dict[str, Any]
+    probe: Probe | None = None  # absent where another simulator than ours speaks
 
 
 def parse(text: str) -> RunConfiguration:
@@ -74,14 +85,16 @@ def parse(text: str) -> RunConfiguration:
     try:
         content = json.loads(text)
         joints = [(joint["name"], JointType(joint["type"])) for joint in content["joints"]]
+        layout, probe = JointLayout(joints), content.get("probe")
         return RunConfiguration(
             character=str(content["character"]),
-            layout=JointLayout(joints),
+            layout=layout,
             effort_limits=np.array(
                 [np.inf if limit is None else limit for limit in content["effort_limits"]]
             ),
             mass=float(content["mass"]),
             parameters=dict(content["parameters"]),
+            probe=None if probe is None else read_probe(probe, layout.size),
         )
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError, LayoutError) as error:
         raise MessageError("not a simulator's configuration") from error

@@ -8,6 +8,8 @@ from rclpy.node import Node
 
 from msgs_config.topics import DIAGNOSTICS, create_publisher
 
+DIAGNOSTICS_PERIOD = 1.0  # s of wall time
+
 
 class DiagnosticsPublisher:
     """Publishes a node's counts, and its fault if it has one."""
@@ -21,11 +23,17 @@ class DiagnosticsPublisher:
         """Whether anybody listens; if not, there is no need to gather anything."""
         return bool(self._publisher.get_subscription_count())
 
-    def publish(self, values: Mapping[str, object], fault: str | None = None) -> None:
-        """Publish the values by name; with a fault the level is ERROR and its text the message."""
+    def publish(
+        self, values: Mapping[str, object], fault: str | None = None, below: str = ""
+    ) -> None:
+        """Publish the values by name; with a fault the level is ERROR and its text the message.
+
+        The status has the node's name, that in a namespace `below` its own if there is one.
+        """
+        namespace = "/".join(filter(None, (self._node.get_namespace().strip("/"), below)))
         status = DiagnosticStatus(
             level=DiagnosticStatus.OK if fault is None else DiagnosticStatus.ERROR,
-            name=self._node.get_fully_qualified_name().lstrip("/"),
+            name=f"{namespace}/{self._node.get_name()}".lstrip("/"),
             message=fault or "running",
             values=[KeyValue(key=name, value=str(value)) for name, value in values.items()],
         )

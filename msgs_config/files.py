@@ -3,6 +3,7 @@
 import importlib.util
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import yaml
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
@@ -10,6 +11,10 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from msgs_config.errors import ActuatedCharactersError
 
 MAX_FILE_BYTES = 16 * 1024 * 1024
+MAX_YAML_CHARACTERS = 128 * 1024  # PyYAML is slow: a second for as much
+MAX_YAML_VALUE = 1000  # characters of a key or value
+MAX_NESTING = 64
+MAX_XML_ELEMENTS = 100_000
 _PACKAGE = "package://"
 
 
@@ -28,7 +33,10 @@ def resolve(path: str, relative_to: Path, error: type[ActuatedCharactersError]) 
 
 
 def _package_directory(package: str, error: type[ActuatedCharactersError]) -> Path:
-    spec = importlib.util.find_spec(package) if package.isidentifier() else None
+    try:
+        spec = importlib.util.find_spec(package) if package.isidentifier() else None
+    except ValueError:  # a module that was not imported from anywhere, such as __main__
+        spec = None
     if spec is not None and spec.submodule_search_locations:
         return Path(spec.submodule_search_locations[0])
     try:
@@ -49,7 +57,7 @@ def read_text(path: Path, error: type[ActuatedCharactersError]) -> str:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise error(f"{path}: larger than {MAX_FILE_BYTES >> 20} MiB")
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as cause:
+    except (OSError, ValueError) as cause:  # ValueError: no UTF-8, or a NUL in the path
         reason = cause.strerror if isinstance(cause, OSError) else "not a text file"
         raise error(f"{path}: {reason}") from cause
 
@@ -60,14 +68,85 @@ def parse_yaml_mapping(
     """The mapping at the top of a YAML file's text.
 
     Raises:
-        error: the text is no YAML, nests too deep, or holds no mapping.
+        error: the text is no YAML, is too large, nests too deep, or holds no mapping.
     """
+    if len(text) > MAX_YAML_CHARACTERS:
+        raise error(f"{path}: larger than {MAX_YAML_CHARACTERS >> 10} KiB")
     try:
-        content = yaml.safe_load(text)
-    except (yaml.YAMLError, RecursionError, ValueError) as cause:  # ValueError: no such date
+        content = yaml.load(text, _PlainLoader)
+    except (yaml.YAMLError, ValueError) as cause:  # ValueError: no such date, too many digits
         where = getattr(cause, "problem_mark", None)
         line = f", line {where.line + 1}" if where is not None else ""
-        raise error(f"{path}{line}: not valid YAML") from cause
+        problem = getattr(cause, "problem", None)
+        reason = f": {problem[:200]}" if problem else ""
+        raise error(f"{path}{line}: not valid YAML{reason}") from cause
     if not isinstance(content, dict):
         raise error(f"{path}: must hold a mapping")
     return content
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Plain data alone, and nothing by which a small text becomes deep or large."""
+
+    _depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self._depth == MAX_NESTING:
+            raise yaml.MarkedYAMLError(
+                problem=f"deeper than {MAX_NESTING} levels", problem_mark=self.get_mark()
+            )
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        if isinstance(node, yaml.ScalarNode) and len(node.value) > MAX_YAML_VALUE:
+            raise yaml.MarkedYAMLError(
+                problem=f"a value of more than {MAX_YAML_VALUE} characters",
+                problem_mark=node.start_mark,
+            )
+        return node
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        # a mapping that is merged (`<<`) is copied: ten merges of ten, a few times over, are
+        # more than fits into memory. Left alone, the key `<<` is no valid one.
+        pass
+
+
+def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> ElementTree.Element:
+    """The root element of an XML file's text, which may end in a NUL as PyBullet's own do.
+
+    Raises:
+        error: the text is no XML, declares a document type, or is too deep or too large.
+    """
+    parser = ElementTree.XMLParser(target=_PlainTreeBuilder())
+    try:
+        parser.feed(text.strip("\0 \t\r\n"))
+        root: ElementTree.Element = parser.close()
+    except (ElementTree.ParseError, ValueError) as cause:  # ValueError: an unknown encoding
+        raise error(f"{path}: not valid XML: {str(cause)[:200]}") from cause
+    return root
+
+
+class _PlainTreeBuilder(ElementTree.TreeBuilder):
+    """Elements alone, and nothing by which a small text becomes deep or large."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._depth = 0
+        self._count = 0
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        # it comes before the entities that it declares
+        raise ElementTree.ParseError("a document type (DOCTYPE) is not allowed")
+
+    def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:
+        self._depth += 1
+        self._count += 1
+        if self._depth > MAX_NESTING:
+            raise ElementTree.ParseError(f"deeper than {MAX_NESTING} elements")
+        if self._count > MAX_XML_ELEMENTS:
+            raise ElementTree.ParseError(f"more than {MAX_XML_ELEMENTS} elements")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str) -> ElementTree.Element:
+        self._depth -= 1
+        return super().end(tag)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import LayoutError, MessageError
@@ -23,9 +23,10 @@ from msgs_config.joint_layout import JointLayout
 from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 
-_CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _NAMES_START = 12  # after the encapsulation header and the stamp
 _MAX_KEPT_SENDERS = 16
+_ENTRY_BYTES = {JointState: (8, 8, 8), MultiDOFJointState: (56, 48, 48)}
 _EMPTY = np.zeros(0)
 
 
@@ -45,18 +46,24 @@ def split_stamp(stamp_ns: int) -> tuple[int, int]:
     return divmod(stamp_ns, NANOSECONDS_PER_SECOND)
 
 
-def _padding(length: int, alignment: int) -> int:
+def padding(length: int, alignment: int) -> int:
+    """How many bytes a serialised item of this alignment is preceded by, after `length` bytes."""
     return -length % alignment
 
 
-def _cdr_names(names: Sequence[str]) -> bytes:
-    """The bytes from after the stamp to the end of the names, with an empty frame_id."""
-    content = bytearray(struct.pack("<I1sxxx", 1, b"\0"))
+def cdr_names(names: Sequence[str], frame_id: str = "") -> bytes:
+    """The bytes from after the stamp to the end of the names."""
+    content = bytearray(_cdr_text(frame_id))
     content += struct.pack("<I", len(names))
     for name in names:
-        text = name.encode() + b"\0"
-        content += bytes(_padding(len(content), 4)) + struct.pack("<I", len(text)) + text
-    return bytes(content + bytes(_padding(len(content), 4)))
+        content += _cdr_text(name)
+    return bytes(content)
+
+
+def _cdr_text(text: str) -> bytes:
+    """A text with its length, padded for whatever comes after it, which is never a double."""
+    content = text.encode() + b"\0"
+    return struct.pack("<I", len(content)) + content + bytes(padding(len(content), 4))
 
 
 def decode(raw: bytes, message_type: type) -> Any:
@@ -66,16 +73,45 @@ def decode(raw: bytes, message_type: type) -> Any:
         MessageError: the bytes are no such message.
     """
     try:
+        _check_lengths(raw, _ENTRY_BYTES.get(message_type, ()))
         return deserialize_message(raw, message_type)
     except Exception as error:  # rclpy has no type of its own for what cannot be decoded
         raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
+
+
+def _check_lengths(raw: bytes, entry_bytes: Sequence[int]) -> None:
+    """Raise struct.error or ValueError if lists are longer than the message is.
+
+    The middleware finds that, too, but prints a line of its own at each such message. The lists
+    are names, after the header, and then some of doubles, of so many bytes an entry.
+    """
+    if not entry_bytes:
+        return
+    order = "<" if raw[1] & 1 else ">"
+
+    def count_at(offset: int) -> tuple[int, int]:
+        offset += padding(offset, 4)  # the encapsulation header has four bytes as well
+        (count,) = struct.unpack_from(f"{order}I", raw, offset)
+        return count, offset + 4
+
+    length, offset = count_at(_NAMES_START)
+    names, offset = count_at(offset + length)
+    for _ in range(names):
+        length, offset = count_at(offset)
+        offset += length
+    for size in entry_bytes:
+        count, offset = count_at(offset)
+        if count:
+            offset += padding(offset - 4, 8) + size * count
+    if offset > len(raw):
+        raise ValueError("a list is longer than the message")
 
 
 class JointStateEncoder:
     """Serialises JointState messages that all have the same names."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        self._head = _CDR_LITTLE_ENDIAN + bytes(8) + _cdr_names(names)
+        self._head = CDR_LITTLE_ENDIAN + bytes(8) + cdr_names(names)
 
     def encode(
         self,
@@ -90,13 +126,13 @@ class JointStateEncoder:
         for values in (position, velocity, effort):
             content += struct.pack("<I", len(values))
             if len(values):
-                content += bytes(_padding(len(content) - 4, 8)) + values.tobytes()
+                content += bytes(padding(len(content) - 4, 8)) + values.tobytes()
         return bytes(content)
 
 
 def encode_clock(stamp_ns: int) -> bytes:
     """A serialised rosgraph_msgs/Clock."""
-    return _CDR_LITTLE_ENDIAN + struct.pack("<iI", *split_stamp(stamp_ns))
+    return CDR_LITTLE_ENDIAN + struct.pack("<iI", *split_stamp(stamp_ns))
 
 
 class JointStateDecoder:
@@ -112,14 +148,14 @@ class JointStateDecoder:
             MessageError: the bytes are no JointState.
         """
         for head, names in self._kept.items():
-            if raw.startswith(head, _NAMES_START) and raw.startswith(_CDR_LITTLE_ENDIAN):
+            if raw.startswith(head, _NAMES_START) and raw.startswith(CDR_LITTLE_ENDIAN):
                 return _read_doubles(raw, _NAMES_START + len(head), names)
         return self._decode_slowly(raw)
 
     def _decode_slowly(self, raw: bytes) -> JointArrays:
         message = decode(raw, JointState)
         names = tuple(message.name)
-        head = _cdr_names(names)
+        head = cdr_names(names)
         if raw.startswith(head, _NAMES_START) and len(self._kept) < _MAX_KEPT_SENDERS:
             self._kept[head] = names
         stamp = message.header.stamp
@@ -141,7 +177,7 @@ def _read_doubles(raw: bytes, offset: int, names: tuple[str, ...]) -> JointArray
             (count,) = struct.unpack_from("<I", raw, offset)
             offset += 4
             if count:
-                offset += _padding(offset - 4, 8)
+                offset += padding(offset - 4, 8)
             arrays.append(np.frombuffer(raw, "<f8", count, offset).copy() if count else _EMPTY)
             offset += 8 * count
     except (struct.error, ValueError) as error:

@@ -1,12 +1,18 @@
 """Parameters at the edge: taken from a node's command line, and declared on it."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from msgs_config.parameters import Parameter, Values
+from msgs_config.errors import ActuatedCharactersError
+from msgs_config.parameters import Parameter, Values, resolve
 
 
 def given_parameters(node: Node) -> dict[str, object]:
@@ -26,6 +32,39 @@ def declare(node: Node, parameters: Iterable[Parameter], values: Values) -> None
         node.declare_parameter(
             parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True
         )
+
+
+class LiveParameters:
+    """Changes of a node's parameters while it runs: checked before any is taken, all or none."""
+
+    def __init__(
+        self,
+        node: Node,
+        parameters: Iterable[Parameter],
+        values: Values,
+        take: Callable[[Values], None],
+    ) -> None:
+        """Hand all values, the changed ones among them, to `take` after each change."""
+        self._parameters = list(parameters)
+        self._values = values
+        self._take = take
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._changed)
+
+    def _check(self, changes: list[RosParameter]) -> SetParametersResult:
+        try:
+            self._with(changes)
+        except ActuatedCharactersError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _changed(self, changes: list[RosParameter]) -> None:
+        self._values = self._with(changes)
+        self._take(self._values)
+
+    def _with(self, changes: list[RosParameter]) -> Values:
+        given = {change.name: change.value for change in changes}
+        return resolve(self._parameters, {**self._values, **given})
 
 
 def _descriptor(parameter: Parameter) -> ParameterDescriptor:

@@ -10,12 +10,16 @@ import os
 import time
 from collections import deque
 
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
 from msgs_config.topics import Topic
 
 _SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
+_SHORT_REST = 0.002  # s; waking up from the executor takes up to that
+_SLEEP_ERROR = 0.0002  # s by which a sleep may be late
+_MOST_TURNS = 50  # of the executor in a row, which has one callback a turn
 _PATIENCE = 0.003  # s of taking turns with other processes before the loop blocks
 
 
@@ -23,7 +27,8 @@ class DirectSubscription:
     """A subscription whose serialised messages a loop takes one by one, oldest first."""
 
     def __init__(self, node: Node, topic: Topic) -> None:
-        self._pending: deque[tuple[bytes, int]] = deque()
+        # as many as the middleware keeps, and like it the newest, lest a flood fill the memory
+        self._pending: deque[tuple[bytes, int]] = deque(maxlen=topic.qos.depth)
         # When the loop blocks in the executor, it is the executor that takes the message. It
         # hands a callback of two arguments the message's info too, which rclpy's types leave out.
         self._subscription = node.create_subscription(
@@ -32,6 +37,8 @@ class DirectSubscription:
             self._keep,  # type: ignore[arg-type]
             topic.qos,
             raw=True,
+            # not one thing more for the executor to look at in each turn; `waiting.py` says it
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
 
     def _keep(self, raw: bytes, info: dict[str, int]) -> None:
@@ -68,9 +75,19 @@ class Spinner:
     def rest(self) -> None:
         """Let others work; at most about 20 ms."""
         if time.monotonic() > self._busy_until:
-            self._executor.spin_once(timeout_sec=_SERVICE_PERIOD)
+            self._turn(_SERVICE_PERIOD)
         else:
             self.serve()
+            os.sched_yield()
+
+    def rest_for(self, seconds: float) -> None:
+        """Let others work for a time that is known; ends early rather than late."""
+        self.serve()
+        if seconds > _SHORT_REST:
+            self._turn(min(seconds - _SHORT_REST, _SERVICE_PERIOD))
+        elif seconds > _SLEEP_ERROR:
+            time.sleep(seconds - _SLEEP_ERROR)
+        else:
             os.sched_yield()
 
     def serve(self) -> None:
@@ -78,7 +95,30 @@ class Spinner:
         now = time.monotonic()
         if now > self._next_service:
             self._next_service = now + _SERVICE_PERIOD
-            self._executor.spin_once(timeout_sec=0.0)
+            self.serve_pending()
+
+    def serve_pending(self) -> None:
+        """Do all that is ready: a flood of messages must not keep services waiting."""
+        for _ in range(_MOST_TURNS):
+            if not self._turn(0.0):
+                return
+
+    def _turn(self, seconds: float) -> bool:
+        """Do one thing that is ready, or becomes so within a time; whether there was one.
+
+        A callback that awaits something is not over when it returns, and the executor offers it
+        first at each turn, whereas `spin_once` would take it for the one thing to do.
+        """
+        for _ in range(_MOST_TURNS):
+            try:
+                callback, *_ = self._executor.wait_for_ready_callbacks(seconds)
+            except (TimeoutException, ShutdownException):
+                return False
+            callback()
+            if callback.done():
+                callback.result()  # raises what it has raised
+                return True
+        return False
 
     def close(self) -> None:
         """End the executor."""

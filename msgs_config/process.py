@@ -6,14 +6,17 @@ Imports neither numpy nor rclpy at the top: the limit on threads must come befor
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Protocol
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
+from msgs_config.last_resort import exit_after
 
 EXIT_ERROR = 1
+_LEAVE_TIME = 2  # s that leaving the ROS graph may take
 _DDS_PROFILES = Path(__file__).with_name("fastdds.xml")
 _PARAMETERS_ARE_SET = (
     "parameters are set by --ros-args -p NAME:=VALUE or --params-file FILE, and listed by "
@@ -36,6 +39,7 @@ class StopSignal:
 
     def __init__(self) -> None:
         self._received = False
+        self._ends_at_once = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._receive)
 
@@ -45,6 +49,17 @@ class StopSignal:
     def _receive(self, number: int, frame: FrameType | None) -> None:
         del number, frame
         self._received = True
+        if self._ends_at_once:
+            os._exit(0)  # an exception would be swallowed by some module that is being imported
+
+    @contextmanager
+    def ending_at_once(self) -> Iterator[None]:
+        """Let a signal end the process there and then: nothing is open yet."""
+        self._ends_at_once = True
+        try:
+            yield
+        finally:
+            self._ends_at_once = False
 
 
 class RunnableNode(Protocol):
@@ -57,28 +72,39 @@ class RunnableNode(Protocol):
         """Leave the graph."""
 
 
-def run_node(make_node: Callable[[], RunnableNode]) -> int:
-    """Make a node and run it between rclpy's start and end; returns the process's exit code.
+def run_node(load: Callable[[], Callable[[], RunnableNode]]) -> int:
+    """Run a node between rclpy's start and end; returns the process's exit code.
 
     rclpy's own signal handlers would end the context under a loop that still has something to
     publish or to write, so the node is handed a `StopSignal` instead.
+
+    Args:
+        load: Imports what the node needs, and gives what makes it.
     """
     stop = StopSignal()
+    node, code = None, 0
     try:
-        _start_ros()
+        with stop.ending_at_once():
+            _start_ros()
+            make_node = load()
         node = make_node()
-        try:
-            node.run(stop)
-        finally:
-            node.destroy_node()
+        node.run(stop)
     except ActuatedCharactersError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
-        return EXIT_ERROR
+        code = EXIT_ERROR
     finally:
-        import rclpy
+        _leave(node, code)
+    return code
 
-        rclpy.try_shutdown()
-    return 0
+
+def _leave(node: RunnableNode | None, code: int) -> None:
+    import rclpy
+
+    sys.stdout.flush()
+    exit_after(_LEAVE_TIME, code)
+    if node is not None:
+        node.destroy_node()
+    rclpy.try_shutdown()
 
 
 def _start_ros() -> None:

@@ -13,6 +13,8 @@ from msgs_config.arrays import FloatArray
 IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
 _TINY = 1e-150  # keeps 0 / 0 away; the product with a vector of length zero is zero all the same
 
+_SMALL = 1e-2  # rad
+
 
 def _product_table() -> FloatArray:
     """The table (4, 4, 4): of a's component, b's component, and the Hamilton product's."""
@@ -95,6 +97,26 @@ def log(q_xyzw: FloatArray) -> FloatArray:
     sine = _length(axis)
     angle = 2.0 * np.arctan2(sine, np.abs(w))
     return axis * np.copysign(angle / np.maximum(sine, _TINY), w)
+
+
+def right_jacobian_inverse(rotation_vector: FloatArray) -> FloatArray:
+    """Matrices (..., 3, 3) that turn an angular velocity into the rate of a rotation vector.
+
+    The angular velocity is in the child frame; vectors (..., 3) in rad, of norm below 2 pi. With
+    `K v = r x v` and angle a it is `1 + K/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) K^2`.
+
+    Source: Solà, Deray and Atchuthan 2018, equation 144.
+    """
+    angle = _length(rotation_vector)[..., np.newaxis]
+    half = np.maximum(0.5 * angle, 0.5 * _SMALL)
+    closed = (1.0 - half / np.tan(half)) / (4.0 * half * half)
+    series = 1.0 / 12.0 + angle * angle / 720.0  # where the closed form would lose its digits
+    cross = np.einsum("...i,ijk->...kj", rotation_vector, _PRODUCT[:3, :3, :3])
+    squared = np.einsum("...ij,...jk->...ik", cross, cross)
+    inverse: FloatArray = (
+        np.eye(3) + 0.5 * cross + np.where(angle < _SMALL, series, closed) * squared
+    )
+    return inverse
 
 
 def normalised(q_xyzw: FloatArray) -> FloatArray:

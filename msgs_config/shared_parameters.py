@@ -1,11 +1,37 @@
 """The parameters that simulator and controller have in common, and must agree on."""
 
+from collections.abc import Mapping
+
+from msgs_config.character import Character, Placement
+from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Parameter
 
 DEFAULT_CHARACTER = "humanoid"
 
 CHARACTER = Parameter(
-    "character", DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml file"
+    "character", DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml or .urdf file"
 )
 RATE = Parameter("rate", 240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000)
 GRAVITY = Parameter("gravity", 9.81, "gravity along -z", unit="m/s^2", maximum=1000.0)
+PLACEMENT = Parameter(
+    "placement",
+    [0.0, 0.0, 0.0, 0.0],
+    "where the character's own world stands: x, y, z, and its turn about z",
+    unit="m, m, m, rad",
+    minimum=-1e12,
+)
+
+
+def placed(character: Character, given: Mapping[str, object]) -> Character:
+    """The character as loaded, where the parameters given say that it stands.
+
+    Raises:
+        ConfigurationError: the placement is not four numbers.
+    """
+    placement = PLACEMENT.checked(given.get(PLACEMENT.name, PLACEMENT.default))
+    if not isinstance(placement, list) or len(placement) != 4:
+        raise ConfigurationError(
+            f"parameter '{PLACEMENT.name}' is {placement}; it must be four numbers: "
+            "x, y, z in m and the turn about z in rad"
+        )
+    return character.placed(Placement(*(float(number) for number in placement)))

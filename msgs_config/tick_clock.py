@@ -35,10 +35,14 @@ class TickClock:
         Raises:
             ClockError: the stamp is none of this clock's; the sender runs at another rate.
         """
-        tick = -(-stamp_ns * self.rate_hz // NANOSECONDS_PER_SECOND)
+        tick = self.first_tick_from(stamp_ns)
         if self.stamp_ns(tick) != stamp_ns:
             raise ClockError(
                 f"stamp {stamp_ns} ns is no tick at {self.rate_hz} Hz; "
                 "simulator and controller must have the same parameter 'rate'"
             )
         return tick
+
+    def first_tick_from(self, stamp_ns: int) -> int:
+        """The first tick whose stamp is a time in ns or later."""
+        return -(-stamp_ns * self.rate_hz // NANOSECONDS_PER_SECOND)

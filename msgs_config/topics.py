@@ -3,12 +3,15 @@
 from dataclasses import dataclass, replace
 
 from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import Header, String
+from visualization_msgs.msg import MarkerArray
 
 _DEEP_HISTORY = 5000
 """With a small history a recorder that pauses for a moment loses messages."""
@@ -26,6 +29,13 @@ LATCHED_QOS = QoSProfile(
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 
+DISPLAY_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
+
 
 @dataclass(frozen=True)
 class Topic:
@@ -39,14 +49,30 @@ class Topic:
         """The topic as another node names it: `~` is the node that publishes it."""
         return replace(self, name=self.name.replace("~", node_name))
 
+    def under(self, namespace: str) -> "Topic":
+        """The topic below a namespace; with an empty one it is the topic itself."""
+        return replace(self, name=f"{namespace}/{self.name}") if namespace else self
+
 
 def create_publisher(node: Node, topic: Topic) -> Publisher:
     """A node's publisher on a topic of the contract."""
-    return node.create_publisher(topic.message_type, topic.name, topic.qos)
+    return node.create_publisher(
+        topic.message_type,
+        topic.name,
+        topic.qos,
+        # each default callback is one thing more that the executor looks at in each turn
+        event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+    )
 
 
 JOINT_STATES = Topic("joint_states", JointState, STREAM_QOS)
 JOINT_TORQUES = Topic("joint_torques", JointState, STREAM_QOS)
+EXTERNAL_WRENCH = Topic("external_wrench", MultiDOFJointState, STREAM_QOS)
+APPLIED_WRENCH = Topic("applied_wrench", MultiDOFJointState, STREAM_QOS)
+CONTACTS = Topic("contacts", MultiDOFJointState, STREAM_QOS)
+ODOM = Topic("odom", Odometry, STREAM_QOS)
+ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED_QOS)
+VISUALIZATION = Topic("visualization", MarkerArray, DISPLAY_QOS)
 REFERENCE = Topic("~/reference", JointState, STREAM_QOS)
 CLOCK = Topic("/clock", Clock, STREAM_QOS)
 EPISODE = Topic("episode", Header, LATCHED_QOS)

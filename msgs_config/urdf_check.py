@@ -1,53 +1,149 @@
 """A URDF is one tree of links, checked before it is loaded: a broken one can crash the engine."""
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
+from msgs_config import files
 from msgs_config.errors import CharacterError
 
-_TYPES = ("revolute", "continuous", "prismatic", "spherical", "fixed")
+MAX_JOINTS = 127
+MAX_POSITION_ENTRIES = 128  # beyond them PyBullet reads states as empty, without an error
+MAX_NAME_BYTES = 255
+
+_WITH_AXIS = ("revolute", "continuous", "prismatic")
+_TYPES = (*_WITH_AXIS, "spherical", "fixed")
+_LARGEST = 1e30  # the engine's single precision ends at 3e38
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_ANY, _POSITIVE = -_LARGEST, 0.0
+_NUMBERS = {  # by element and attribute: how many, and the least that they may be
+    "origin": {"xyz": (3, _ANY), "rpy": (3, _ANY)},
+    "axis": {"xyz": (3, _ANY)},
+    "mass": {"value": (1, _POSITIVE)},
+    "inertia": {
+        **dict.fromkeys(("ixx", "iyy", "izz"), (1, _POSITIVE)),
+        **dict.fromkeys(("ixy", "ixz", "iyz"), (1, _ANY)),
+    },
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), (1, _ANY)),
+    "dynamics": dict.fromkeys(("damping", "friction"), (1, _ANY)),
+    "box": {"size": (3, _POSITIVE)},
+    "sphere": {"radius": (1, _POSITIVE)},
+    "cylinder": {"radius": (1, _POSITIVE), "length": (1, _POSITIVE)},
+    "capsule": {"radius": (1, _POSITIVE), "length": (1, _POSITIVE)},
+    "mesh": {"scale": (3, _ANY)},
+    "plane": {"normal": (3, _ANY)},
+    "color": {"rgba": (4, _ANY)},
+    **{
+        name: {"value": (1, _ANY)}
+        for name in (
+            "lateral_friction",
+            "rolling_friction",
+            "spinning_friction",
+            "restitution",
+            "stiffness",
+            "damping",
+            "contact_cfm",
+            "contact_erp",
+            "inertia_scaling",
+        )
+    },
+}
 
 
-def check_urdf(path: Path, text: str) -> None:
-    """Check that names are unique and that the joints make one tree of all links.
+def check_urdf(path: Path, text: str) -> ElementTree.Element:
+    """Parse a URDF and check all of it that the engine takes for granted; returns its root.
+
+    Names are unique, the joints make one tree of all links that is not too large for the engine,
+    and what should be a number is one.
 
     Raises:
-        CharacterError: they do not; names the file and the link or joint.
+        CharacterError: it is not so; names the file and the link or joint.
     """
-    try:
-        robot = _parse(text)
-    except ElementTree.ParseError as error:
-        raise CharacterError(f"{path}: not valid XML: {error}") from error
-    links = [link.get("name", "") for link in robot.findall("link")]
-    joints = robot.findall("joint")
+    robot = files.parse_xml(path, text, CharacterError)
+    links, joints = robot.findall("link"), robot.findall("joint")
+    names = [link.get("name", "") for link in links]
     ends = [(_end(joint, "parent"), _end(joint, "child")) for joint in joints]
-    _check_unique(path, "links are named", links)
+    for element in links + joints:
+        _check_name(path, element)
+    _check_unique(path, "links are named", names)
     _check_unique(path, "joints are named", [joint.get("name", "") for joint in joints])
     _check_unique(path, "joints lead to", [child for _, child in ends])
     for joint in joints:
-        if joint.get("type") not in _TYPES:
-            raise CharacterError(
-                f"{path}: joint {joint.get('name')!r} is of type {joint.get('type')!r}; "
-                "it must be revolute, continuous, prismatic, spherical or fixed"
-            )
-        if joint.get("type") in ("revolute", "prismatic") and joint.find("limit") is None:
-            raise CharacterError(
-                f"{path}: joint {joint.get('name')!r} is {joint.get('type')} and has no <limit>"
-            )
-    for name in {name for pair in ends for name in pair} - set(links):
+        _check_joint(path, joint)
+    for name in sorted({name for pair in ends for name in pair} - set(names)):
         raise CharacterError(f"{path}: a joint names the link {name!r}, which does not exist")
-    _check_tree(path, links, ends)
+    _check_tree(path, names, ends)
+    _check_size(path, joints)
+    for element in [*links, *joints, *robot.findall("material")]:
+        _check_numbers(path, element)
+    return robot
 
 
-def links_without_inertial(text: str) -> set[str]:
-    """Names of the links to which a URDF, checked before, gives no mass."""
-    links = _parse(text).findall("link")
+def links_without_inertial(robot: ElementTree.Element) -> set[str]:
+    """Names of the links to which a URDF gives no mass."""
+    links = robot.findall("link")
     return {link.get("name", "") for link in links if link.find("inertial") is None}
 
 
-def _parse(text: str) -> ElementTree.Element:
-    return ElementTree.fromstring(text.strip("\0 \t\r\n"))  # PyBullet's own end in a NUL
+def has_world_base(robot: ElementTree.Element) -> bool:
+    """Whether the base link is called `world` and has no mass: ROS' sign of a fixed base."""
+    children = {_end(joint, "child") for joint in robot.findall("joint")}
+    return "world" in links_without_inertial(robot) - children
+
+
+def _check_name(path: Path, element: ElementTree.Element) -> None:
+    name = element.get("name", "")
+    if not name or len(name.encode()) > MAX_NAME_BYTES or not name.isprintable():
+        raise CharacterError(
+            f"{path}: a {element.tag} is named {name[:MAX_NAME_BYTES]!r}; a name must have 1 to "
+            f"{MAX_NAME_BYTES} bytes, all printable"
+        )
+
+
+def _check_joint(path: Path, joint: ElementTree.Element) -> None:
+    name, kind = joint.get("name"), joint.get("type")
+    if kind not in _TYPES:
+        raise CharacterError(
+            f"{path}: joint {name!r} is of type {kind!r}; "
+            "it must be revolute, continuous, prismatic, spherical or fixed"
+        )
+    if kind in ("revolute", "prismatic") and joint.find("limit") is None:
+        raise CharacterError(f"{path}: joint {name!r} is {kind} and has no <limit>")
+
+
+def _check_size(path: Path, joints: list[ElementTree.Element]) -> None:
+    widths = {"spherical": 4, "fixed": 0}  # of a position in the engine, a quaternion for a ball
+    entries = 7 + sum(widths.get(joint.get("type", ""), 1) for joint in joints)
+    if len(joints) > MAX_JOINTS or entries > MAX_POSITION_ENTRIES:
+        raise CharacterError(
+            f"{path}: too large for the engine: {len(joints)} joints and {entries} positions (7 of "
+            "the base, 4 of each ball joint, 1 of each hinge or slider); it can hold "
+            f"{MAX_JOINTS} and {MAX_POSITION_ENTRIES}"
+        )
+
+
+def _check_numbers(path: Path, part: ElementTree.Element) -> None:
+    for element in part.iter():
+        for attribute, (count, minimum) in _NUMBERS.get(element.tag, {}).items():
+            text = element.get(attribute)
+            if text is not None and not _are_numbers(text, count, minimum):
+                bound = f" of at least {minimum:g}" if minimum > -_LARGEST else ""
+                raise CharacterError(
+                    f"{path}: {part.tag} {part.get('name')!r}: {attribute} of <{element.tag}> is "
+                    f"{text[:100]!r}; it must be {count} finite number{'s' * (count > 1)}{bound}"
+                )
+    axis = part.find("axis") if part.get("type") in _WITH_AXIS else None
+    if axis is not None and not any(float(number) for number in axis.get("xyz", "1").split()):
+        raise CharacterError(f"{path}: joint {part.get('name')!r} has an axis of length zero")
+
+
+def _are_numbers(text: str, count: int, minimum: float) -> bool:
+    # the engine takes what C does: no `_`, `nan` or `inf`, and nothing that is no number
+    pieces = text.split()
+    return len(pieces) == count and all(
+        _NUMBER.fullmatch(piece) and minimum <= float(piece) <= _LARGEST for piece in pieces
+    )
 
 
 def _end(joint: ElementTree.Element, which: str) -> str:

@@ -16,6 +16,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.bullet import load_urdf, pybullet
 from msgs_config.character import Character
 from msgs_config.joint_layout import JointType
+from sim_node.links import Links
 
 _UNLIMITED_SPEED = 1e9  # Bullet clamps at 100 otherwise, and a divergence would stay unseen
 
@@ -45,7 +46,8 @@ class Body:
             pybullet.getJointInfo(self._body, i, physicsClientId=self._client) for i in range(count)
         ]
         numbers = {info[1].decode(): info[0] for info in infos}
-        self._links = [-1, *numbers.values()]
+        in_order = [-1, *(numbers[link.joint.name] for link in character.links[1:])]
+        self.links = Links(self._client, self._body, character, in_order)
         joints = [j for j in self._layout.joints if j.type is not JointType.FLOATING]
         self._joint_start = self._layout.size - sum(len(j.dof_names) for j in joints)
         self._joints = [numbers[joint.name] for joint in joints]
@@ -73,7 +75,7 @@ class Body:
             {"lateralFriction": friction},
             {"maxJointVelocity": _UNLIMITED_SPEED},
         )
-        for link in self._links:
+        for link in range(-1, pybullet.getNumJoints(self._body, physicsClientId=self._client)):
             for setting in settings:
                 pybullet.changeDynamics(self._body, link, **setting, physicsClientId=self._client)
         for index in self._joints:

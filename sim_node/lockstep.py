@@ -5,12 +5,15 @@ No ROS and no engine in here: a state machine over stamps, names and numbers.
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import CommandError
+
+_REMEMBERED = 1000  # ticks
 
 
 class Verdict(Enum):
@@ -19,22 +22,38 @@ class Verdict(Enum):
     ACCEPTED = "accepted"
     DUPLICATE = "duplicate"  # repeats what it has already
     CONFLICT = "conflict"  # differs from what it has already; nothing of it is taken
-    STALE = "stale"  # answers an earlier state
+    STALE = "stale"  # answers an earlier state, and comes too late
     FUTURE = "future"  # answers a state that was never published
     REJECTED = "rejected"  # malformed; nothing of it is taken
+
+
+@dataclass
+class _Tick:
+    """What was commanded at one tick."""
+
+    given: BoolArray  # (n,)
+    effort: FloatArray  # (n,)
+
+    def conflict(self, indices: IntArray, effort: FloatArray) -> IntArray:
+        """Those of the entries that have another command already."""
+        conflicting: IntArray = indices[self.given[indices] & (self.effort[indices] != effort)]
+        return conflicting
 
 
 class LockstepBarrier:
     """Collects the commands that answer one state, until they cover all required entries.
 
     `required` (n,) is both what must be commanded and what may be. Several senders may share it.
+    The ticks before are remembered for a while: a second sender of the same entries that is a
+    little slower than the first is one too many, and not only late.
     """
 
     def __init__(self, dof_names: Sequence[str], required: BoolArray) -> None:
         self._dof_names = tuple(dof_names)
         self._required = required
-        self._given = np.zeros_like(required)
-        self._effort = np.zeros(len(required))
+        self._past: dict[int, _Tick] = {}  # by stamp, the oldest first
+        self._tick = self._empty()
+        self._filled = np.zeros_like(self._required)  # (n,) what nobody commanded
         self._missing = int(required.sum())
         self.stamp_ns = 0
         self.conflict: str | None = None  # the first entry of the last conflict
@@ -42,11 +61,24 @@ class LockstepBarrier:
 
     def open(self, stamp_ns: int) -> None:
         """Begin to wait for the commands that answer the state of this stamp."""
+        if stamp_ns != self.stamp_ns:
+            self._tick.given &= ~self._filled
+            self._past[self.stamp_ns] = self._tick
+            if len(self._past) > _REMEMBERED:
+                del self._past[next(iter(self._past))]
         self.stamp_ns = stamp_ns
         self.conflict = None
-        self._given[:] = False
-        self._effort = np.zeros(len(self._required))
+        self._tick = self._empty()
+        self._filled = np.zeros_like(self._required)  # (n,) what nobody commanded
         self._missing = int(self._required.sum())
+
+    def clear(self) -> None:
+        """Forget the commands of the episode before."""
+        self._tick = self._empty()
+        self._past.clear()
+
+    def _empty(self) -> _Tick:
+        return _Tick(np.zeros_like(self._required), np.zeros(len(self._required)))
 
     @property
     def complete(self) -> bool:
@@ -56,12 +88,12 @@ class LockstepBarrier:
     @property
     def effort(self) -> FloatArray:
         """The effort (n,) collected so far; zero where nothing was commanded."""
-        return self._effort
+        return self._tick.effort
 
     @property
     def missing(self) -> list[str]:
         """Names of the required entries that still lack a command."""
-        lacking = self._required & ~self._given
+        lacking = self._required & ~self._tick.given
         return [name for name, lacks in zip(self._dof_names, lacking, strict=True) if lacks]
 
     def offer(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> Verdict:
@@ -71,13 +103,13 @@ class LockstepBarrier:
             CommandError: the lengths differ, a number is not finite, or an entry may not be
                 commanded; nothing of the command is taken.
         """
-        self._check(indices, effort)
+        check_command(self._dof_names, self._required, indices, effort)
         verdict = self._judge(stamp_ns, indices, effort)
         self.counts[verdict] += 1
         if verdict is Verdict.ACCEPTED:
-            self._effort[indices] = effort
-            self._given[indices] = True
-            self._missing = int((self._required & ~self._given).sum())
+            self._tick.effort[indices] = effort
+            self._tick.given[indices] = True
+            self._missing = int((self._required & ~self._tick.given).sum())
         return verdict
 
     def count_rejected(self) -> None:
@@ -86,33 +118,42 @@ class LockstepBarrier:
 
     def fill_missing(self, effort: FloatArray) -> None:
         """Complete the tick with the entries of `effort` (n,) wherever a command is missing."""
-        lacking = self._required & ~self._given
-        self._effort[lacking] = effort[lacking]
-        self._given |= lacking
+        self._filled = self._required & ~self._tick.given
+        self._tick.effort[self._filled] = effort[self._filled]
+        self._tick.given |= self._filled
         self._missing = 0
 
     def _judge(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> Verdict:
-        if stamp_ns != self.stamp_ns:
-            return Verdict.STALE if stamp_ns < self.stamp_ns else Verdict.FUTURE
-        already = self._given[indices]
-        if not already.any():
-            return Verdict.ACCEPTED
-        differs = already & (self._effort[indices] != effort)
-        if differs.any():
-            self.conflict = self._dof_names[indices[int(np.argmax(differs))]]
+        if stamp_ns > self.stamp_ns:
+            return Verdict.FUTURE
+        tick = self._tick if stamp_ns == self.stamp_ns else self._past.get(stamp_ns)
+        if tick is None:
+            return Verdict.STALE
+        conflict = tick.conflict(indices, effort)
+        if len(conflict):
+            self.conflict = self._dof_names[conflict[0]]
             return Verdict.CONFLICT
-        return Verdict.DUPLICATE if already.all() else Verdict.ACCEPTED
+        if tick is not self._tick:
+            return Verdict.STALE
+        return Verdict.DUPLICATE if tick.given[indices].all() else Verdict.ACCEPTED
 
-    def _check(self, indices: IntArray, effort: FloatArray) -> None:
-        if len(indices) != len(effort):
-            raise CommandError(f"{len(indices)} names but {len(effort)} efforts")
-        if len(indices) == 0:
-            raise CommandError("an empty command")
-        if not np.isfinite(effort).all():
-            worst = int(np.argmin(np.isfinite(effort)))
-            name = self._dof_names[indices[worst]]
-            raise CommandError(f"effort of '{name}' is {effort[worst]}; it must be finite")
-        if not self._required[indices].all():
-            name = self._dof_names[indices[int(np.argmin(self._required[indices]))]]
-            hint = "; root_assistance of controller_node is on" if name.startswith("root_") else ""
-            raise CommandError(f"'{name}' is not among the commanded joints{hint}")
+
+def check_command(
+    dof_names: Sequence[str], allowed: BoolArray, indices: IntArray, effort: FloatArray
+) -> None:
+    """Raise CommandError unless a command is whole, finite, and for entries that may be commanded.
+
+    `effort` (m,) is for the entries `indices` (m,); `allowed` is (n,).
+    """
+    if len(indices) != len(effort):
+        raise CommandError(f"{len(indices)} names but {len(effort)} efforts")
+    if len(indices) == 0:
+        raise CommandError("an empty command")
+    if not np.isfinite(effort).all():
+        worst = int(np.argmin(np.isfinite(effort)))
+        name = dof_names[indices[worst]]
+        raise CommandError(f"effort of '{name}' is {effort[worst]}; it must be finite")
+    if not allowed[indices].all():
+        name = dof_names[indices[int(np.argmin(allowed[indices]))]]
+        hint = "; root_assistance of controller_node is on" if name.startswith("root_") else ""
+        raise CommandError(f"'{name}' is not among the commanded joints{hint}")

@@ -1,75 +1,78 @@
-"""`sim_node`: the simulation at one end of the topics, in lockstep with whoever commands it."""
+"""`sim_node`: the simulation at one end of the topics, with whoever commands it at the other."""
 
 import time
 
 import numpy as np
 from rclpy.node import Node
-from std_srvs.srv import SetBool
 
-from msgs_config import configuration, topics
-from msgs_config.character_loading import load_character
-from msgs_config.diagnostics import DiagnosticsPublisher
-from msgs_config.errors import CommandError, LayoutError, MessageError, SimulationError
-from msgs_config.messages import JointStateDecoder
-from msgs_config.node_parameters import declare, given_parameters
-from msgs_config.parameters import resolve
-from msgs_config.polling import DirectSubscription, Spinner
+from msgs_config import topics
+from msgs_config.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
+from msgs_config.errors import SimulationError
+from msgs_config.messages import encode_clock
+from msgs_config.node_parameters import LiveParameters, declare, given_parameters
+from msgs_config.parameters import Values
+from msgs_config.polling import Spinner
 from msgs_config.process import StopSignal
-from msgs_config.shared_parameters import DEFAULT_CHARACTER
-from msgs_config.warnings import Warnings
 from sim_node.lockstep import LockstepBarrier, Verdict
-from sim_node.outputs import Outputs
-from sim_node.parameters import PARAMETERS, character_parameters, make_settings
+from sim_node.pace import Pace
+from sim_node.parameters import (
+    command_timeout_ns,
+    is_realtime,
+    make_cast,
+    make_role,
+    make_settings,
+    push_ticks,
+    tick_period,
+)
 from sim_node.patience import Due, Patience
+from sim_node.port import Port, open_ports
+from sim_node.realtime import CommandHold
+from sim_node.report import report
+from sim_node.run_control import RunControl
+from sim_node.services import Services
 from sim_node.simulation import FIRST_TICK, Simulation
 from sim_node.tick_times import TickTimes
 from sim_node.waiting import describe_waiting, publisher_names
 
 _EXPLAIN_AFTER = 2.0  # s without a complete command before the node says what is missing
-_DIAGNOSTICS_PERIOD = 1.0  # s of wall time
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
 _STOP_FLUSH_TIME = 0.5  # s, after a signal or an error
+_MOST_COMMANDS = 1000  # that are taken in a row in real time, lest a flood stop the world
 
 
 class SimNode(Node):
-    """Publishes the state of each tick; goes on when every commanded joint has its answer."""
+    """Publishes the states of each tick; goes on when they are answered, or when it is time."""
 
     def __init__(self) -> None:
         """Read the parameters, build the world, and offer the topics.
 
         Raises:
-            ActuatedCharactersError: a parameter or the character cannot be used.
+            ActuatedCharactersError: a parameter or a character cannot be used.
         """
         super().__init__(topics.SIM_NODE)
-        given = given_parameters(self)
-        character = load_character(str(given.get("character", DEFAULT_CHARACTER)))
-        parameters = PARAMETERS + character_parameters(character)
-        values = resolve(parameters, given)
-        self._simulation = Simulation(character, make_settings(values))
-        declare(self, parameters, values)
-        self._values = values
+        cast = make_cast(given_parameters(self))
+        values = self._values = cast.values
+        self._realtime = is_realtime(values)
+        roles = [make_role(part.character, part.values, part.name) for part in cast.parts]
+        self._simulation = Simulation(roles, make_settings(values))
+        declare(self, cast.declared, values)
+        self._ports = open_ports(self, cast, self._simulation)
+        self._clock_topic = topics.create_publisher(self, topics.CLOCK)
         self._max_ticks = values.integer("max_ticks")
-        self._barrier = LockstepBarrier(character.layout.dof_names, self._simulation.commanded)
         self._patience = Patience(
             republish_period=values.number("republish_period"),
             explain_after=_EXPLAIN_AFTER,
             timeout=values.number("lockstep_timeout"),
         )
-        self._decoder = JointStateDecoder()
-        self._commands = DirectSubscription(self, topics.JOINT_TORQUES)
-        self._outputs = Outputs(self, character.layout)
-        self._outputs.publish_configuration(configuration.describe(character, values))
+        self._pace = Pace(tick_period(values))
         self._diagnostics = DiagnosticsPublisher(self)
         self._next_diagnostics = 0.0
-        self.create_service(SetBool, "~/pause", self._on_pause)
-        self._paused = False
-        self._fault: str | None = None
-        self._diverged = False
-        self._last_effort = self._barrier.effort
         self._timeouts = 0
         self._tick_times = TickTimes()
-        self._warnings = Warnings(self)
         self._begun = False
+        self._control = RunControl()
+        self._run_services = Services(self, self._control, self._resume, self._reset)
+        LiveParameters(self, cast.declared, values, self._take_parameters)
 
     def run(self, stop: StopSignal) -> None:
         """Simulate until `max_ticks`, or until `stop`.
@@ -80,11 +83,11 @@ class SimNode(Node):
         spinner = Spinner(self)
         try:
             self._wait_for_subscribers(stop, spinner)
-            self._outputs.publish_episode(1, self._simulation.state.stamp_ns)
-            self._begin_tick()
+            self._begin_episode()
             while not stop and not self._finished:
                 self._turn(spinner)
         finally:
+            self._run_services.end(spinner)
             self._flush(_FLUSH_TIME if self._finished else _STOP_FLUSH_TIME)
             spinner.close()
             self._simulation.close()
@@ -92,137 +95,202 @@ class SimNode(Node):
     @property
     def _finished(self) -> bool:
         ticks = self._simulation.tick - FIRST_TICK
-        return not self._diverged and 0 < self._max_ticks <= ticks
+        return not self._control.is_stuck and 0 < self._max_ticks <= ticks
+
+    @property
+    def _complete(self) -> bool:
+        return all(port.collector.complete for port in self._ports)
+
+    @property
+    def _missing(self) -> list[str]:
+        return [name for port in self._ports for name in port.missing]
 
     def _wait_for_subscribers(self, stop: StopSignal, spinner: Spinner) -> None:
         wanted = self._values.integer("wait_for_subscribers")
         self._patience.restart(time.monotonic())
-        while not stop and (found := self._outputs.state_subscribers) < wanted:
+        while not stop and (found := self._fewest_subscribers) < wanted:
             spinner.rest()
             if Due.EXPLAIN in self._patience.due(time.monotonic()):
                 sentence = f"waiting for {wanted} subscribers of joint_states; there are {found}"
                 self.get_logger().warning(f"{sentence}; has one not started, or ended?")
 
+    @property
+    def _fewest_subscribers(self) -> int:
+        return min(port.outputs.state_subscribers for port in self._ports)
+
     def _turn(self, spinner: Spinner) -> None:
-        """Take a command or rest, and advance if the tick is complete."""
-        raw = self._commands.take()
-        if raw is None:
-            spinner.rest()
-        else:
+        """Take commands, and advance if the tick is complete and due; or rest."""
+        received = self._receive()
+        if received:
             spinner.received()
             spinner.serve()  # a flood of commands must not keep services waiting
-            self._take_command(raw)
-        if self._barrier.complete and not self._paused:
+        if not (self._control.runs and self._complete):
+            if not received:
+                spinner.rest()
+        elif wait := self._pace.wait(time.monotonic()):
+            spinner.rest_for(wait)
+        else:
             self._advance()  # before the clock: a command that came in time is no timeout
         self._look_at_the_clock()
+
+    def _receive(self) -> bool:
+        """Take one command a character, or all in real time; whether there was one."""
+        received = False
+        for port in self._ports:
+            for _ in range(_MOST_COMMANDS if self._realtime else 1):
+                verdict = port.take_command()
+                if verdict is None:
+                    break
+                received = True
+                if verdict is Verdict.CONFLICT:
+                    self._on_conflict(port)
+        return received
 
     def _flush(self, seconds: float) -> None:
         """Publish the last report, and wait until every subscriber has all that was published."""
         self._publish_diagnostics()
         deadline = time.monotonic() + seconds
-        flushed = self._outputs.flush(seconds)
-        if not (flushed and self._diagnostics.flush(deadline - time.monotonic())):
+        flushes = [port.outputs.flush for port in self._ports] + [self._diagnostics.flush]
+        flushed = [flush(max(deadline - time.monotonic(), 0.0)) for flush in flushes]
+        if not all(flushed):
             self.get_logger().warning("a subscriber has not acknowledged the last messages")
 
-    def _begin_tick(self) -> None:
+    def _begin_episode(self) -> None:
+        for port in self._ports:
+            port.outputs.publish_episode(self._simulation.episode, self._simulation.stamp_ns)
         self._begun = True
-        state = self._simulation.state
-        self._barrier.open(state.stamp_ns)
+        self._pace.restart(time.monotonic())
+        self._begin_tick()
+
+    def _begin_tick(self) -> None:
+        for port in self._ports:
+            port.open()
         self._patience.restart(time.monotonic())
-        self._outputs.publish_state(state)
+        self._clock_topic.publish(encode_clock(self._simulation.stamp_ns))
+        for port in self._ports:
+            port.outputs.publish_around(self._simulation.tick)
+        for port in self._ports:
+            port.outputs.publish_state()
 
     def _advance(self) -> None:
-        self._last_effort = self._barrier.effort
+        simulation = self._simulation
+        self._pace.tick(time.monotonic())
+        ticks = push_ticks(self._values)
+        pushes = [
+            port.take_pushes(simulation.clock, simulation.tick, ticks) for port in self._ports
+        ]
+        for port in self._ports:
+            port.last_effort = port.collector.effort
+        simulation.watches_contacts = any(port.outputs.wants_contacts for port in self._ports)
         try:
-            self._simulation.step(self._last_effort)
+            simulation.step([port.last_effort for port in self._ports], pushes)
         except SimulationError as error:
-            self._diverged = True
-            self._raise_fault(str(error))
+            self._raise_fault(str(error), stuck=True)
             return
         self._tick_times.tick()
         self._begin_tick()
+        if self._control.tick():
+            self._run_services.end_steps()
 
-    def _take_command(self, raw: bytes) -> None:
-        try:
-            command = self._decoder.decode(raw)
-            indices = self._simulation.layout.indices(command.names)
-            verdict = self._barrier.offer(command.stamp_ns, indices, command.effort)
-        except (MessageError, LayoutError, CommandError) as error:
-            self._barrier.count_rejected()
-            self._warnings.say_once(f"command rejected: {error}")
+    def _on_conflict(self, port: Port) -> None:
+        if self._control.paused and not self._control.runs:
             return
-        if verdict is Verdict.FUTURE or command.stamp_ns == 0:
-            self._warnings.say_once(
-                f"command dropped: it answers {command.stamp_ns} ns, the state is of "
-                f"{self._barrier.stamp_ns} ns; the stamp must be that of the state"
-            )
-        if verdict is Verdict.CONFLICT and not self._paused:
-            senders = ", ".join(publisher_names(self, topics.JOINT_TORQUES))
-            self._raise_fault(
-                f"two different commands for '{self._barrier.conflict}' at one tick; "
-                f"'{topics.JOINT_TORQUES.name}' is published by {senders}"
-            )
+        joint = f"{port.actor.role.prefix}{port.collector.conflict}"
+        if self._realtime and port.warnings.has_said(joint):
+            return  # finding out who publishes takes its time
+        senders = publisher_names(self, port.torques)
+        sentence = (
+            f"two different commands for '{joint}' at one tick; '{port.torques.name}' is "
+            f"published by {', '.join(senders)}"
+        )
+        if self._realtime:
+            port.warnings.say_once(f"{sentence}; the last one counts", kind=joint)
+        else:
+            self._raise_fault(sentence)
 
     def _look_at_the_clock(self) -> None:
         now = time.monotonic()
         if now >= self._next_diagnostics:
-            self._next_diagnostics = now + _DIAGNOSTICS_PERIOD
+            self._next_diagnostics = now + DIAGNOSTICS_PERIOD
             self._publish_diagnostics()
-        for due in [] if self._paused else self._patience.due(now):
+        for due in self._patience.due(now):
+            waits = self._control.runs and not self._complete
             if due is Due.REPUBLISH:
-                self._outputs.republish_state()
-            elif due is Due.EXPLAIN:
-                missing = self._barrier.missing
-                self.get_logger().warning(describe_waiting(self, topics.JOINT_TORQUES, missing))
-            elif self._simulation.tick > FIRST_TICK:  # before the first command it just waits
+                for port in self._ports:
+                    port.outputs.republish(with_state=waits)
+            elif waits and due is Due.EXPLAIN:
+                self.get_logger().warning(self._describe_waiting())
+            elif waits and self._simulation.tick > FIRST_TICK:  # before that it just waits
                 self._on_timeout()
+
+    def _describe_waiting(self) -> str:
+        port = next(port for port in self._ports if port.missing)
+        return describe_waiting(self, port.torques, self._missing)
 
     def _on_timeout(self) -> None:
         action = self._values.text("on_timeout")
-        sentence = describe_waiting(self, topics.JOINT_TORQUES, self._barrier.missing)
-        sentence = f"no command within {self._patience.timeout:g} s; {sentence}"
+        sentence = f"no command within {self._patience.timeout:g} s; {self._describe_waiting()}"
         if action == "abort":
-            self._fault = sentence
+            self._control.fault = sentence
             raise SimulationError(sentence)
         self.get_logger().warning(f"{sentence}; on_timeout: {action}")
         if action == "pause":
             self._pause(sentence)
-        else:
-            fill = self._last_effort if action == "hold" else np.zeros_like(self._last_effort)
-            self._barrier.fill_missing(fill)
-            self._timeouts += 1
+            return
+        self._timeouts += 1
+        for port in self._ports:
+            assert isinstance(port.collector, LockstepBarrier)  # real time has no missing commands
+            held = port.last_effort
+            port.collector.fill_missing(held if action == "hold" else np.zeros_like(held))
 
-    def _raise_fault(self, sentence: str) -> None:
-        self._fault = sentence
+    def _raise_fault(self, sentence: str, *, stuck: bool = False) -> None:
         if self._values.text("on_fault") == "abort":
+            self._control.pause(sentence, stuck=stuck)
             raise SimulationError(sentence)
         self.get_logger().error(f"{sentence}; paused")
-        self._pause(sentence)
+        self._pause(sentence, stuck=stuck)
 
-    def _pause(self, fault: str) -> None:
-        self._paused = True
-        self._fault = fault
+    def _pause(self, fault: str, *, stuck: bool = False) -> None:
+        self._control.pause(fault, stuck=stuck)
+        self._run_services.end_steps(fault)
         self._publish_diagnostics()
 
-    def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        if self._diverged and not request.data:
-            response.success, response.message = False, f"cannot go on: {self._fault}"
-            return response
-        resumes = self._paused and not request.data
-        self._paused = request.data
-        if resumes and self._begun:
-            self._fault = None
+    def _resume(self) -> None:
+        """Go on after a pause: what was collected before it is asked for again."""
+        if self._begun:
             self._tick_times.resume()
-            self._begin_tick()  # what was collected before the pause is asked for again
-        response.success, response.message = True, "paused" if self._paused else "running"
-        return response
+            self._pace.restart(time.monotonic())
+            self._begin_tick()
+
+    def _reset(self) -> None:
+        """Begin a new episode, now or when all who are waited for are there."""
+        self._simulation.reset()
+        for port in self._ports:
+            port.forget()
+        self._tick_times.resume()
+        if self._begun:
+            self._begin_episode()
+
+    def _take_parameters(self, values: Values) -> None:
+        """Take changed parameters, at this tick's boundary."""
+        self._values = values
+        if (period := tick_period(values)) != self._pace.period:
+            self._pace.change(period, time.monotonic())
+        for port in self._ports:
+            if isinstance(port.collector, CommandHold):
+                port.collector.timeout_ns = command_timeout_ns(values)
 
     def _publish_diagnostics(self) -> None:
         if not self._diagnostics.is_heard:
             return
-        counts = self._barrier.counts
-        values: dict[str, object] = {"tick": self._simulation.tick, "paused": self._paused}
-        values |= {verdict.value: counts[verdict] for verdict in Verdict}
-        values["timeouts"] = self._timeouts
-        values |= self._tick_times.summary()
-        self._diagnostics.publish(values, self._fault)
+        values: dict[str, object] = {
+            "tick": self._simulation.tick,
+            "episode": self._simulation.episode,
+            "paused": self._control.paused,
+            "timeouts": self._timeouts,
+        }
+        values |= self._tick_times.summary() | self._pace.summary()
+        for port in self._ports:
+            self._diagnostics.publish(
+                values | report(port), self._control.fault, below=port.actor.role.name
+            )

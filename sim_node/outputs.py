@@ -1,31 +1,55 @@
-"""What the simulator publishes, tick by tick, in the contract's order."""
+"""What the simulator publishes of one character, tick by tick."""
 
 from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from std_msgs.msg import Header, String
 
 from msgs_config import topics
-from msgs_config.joint_layout import JointLayout
-from msgs_config.messages import JointStateEncoder, encode_clock, split_stamp
-from msgs_config.stamped import StampedState
+from msgs_config.messages import JointStateEncoder, split_stamp
+from msgs_config.robot_description import robot_description
+from msgs_config.topics import Topic
+from msgs_config.wrench_messages import WrenchArrays, encode_wrenches, select
+from sim_node.actor import Actor
+from sim_node.display import Display
 
 
 class Outputs:
-    """The simulator's publishers. Within a tick the state comes last."""
+    """The publishers of one character. A topic that nobody listens to costs nothing."""
 
-    def __init__(self, node: Node, layout: JointLayout) -> None:
-        self._encoder = JointStateEncoder(layout.dof_names)
-        self._clock = topics.create_publisher(node, topics.CLOCK)
-        self._episode = topics.create_publisher(node, topics.EPISODE)
-        self._configuration = topics.create_publisher(node, topics.CONFIGURATION)
-        self._states = topics.create_publisher(node, topics.JOINT_STATES)
+    def __init__(self, node: Node, actor: Actor, display_ticks: int) -> None:
+        """Offer the topics, below the character's name; markers come every `display_ticks`."""
+        self._actor = actor
+        namespace = actor.role.name
+        self._display_ticks = display_ticks
+        self._encoder = JointStateEncoder(actor.layout.dof_names)
+        self._links = [link.name for link in actor.character.links]
+
+        def offer(topic: Topic) -> Publisher:
+            return topics.create_publisher(node, topic.under(namespace))
+
+        self._episode = offer(topics.EPISODE)
+        self._configuration = offer(topics.CONFIGURATION.of(node.get_name()))
+        self._states = offer(topics.JOINT_STATES)
+        self._contacts = offer(topics.CONTACTS)
+        self._wrenches = offer(topics.APPLIED_WRENCH)
+        self._display = Display(node, actor, namespace)
         self._last_state = b""
+        description = robot_description(actor.character)
+        if description is not None:
+            self._description = offer(topics.ROBOT_DESCRIPTION)
+            self._description.publish(String(data=description))
 
     @property
     def state_subscribers(self) -> int:
         """How many subscribe to the states."""
         return int(self._states.get_subscription_count())
+
+    @property
+    def wants_contacts(self) -> bool:
+        """Whether anybody listens to the contacts."""
+        return bool(self._contacts.get_subscription_count())
 
     def publish_configuration(self, text: str) -> None:
         """Publish the JSON text that a bag needs to repeat the run."""
@@ -37,20 +61,41 @@ class Outputs:
         stamp = Time(sec=seconds, nanosec=nanoseconds)
         self._episode.publish(Header(stamp=stamp, frame_id=str(number)))
 
-    def publish_state(self, state: StampedState) -> None:
-        """Publish a tick: the clock, then the state."""
+    def publish_around(self, tick: int) -> None:
+        """Publish all of a tick but its state, which comes last."""
+        actor, stamp_ns = self._actor, self._actor.state.stamp_ns
+        if actor.contacts is not None and self.wants_contacts:
+            touching = select(stamp_ns, self._links, actor.contacts.forces, actor.contacts.touching)
+            self._contacts.publish(encode_wrenches(touching))
+        if self._wrenches.get_subscription_count():
+            self._wrenches.publish(encode_wrenches(self._applied(stamp_ns)))
+        self._display.publish_base()
+        if tick % self._display_ticks == 0 or actor.state.effort is None:
+            self._display.publish_markers()
+
+    def publish_state(self) -> None:
+        """Publish the state of a tick."""
+        state = self._actor.state
         effort = () if state.effort is None else (state.effort,)
         self._last_state = self._encoder.encode(
             state.stamp_ns, state.position, state.velocity, *effort
         )
-        self._clock.publish(encode_clock(state.stamp_ns))
         self._states.publish(self._last_state)
 
-    def republish_state(self) -> None:
-        """Publish the last state again, the same bytes."""
-        self._states.publish(self._last_state)
+    def republish(self, *, with_state: bool) -> None:
+        """Publish the markers again, and the last state, the same bytes, for who joined late."""
+        self._display.publish_markers()
+        if with_state:
+            self._states.publish(self._last_state)
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has the last tick, at the most `seconds`; whether it has."""
-        streams = (self._clock, self._states)
-        return all(stream.wait_for_all_acked(Duration(seconds=seconds)) for stream in streams)
+        return bool(self._states.wait_for_all_acked(Duration(seconds=seconds)))
+
+    def _applied(self, stamp_ns: int) -> WrenchArrays:
+        return WrenchArrays.of_rows(
+            stamp_ns,
+            [self._links[push.link] for push in self._actor.pushes],
+            [push.wrench for push in self._actor.pushes],
+            [push.point for push in self._actor.pushes],
+        )

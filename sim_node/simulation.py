@@ -1,16 +1,13 @@
-"""The simulation of one character: apply an effort for one tick, read the next state. No ROS."""
+"""The simulation of characters in one world: efforts for one tick, then the next states. No ROS."""
 
-from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
-import numpy as np
-
-from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character import Character
-from msgs_config.errors import ConfigurationError, SimulationError
-from msgs_config.stamped import StampedState
+from msgs_config.arrays import FloatArray
 from msgs_config.tick_clock import TickClock
+from sim_node.actor import Actor, Role
+from sim_node.pushes import Push
 from sim_node.world import World, WorldSettings
 
 FIRST_TICK = 1
@@ -18,58 +15,40 @@ FIRST_TICK = 1
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """All that a simulation depends on, beside the character and the efforts."""
+    """All that a simulation depends on, beside its roles, the efforts and the pushes."""
 
     rate_hz: int
     substeps: int
-    gravity: float  # m/s^2, along -z
-    friction: float  # of the ground; a contact's is the product of both surfaces'
-    link_friction: float
-    solver_iterations: int
     speed_limit: float  # rad/s or m/s
     command_delay_ticks: int
-    commanded_joints: tuple[str, ...]
-    initial_position: tuple[float, ...]  # (n,)
-    initial_velocity: tuple[float, ...]  # (n,)
+    world: WorldSettings
 
 
 class Simulation:
-    """Forward dynamics in ticks: `(q, v, effort) -> next (q, v)`.
+    """Forward dynamics in ticks: `(q, v, effort) -> next (q, v)` of every actor.
 
     The effort is held over the tick and applied anew at each engine step: a force in the world
     stays so, a torque in a body's frame turns with the body.
     """
 
-    def __init__(self, character: Character, settings: SimulationSettings) -> None:
-        """Build the world and put the character into its initial state.
+    def __init__(self, roles: Sequence[Role], settings: SimulationSettings) -> None:
+        """Build the world and put the characters into their initial states.
 
         Raises:
-            ConfigurationError: an array or a name in the settings does not fit the character.
+            ConfigurationError: an array or a name in a role does not fit its character.
             LayoutError: a commanded joint does not exist.
+            CharacterError: the engine refuses a file.
         """
-        self.character = character
-        self.layout = character.layout
         self.settings = settings
         self.clock = TickClock(settings.rate_hz)
-        self.commanded: BoolArray = self.layout.mask(settings.commanded_joints)
-        self._limits = character.effort_limits()
-        position = self._initial("initial_position", settings.initial_position)
-        velocity = self._initial("initial_velocity", settings.initial_velocity)
-        self._world = World(
-            character,
-            WorldSettings(
-                step_s=1.0 / (settings.rate_hz * settings.substeps),
-                gravity=settings.gravity,
-                friction=settings.friction,
-                link_friction=settings.link_friction,
-                solver_iterations=settings.solver_iterations,
-            ),
+        self.actors = tuple(
+            Actor(role, delay_ticks=settings.command_delay_ticks, step_s=settings.world.step_s)
+            for role in roles
         )
-        self._world.body.set_state(position, velocity)
-        zero = np.zeros(self.layout.size)
-        self._delayed = deque([zero] * settings.command_delay_ticks)
         self.tick = FIRST_TICK
-        self.state = self._read(effort=None)
+        self.episode = 1
+        self.watches_contacts = False  # whether to find out what touches, which takes time
+        self._world = self._fresh_world()
 
     def __enter__(self) -> "Simulation":
         return self
@@ -86,42 +65,54 @@ class Simulation:
         """End the engine."""
         self._world.close()
 
-    def step(self, effort: FloatArray) -> StampedState:
-        """Advance one tick under an effort (n,), clipped to the character's limits.
+    @property
+    def stamp_ns(self) -> int:
+        """The stamp of the present states."""
+        return self.clock.stamp_ns(self.tick)
+
+    def step(
+        self, efforts: Sequence[FloatArray], pushes: Sequence[Sequence[Push]] | None = None
+    ) -> None:
+        """Advance one tick: for each actor an effort (n,), clipped to its limits, and its pushes.
 
         Raises:
-            SimulationError: the next state is not finite or faster than the speed limit; it
-                names the degree of freedom.
+            SimulationError: a next state is not finite or faster than the speed limit; it names
+                the degree of freedom.
         """
-        self._delayed.append(effort + 0.0)  # -0.0 becomes 0.0: a tick has one effort, to the bit
-        applied = self.layout.clipped(self._delayed.popleft(), self._limits)
-        for _ in range(self.settings.substeps):
-            self._world.body.apply(applied)
+        nothing: list[tuple[Push, ...]] = [()] * len(self.actors)
+        for actor, effort, its in zip(self.actors, efforts, pushes or nothing, strict=True):
+            actor.begin_tick(effort, its, self.watches_contacts)
+        substeps = self.settings.substeps
+        for substep in range(substeps):
+            for actor in self.actors:
+                actor.begin_substep(first=substep == 0)
             self._world.step()
+            if self.watches_contacts:
+                touched = self._world.touched_links()
+                for actor in self.actors:
+                    actor.add_contacts(touched, share=1.0 / substeps)
         self.tick += 1
-        self.state = self._read(applied)
-        self._check_divergence(self.state)
-        return self.state
+        for actor in self.actors:
+            actor.end_tick(self.stamp_ns)
+        for actor in self.actors:
+            actor.check_divergence(self.tick, self.settings.speed_limit)
 
-    def _read(self, effort: FloatArray | None) -> StampedState:
-        position, velocity = self._world.body.read()
-        return StampedState(self.clock.stamp_ns(self.tick), position, velocity, effort)
+    def reset(self) -> None:
+        """Begin a new episode in a new world, whose first states have the next tick's stamp.
 
-    def _initial(self, name: str, values: tuple[float, ...]) -> FloatArray:
-        if len(values) != self.layout.size:
-            raise ConfigurationError(
-                f"parameter '{name}' has {len(values)} entries; it must have {self.layout.size}: "
-                + ", ".join(self.layout.dof_names)
-            )
-        return np.array(values)
+        All that follows is what would follow in a fresh simulation, to the bit.
+        """
+        self._world.close()
+        self.tick += 1
+        self.episode += 1
+        self._world = self._fresh_world()
 
-    def _check_divergence(self, state: StampedState) -> None:
-        speed = np.abs(state.velocity)
-        sound = (speed <= self.settings.speed_limit) & np.isfinite(state.position)  # NaN is unsound
-        if not sound.all():
-            worst = int(np.argmin(sound))
-            raise SimulationError(
-                f"diverged at tick {self.tick}: '{self.layout.dof_names[worst]}' is at "
-                f"{state.position[worst]:.4g} with velocity {state.velocity[worst]:.4g}; "
-                f"the limit is {self.settings.speed_limit:g}"
-            )
+    def _fresh_world(self) -> World:
+        world = World(self.settings.world)
+        try:
+            for actor in self.actors:
+                actor.enter(world, self.stamp_ns)
+        except Exception:
+            world.close()
+            raise
+        return world

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from types import TracebackType
 
-from msgs_config.bullet import connect, pybullet
-from msgs_config.character import Character
+from msgs_config.bullet import connect, load_urdf, pybullet
+from msgs_config.character import Character, Loading
 from sim_node.body import Body
+from sim_node.contacts import TouchedLinks, read_contacts
 
 
 @dataclass(frozen=True)
@@ -17,18 +18,26 @@ class WorldSettings:
     friction: float = 0.9  # of the ground; a contact's is the product of both surfaces'
     link_friction: float = 0.5  # of every link
     solver_iterations: int = 10
+    ground: bool = True  # the plane z = 0
+    terrain: Loading | None = None  # what else lies there for ever
 
 
 class World:
-    """A plane ground and one character, in a private engine.
+    """The ground and the characters on it, in a private engine.
 
     `save` and `restore` keep the engine's contact caches, so that what follows a restored state
     is what followed the saved one, to the bit; setting positions and velocities alone is not.
     Restore right after a step: the engine keeps an effort that was applied but not stepped yet.
     """
 
-    def __init__(self, character: Character, settings: WorldSettings) -> None:
+    def __init__(self, settings: WorldSettings) -> None:
+        """Start the engine.
+
+        Raises:
+            CharacterError: the terrain cannot be loaded.
+        """
         self._client = connect()
+        self._link_friction = settings.link_friction
         pybullet.setGravity(0.0, 0.0, -settings.gravity, physicsClientId=self._client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=settings.step_s,
@@ -38,8 +47,12 @@ class World:
             enableFileCaching=0,
             physicsClientId=self._client,
         )
-        self._add_ground(settings.friction)
-        self.body = Body(self._client, character, settings.link_friction)
+        if settings.ground:
+            shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+            ground = pybullet.createMultiBody(0.0, shape, physicsClientId=self._client)
+            self._set_friction(ground, settings.friction)
+        if settings.terrain is not None:
+            self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
 
     def __enter__(self) -> "World":
         return self
@@ -56,9 +69,17 @@ class World:
         """End the engine; the world cannot be used any more."""
         pybullet.disconnect(self._client)
 
+    def add(self, character: Character) -> Body:
+        """Put a character into the world, at the pose of its URDF."""
+        return Body(self._client, character, self._link_friction)
+
     def step(self) -> None:
         """Advance by one engine step; efforts last one step and are to be applied anew."""
         pybullet.stepSimulation(physicsClientId=self._client)
+
+    def touched_links(self) -> TouchedLinks:
+        """What touched in the last step."""
+        return read_contacts(self._client)
 
     def save(self) -> int:
         """Keep the whole state in memory; returns its number for `restore`."""
@@ -68,7 +89,8 @@ class World:
         """Return to a saved state, exactly."""
         pybullet.restoreState(stateId=saved, physicsClientId=self._client)
 
-    def _add_ground(self, friction: float) -> None:
-        shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
-        ground = pybullet.createMultiBody(0.0, shape, physicsClientId=self._client)
-        pybullet.changeDynamics(ground, -1, lateralFriction=friction, physicsClientId=self._client)
+    def _set_friction(self, body: int, friction: float) -> None:
+        for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):
+            pybullet.changeDynamics(
+                body, link, lateralFriction=friction, physicsClientId=self._client
+            )

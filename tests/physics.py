@@ -4,7 +4,7 @@ What a test compares with is computed here anew, from what the engine says of ea
 frame: none of the conversions under test is used, save for quaternion products.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -23,15 +23,18 @@ from msgs_config.joint_layout import JointType
 from msgs_config.parameters import resolve
 from msgs_config.stamped import StampedReference, StampedState
 from sim_node import parameters as for_simulator
+from sim_node.actor import Role
 from sim_node.body import Body
-from sim_node.simulation import Simulation
+from sim_node.pushes import Push
+from sim_node.simulation import Simulation, SimulationSettings
 from sim_node.world import World, WorldSettings
 
 DATA = Path(__file__).parent / "data"
 TURNED_FRAMES = [str(path) for path in sorted(DATA.glob("turned_frames*.yaml"))]
 FLOATING_TURNED_FRAMES = str(DATA / "turned_frames.yaml")
 SIMPLE_BODIES = [str(DATA / "free_box.yaml"), str(DATA / "wheel.yaml")]
-EVERY_CHARACTER = [*shipped_characters(), *TURNED_FRAMES, *SIMPLE_BODIES]
+DAMPED = str(DATA / "damped.yaml")
+EVERY_CHARACTER = [*shipped_characters(), *TURNED_FRAMES, *SIMPLE_BODIES, DAMPED]
 FLOATING_CHARACTERS = ["humanoid", FLOATING_TURNED_FRAMES]
 
 INSTANT = 1e-7
@@ -95,7 +98,34 @@ def free_random_state(
     raise AssertionError("no state without contact was found")
 
 
-def acceleration(world: World, effort: FloatArray) -> FloatArray:
+class LoneWorld(World):
+    """A world of one character."""
+
+    def __init__(self, whole: Character, settings: WorldSettings) -> None:
+        super().__init__(settings)
+        self.body = self.add(whole)
+
+
+class LoneSimulation(Simulation):
+    """A simulation of one actor."""
+
+    def __init__(self, role: Role, settings: SimulationSettings) -> None:
+        super().__init__([role], settings)
+        (self.actor,) = self.actors
+        self.layout = self.actor.layout
+
+    @property
+    def state(self) -> StampedState:
+        """Its present state."""
+        return self.actor.state
+
+    def advance(self, effort: FloatArray, *pushes: Push) -> StampedState:
+        """Advance one tick; the next state."""
+        self.step([effort], [pushes])
+        return self.actor.state
+
+
+def acceleration(world: LoneWorld, effort: FloatArray) -> FloatArray:
     """What an effort does to the velocity (n,) in one instant; the world must step by INSTANT."""
     before = world.body.read()[1]
     advance(world, effort)
@@ -202,23 +232,33 @@ def momentum(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
     return np.asarray(linear), np.asarray(angular)
 
 
-def still_world(whole: Character, step_s: float = INSTANT) -> World:
+def still_world(whole: Character, step_s: float = INSTANT) -> LoneWorld:
     """A world without gravity."""
-    return World(whole, WorldSettings(step_s=step_s, gravity=0.0))
+    return LoneWorld(whole, WorldSettings(step_s=step_s, gravity=0.0))
 
 
-def advance(world: World, effort: FloatArray, steps: int = 1) -> None:
+def advance(world: LoneWorld, effort: FloatArray, steps: int = 1) -> None:
     """Apply an effort anew at each of some steps."""
     for _ in range(steps):
         world.body.apply(effort)
         world.step()
 
 
-def simulation(name: str, **given: object) -> Simulation:
+def simulation(name: str, **given: object) -> LoneSimulation:
     """A simulation with the parameters given, the others at their defaults."""
     whole = character(name)
     parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
-    return Simulation(whole, for_simulator.make_settings(resolve(parameters, given)))
+    values = resolve(parameters, given)
+    return LoneSimulation(
+        for_simulator.make_role(whole, values), for_simulator.make_settings(values)
+    )
+
+
+def joint_simulation(given: Mapping[str, object]) -> Simulation:
+    """A simulation of several characters, with the parameters given."""
+    cast = for_simulator.make_cast(given)
+    roles = [for_simulator.make_role(p.character, p.values, p.name) for p in cast.parts]
+    return Simulation(roles, for_simulator.make_settings(cast.values))
 
 
 def controller(name: str, **given: object) -> Controller:
@@ -233,7 +273,7 @@ def controller(name: str, **given: object) -> Controller:
 
 
 def run_together(
-    run: Simulation, driver: Controller, ticks: int
+    run: LoneSimulation, driver: Controller, ticks: int
 ) -> Iterator[tuple[StampedState, FloatArray, StampedReference]]:
     """Both sides in one process: each tick's state, the effort that answers it, the reference."""
     episode_ns = run.state.stamp_ns
@@ -241,4 +281,4 @@ def run_together(
         state = run.state
         effort, reference = driver.answer(state, episode_ns)
         yield state, effort, reference
-        run.step(effort)
+        run.advance(effort)

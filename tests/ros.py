@@ -15,7 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
+from geometry_msgs.msg import Transform, Vector3, Wrench
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.context import Context
@@ -25,8 +27,9 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
-from std_srvs.srv import SetBool
+from rclpy.task import Future
+from sensor_msgs.msg import JointState, MultiDOFJointState
+from std_srvs.srv import SetBool, Trigger
 
 from msgs_config import topics
 from msgs_config.joint_layout import ROOT
@@ -48,6 +51,7 @@ MODULES = {
     topics.RECORDER_NODE: "experiment.recorder_main",
 }
 _PR_SET_PDEATHSIG = 1  # prctl(2)
+_MIDDLEWARE_SAYS = "sequence size exceeds remaining buffer"
 
 
 def stamp_ns(message: Any) -> int:
@@ -118,6 +122,12 @@ class Process:
         """What it has written to its standard output so far."""
         return self._output.read_text(errors="replace")
 
+    @property
+    def peak_memory(self) -> float:
+        """The most memory that it has had at any time, MB."""
+        lines = Path(f"/proc/{self.pid}/status").read_text().splitlines()
+        return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024.0
+
     def send(self, number: signal.Signals) -> None:
         """Send it a signal."""
         self._process.send_signal(number)
@@ -146,6 +156,18 @@ def _be_killed_with_parent() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
+LOG_LINES = 220
+"""Of a node, however much it is told: a hundred for each kind of input."""
+
+
+def assert_quiet(process: Process) -> None:
+    """It has not said the same again and again, nor anything of endless length."""
+    lines = [line for line in process.stderr.splitlines() if line != _MIDDLEWARE_SAYS]
+    assert len(lines) < LOG_LINES
+    assert sum(map(len, lines)) < 200 * LOG_LINES
+    assert "Traceback" not in process.stderr
+
+
 class Processes:
     """Starts processes in a folder, and ends them all, the last one first."""
 
@@ -153,12 +175,14 @@ class Processes:
         self._folder = folder
         self._started: list[Process] = []
 
-    def node(self, name: str, **parameters: object) -> Process:
+    def node(self, name: str, namespace: str = "", **parameters: object) -> Process:
         """Start one of the package's nodes; a name's dots are written as double underscores."""
         given = {name.replace("__", "."): value for name, value in parameters.items()}
         file = self._folder / f"{len(self._started)}_{name}.yaml"
-        file.write_text(yaml.safe_dump({name: {"ros__parameters": given}}))
-        return self.python("-m", MODULES[name], "--ros-args", "--params-file", str(file))
+        file.write_text(yaml.safe_dump({f"/**/{name}": {"ros__parameters": given}}))
+        arguments = ["--ros-args", "--params-file", str(file)]
+        arguments += ["-r", f"__ns:=/{namespace}"] if namespace else []
+        return self.python("-m", MODULES[name], *arguments)
 
     def simulator(self, character: str = "pendulum", **parameters: object) -> Process:
         """Start `sim_node`."""
@@ -194,6 +218,7 @@ class Inbox:
 
     messages: list[Any]
     raw: list[bytes]
+    sent_ns: list[int]  # wall time
 
     def __len__(self) -> int:
         return len(self.messages)
@@ -202,6 +227,14 @@ class Inbox:
     def last(self) -> Any:
         """The newest message."""
         return self.messages[-1]
+
+    def ticks(self) -> list[int]:
+        """The ticks of the messages, at the default rate."""
+        return [tick_of(message) for message in self.messages]
+
+    def by_tick(self) -> dict[int, Any]:
+        """Each tick's message, at the default rate; one that came twice counts once."""
+        return {tick_of(message): message for message in self.messages}
 
 
 class Client:
@@ -219,10 +252,11 @@ class Client:
 
     def listen(self, topic: Topic, qos: QoSProfile | None = None) -> Inbox:
         """Subscribe to a topic."""
-        inbox = Inbox([], [])
+        inbox = Inbox([], [], [])
 
-        def keep(raw: bytes) -> None:
+        def keep(raw: bytes, info: dict[str, int]) -> None:
             inbox.raw.append(raw)
+            inbox.sent_ns.append(info["source_timestamp"])
             inbox.messages.append(deserialize_message(raw, topic.message_type))
 
         self.node.create_subscription(
@@ -266,6 +300,12 @@ class Client:
         finally:
             self.node.destroy_client(client)
 
+    def begin_call(self, service_type: Any, name: str, request: Any) -> Future:
+        """Call a service whose response may take long; it is the result of what is returned."""
+        client = self.node.create_client(service_type, name)
+        self.spin_until(client.service_is_ready, f"service {name}")
+        return client.call_async(request)
+
     def get_parameters(self, node: str, names: list[str]) -> list[Any]:
         """Values of a node's parameters."""
         request = GetParameters.Request(names=names)
@@ -307,17 +347,40 @@ def joint_state(
     return message
 
 
+def wrench_message(
+    stamp: int,
+    wrenches: Sequence[tuple[str, Sequence[float]]],
+    points: Sequence[Sequence[float]] = (),
+) -> MultiDOFJointState:
+    """Force and torque (6,) on links, stamped in ns, and where the forces act."""
+    message = MultiDOFJointState(
+        joint_names=[link for link, _ in wrenches],
+        wrench=[Wrench(force=_vector(w[:3]), torque=_vector(w[3:])) for _, w in wrenches],
+        transforms=[Transform(translation=_vector(point)) for point in points],
+    )
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, NANOSECONDS_PER_SECOND)
+    return message
+
+
+def _vector(values: Sequence[float]) -> Vector3:
+    x, y, z = values
+    return Vector3(x=float(x), y=float(y), z=float(z))
+
+
 class SimulatorClient(Client):
     """Stands where a controller stands: hears the simulator, and commands it."""
 
-    def __init__(self, context: Context, name: str = "test_client") -> None:
+    def __init__(self, context: Context, name: str = "test_client", below: str = "") -> None:
+        """Stand at the topics of the one character, or of that whose namespace is `below`."""
         super().__init__(context, name)
         self.clock = self.listen(topics.CLOCK)
-        self.episodes = self.listen(topics.EPISODE)
-        self.configuration = self.listen(topics.CONFIGURATION.of(topics.SIM_NODE))
+        self.episodes = self.listen(topics.EPISODE.under(below))
+        configuration = topics.CONFIGURATION.of(topics.SIM_NODE)
+        self.configuration = self.listen(configuration.under(below))
         self.diagnostics = self.listen(topics.DIAGNOSTICS)
-        self.torques = self.speak(topics.JOINT_TORQUES)
-        self.states = self.listen(topics.JOINT_STATES)
+        self.torques = self.speak(topics.JOINT_TORQUES.under(below))
+        self.wrenches = self.speak(topics.EXTERNAL_WRENCH.under(below))
+        self.states = self.listen(topics.JOINT_STATES.under(below))
 
     def state(self, tick: int) -> JointState:
         """The state of a tick, once it has come."""
@@ -327,8 +390,9 @@ class SimulatorClient(Client):
         return next((s for s in self.states.messages if tick_of(s) == tick), None)
 
     def first_state(self) -> JointState:
-        """The state of tick 1, once the simulator hears commands as well."""
-        self.spin_until(self.torques.get_subscription_count, "a simulator that listens")
+        """The state of tick 1, once the simulator hears commands and pushes as well."""
+        for publisher in (self.torques, self.wrenches):
+            self.spin_until(publisher.get_subscription_count, "a simulator that listens")
         return self.state(1)
 
     def command(self, stamp: int, efforts: Mapping[str, float]) -> None:
@@ -340,6 +404,14 @@ class SimulatorClient(Client):
         motors = [name for name in state.name if not name.startswith(f"{ROOT}_")]
         self.command(stamp_ns(state), dict.fromkeys(motors, 0.0) | dict(efforts))
         return self.state(tick_of(state) + 1)
+
+    def drive(self, state: JointState, ticks: int, rng: np.random.Generator) -> JointState:
+        """Command every motor at random for some ticks; gives the state that follows."""
+        motors = [name for name in state.name if not name.startswith(f"{ROOT}_")]
+        for _ in range(ticks):
+            torques = rng.uniform(-20.0, 20.0, len(motors)).tolist()
+            state = self.answer(state, dict(zip(motors, torques, strict=True)))
+        return state
 
     def reported(self, **expected: object) -> Any:
         """The first report on /diagnostics with these values (as texts), once it has come."""
@@ -357,6 +429,14 @@ class SimulatorClient(Client):
     def pause(self, paused: bool) -> SetBool.Response:
         """Call the simulator's service `~/pause`."""
         return self.call(SetBool, f"{topics.SIM_NODE}/pause", SetBool.Request(data=paused))
+
+    def step(self) -> Future:
+        """Begin a call of the simulator's service `~/step`."""
+        return self.begin_call(Trigger, f"{topics.SIM_NODE}/step", Trigger.Request())
+
+    def reset(self) -> Trigger.Response:
+        """Call the simulator's service `~/reset`."""
+        return self.call(Trigger, f"{topics.SIM_NODE}/reset", Trigger.Request())
 
 
 class ControllerClient(Client):

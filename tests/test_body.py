@@ -12,6 +12,7 @@ from physics import (
     FLOATING_CHARACTERS,
     FLOATING_TURNED_FRAMES,
     INSTANT,
+    LoneWorld,
     acceleration,
     advance,
     character,
@@ -33,7 +34,7 @@ from msgs_config.bullet import pybullet
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
 from msgs_config.joint_layout import JointType
-from sim_node.world import World, WorldSettings
+from sim_node.world import WorldSettings
 
 PUCK_URDF = """
 <robot name="puck"><link name="puck"><inertial>
@@ -325,7 +326,9 @@ def test_a_ball_joints_torque_is_that_on_the_child_in_the_child_frame(
     assert np.abs(by_joint - by_torques).max() < 1e-7 * np.abs(by_joint).max()
 
 
-def apply_torque_in_world(world: World, whole: Character, link: int, torque: FloatArray) -> None:
+def apply_torque_in_world(
+    world: LoneWorld, whole: Character, link: int, torque: FloatArray
+) -> None:
     joint = whole.links[link].joint
     floating = joint.type is JointType.FLOATING
     pybullet.applyExternalTorque(
@@ -383,7 +386,7 @@ def test_a_pendulum_keeps_its_energy() -> None:
     # Arrange: 1 kg, 1 m, from rest at 1.5 rad
     step, seconds_a_window = 1e-3, 2.0
     energies = []
-    with World(character("pendulum"), WorldSettings(step_s=step)) as world:
+    with LoneWorld(character("pendulum"), WorldSettings(step_s=step)) as world:
         world.body.set_state(np.array([1.5]), np.zeros(1))
 
         # Act
@@ -401,7 +404,7 @@ def test_a_pendulum_keeps_its_energy() -> None:
 def test_a_mass_falls_freely() -> None:
     # Arrange
     step, steps = 1e-3, 2000
-    with World(character("lift"), WorldSettings(step_s=step)) as world:
+    with LoneWorld(character("lift"), WorldSettings(step_s=step)) as world:
         world.body.set_state(np.zeros(1), np.zeros(1))
 
         # Act
@@ -420,7 +423,7 @@ def test_a_character_in_free_fall_keeps_its_pose(name: str) -> None:
     step, steps = 1e-3, 1000
     start = np.array(whole.rest_position)
     start[2] = 100.0
-    with World(whole, WorldSettings(step_s=step)) as world:
+    with LoneWorld(whole, WorldSettings(step_s=step)) as world:
         world.body.set_state(start, np.zeros_like(start))
 
         # Act

@@ -18,7 +18,7 @@ import pytest
 
 from msgs_config import files
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character, Gains
+from msgs_config.character import Character, Gains, SoftLimit
 from msgs_config.character_file import CHARACTERS_DIRECTORY, shipped_characters
 from msgs_config.character_loading import load_character
 from msgs_config.errors import CharacterError
@@ -420,6 +420,96 @@ def test_an_edited_urdf_is_read_anew(write: WriteCharacter) -> None:
     assert (before.mass, after.mass) == (1.0, 2.0)
 
 
+# Passive damping and soft limits
+
+DAMPED_LIFT = URDF.replace("<limit", '<dynamics damping="2.5"/><limit')
+BALL = robot(link("trunk"), link("arm"), joint("shoulder", "trunk", "arm", "spherical"))
+BALL_FILE = "urdf: lift.urdf\ninertia: file\njoints: {{shoulder: {{soft_limit: {}}}}}\n"
+LIMIT = "{lower: [-1, -0.5, 0], upper: [1, 0.5, 2], stiffness: 40, damping: 2}"
+
+
+@pytest.mark.parametrize(
+    ("more", "damping"),
+    [
+        ("", 2.5),
+        ("joint_damping: file", 2.5),
+        ("joint_damping: none", 0.0),
+        ("joints: {height: {passive_damping: 4}}", 4.0),
+        ("joint_damping: none\njoints: {height: {passive_damping: 4}}", 4.0),
+    ],
+)
+def test_passive_damping_is_the_urdfs_or_the_files(
+    write: WriteCharacter, more: str, damping: float
+) -> None:
+    character = load_character(str(write(PREAMBLE + more + "\n", DAMPED_LIFT)))
+
+    assert "dynamics" in DAMPED_LIFT
+    assert character.passive_damping().tolist() == [damping]
+
+
+def test_a_ball_joint_has_the_passive_damping_of_its_file_alone(write: WriteCharacter) -> None:
+    urdf = BALL.replace("<limit", '<dynamics damping="2.5"/><limit')
+    preamble = "urdf: lift.urdf\ninertia: file\nfixed_base: true\n"
+
+    of_urdf = load_character(str(write(preamble, urdf)))
+    damped = preamble + "joints: {shoulder: {passive_damping: 3}}"
+    of_file = load_character(str(write(damped, urdf)))
+
+    assert of_urdf.passive_damping().tolist() == [0.0] * 3
+    assert of_file.passive_damping().tolist() == [3.0] * 3
+
+
+def test_the_first_shipped_characters_have_no_passive_damping() -> None:
+    for name in ("franka_panda", "humanoid", "lift", "pendulum"):
+        assert not load_character(name).passive_damping().any()
+
+
+def test_a_soft_limit_is_as_its_file_says(write: WriteCharacter) -> None:
+    character = load_character(str(write(BALL_FILE.format(LIMIT), BALL)))
+
+    limit = SoftLimit((-1.0, -0.5, 0.0), (1.0, 0.5, 2.0), stiffness=40.0, damping=2.0)
+    assert character.moving_joints[1].soft_limit == limit
+
+
+WRONG_LIMITS = {
+    "no bounds": ("{stiffness: 1}", ["soft_limit.lower", "three numbers"]),
+    "two numbers": (LIMIT.replace("[-1, -0.5, 0]", "[-1, 0]"), ["lower", "three numbers"]),
+    "a word": (LIMIT.replace("[-1,", "[low,"), ["lower", "three numbers"]),
+    "a flag": (LIMIT.replace("[-1,", "[no,"), ["lower", "three numbers"]),
+    "not a number": (LIMIT.replace("[-1,", "[.nan,"), ["lower", "three numbers"]),
+    "beyond half a turn": (LIMIT.replace("[1,", "[3.2,"), ["upper", "-pi to pi"]),
+    "crossed": (LIMIT.replace("[1,", "[-2,"), ["soft_limit.lower", "'upper'"]),
+    "no stiffness": (LIMIT.replace("stiffness: 40, ", ""), ["stiffness"]),
+    "a negative damping": (LIMIT.replace("damping: 2", "damping: -2"), ["damping", "-2"]),
+    "an unknown key": (LIMIT.replace("damping", "dumping"), ["'joints.shoulder.soft_limit.dump"]),
+    "no mapping": ("3", ["soft_limit", "mapping"]),
+    "nothing": ("", ["lower"]),
+    "a rest pose outside": (LIMIT.replace("[-1,", "[0.5,"), ["rest_pose.shoulder_x", "0.5 to 1"]),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_LIMITS)
+def test_a_wrong_soft_limit_is_refused_with_what_would_be_right(
+    write: WriteCharacter, case: str
+) -> None:
+    text, words = WRONG_LIMITS[case]
+    path = write(BALL_FILE.format(text), BALL)
+
+    line = refusal(path)
+
+    assert str(path) in line
+    for word in words:
+        assert word in line
+
+
+def test_a_urdf_that_drives_its_joints_by_damping_is_refused(write: WriteCharacter) -> None:
+    path = write(PREAMBLE, DAMPED_LIFT.replace("2.5", "-2.5"))
+
+    line = refusal(path)
+
+    assert "lift.urdf" in line and "'height'" in line and "joint_damping: none" in line
+
+
 # Refusals
 
 
@@ -491,6 +581,15 @@ REFUSED = {
         PREAMBLE + "joints: {height: {effort_limit: -1}}",
         ["height", "effort_limit", "-1"],
     ),
+    "a soft limit of a slider": (
+        PREAMBLE + f"joints: {{height: {{soft_limit: {LIMIT}}}}}",
+        ["joints.height.soft_limit", "ball joints", "prismatic"],
+    ),
+    "a passive damping below zero": (
+        PREAMBLE + "joints: {height: {passive_damping: -1}}",
+        ["height", "passive_damping", "-1"],
+    ),
+    "a third way to damp": (PREAMBLE + "joint_damping: much", ["'much'", "'file' or 'none'"]),
     "a rest entry that is no number": (PREAMBLE + "rest_pose: {height: .nan}", ["height", "nan"]),
     "joints that are a list": (PREAMBLE + "joints: [height]", ["joints", "mapping"]),
     "joints that are an empty list": (PREAMBLE + "joints: []", ["joints", "mapping"]),

@@ -41,7 +41,7 @@ def heights(run: Simulation, law: Law, ticks: int) -> FloatArray:
     result = np.empty(ticks)
     for tick in range(ticks):
         result[tick] = run.state.position[0]
-        run.step(law(run.state.position, run.state.velocity))
+        run.advance(law(run.state.position, run.state.velocity))
     return result
 
 

@@ -335,6 +335,34 @@ def test_a_sender_cannot_change_its_command_afterwards(barrier: LockstepBarrier)
     np.testing.assert_array_equal(barrier.effort, [0.0, 0.0, 0.0, 0.0, 4.0, 5.0])
 
 
+def test_another_command_for_a_tick_that_is_over_is_a_conflict_and_a_repeat_is_only_late() -> None:
+    barrier = LockstepBarrier(NAMES, REQUIRED)
+    barrier.open(STAMP_NS)
+    offer(barrier, {4: 4.0, 5: 5.0})
+    barrier.fill_missing(np.zeros(6))
+    barrier.open(2 * STAMP_NS)
+
+    verdicts = [
+        offer(barrier, command, STAMP_NS)
+        for command in ({4: 4.0}, {5: 5.0, 4: 4.0}, {1: 1.0, 2: 0.0, 3: 0.0}, {4: 4.0, 5: 6.0})
+    ]
+
+    late = Verdict.STALE  # what nobody had commanded may be commanded by who is late
+    assert verdicts == [late, late, late, Verdict.CONFLICT]
+    assert barrier.conflict == NAMES[5]
+    assert not barrier.effort.any()
+
+
+def test_a_new_episode_knows_nothing_of_the_ticks_before() -> None:
+    barrier = LockstepBarrier(NAMES, REQUIRED)
+    barrier.open(STAMP_NS)
+    offer(barrier, {4: 4.0})
+    barrier.clear()
+    barrier.open(2 * STAMP_NS)
+
+    assert offer(barrier, {4: 5.0}, STAMP_NS) is Verdict.STALE
+
+
 def test_opening_and_offering_change_no_argument() -> None:
     required, fill = REQUIRED.copy(), np.full(6, 7.0)
     barrier = LockstepBarrier(NAMES, required)
@@ -362,6 +390,7 @@ class AnyTraffic(RuleBasedStateMachine):
         self.barrier = LockstepBarrier(NAMES, REQUIRED)
         self.tick = 1
         self.given: Command = {}
+        self.commanded: dict[int, Command] = {1: {}}  # by tick, without what a timeout filled in
         self.expected: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
         self.barrier.open(self.tick)
 
@@ -369,6 +398,7 @@ class AnyTraffic(RuleBasedStateMachine):
     def next_tick(self) -> None:
         self.tick += 1
         self.given = {}
+        self.commanded[self.tick] = {}
         self.barrier.open(self.tick)
 
     @rule(command=commands)
@@ -386,12 +416,18 @@ class AnyTraffic(RuleBasedStateMachine):
         else:
             assert verdict is Verdict.ACCEPTED
             self.given |= command
+            self.commanded[self.tick] |= command
         self.expected[verdict] += 1
 
     @rule(command=commands, offset=st.integers(1, 3))
     def command_of_an_earlier_tick(self, command: Command, offset: int) -> None:
-        assert offer(self.barrier, command, self.tick - offset) is Verdict.STALE
-        self.expected[Verdict.STALE] += 1
+        before = self.commanded.get(self.tick - offset, {})
+        differs = any(before.get(index, value) != value for index, value in command.items())
+
+        verdict = offer(self.barrier, command, self.tick - offset)
+
+        assert verdict is (Verdict.CONFLICT if differs else Verdict.STALE)
+        self.expected[verdict] += 1
 
     @rule(command=commands, offset=st.integers(1, 3))
     def command_of_a_later_tick(self, command: Command, offset: int) -> None:

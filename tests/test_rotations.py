@@ -272,6 +272,34 @@ def test_an_angular_velocity_in_the_child_frame_turns_from_the_right(
     np.testing.assert_allclose(derivative, expected, rtol=0.0, atol=1e-9)
 
 
+@PROPERTY
+@given(rotation_vectors(3.0), directions())
+def test_the_right_jacobians_inverse_gives_the_rate_of_the_rotation_vector(
+    vector: FloatArray, velocity: FloatArray
+) -> None:
+    step = 1e-5
+    ahead, behind = (
+        rotations.log(rotations.multiply(rotations.exp(vector), rotations.exp(sign * velocity)))
+        for sign in (step, -step)
+    )
+
+    rate = rotations.right_jacobian_inverse(vector) @ velocity
+
+    np.testing.assert_allclose(rate, (ahead - behind) / (2.0 * step), rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("angle", [0.5, 3.0, 4.0, 6.0])
+def test_the_right_jacobians_inverse_undoes_the_right_jacobian(angle: float) -> None:
+    """Which is the mean of exp(-s r) over s from 0 to 1, also beyond half a turn."""
+    vector = angle * np.array([0.6, 0.0, -0.8])
+    shares = (np.arange(2000) + 0.5) / 2000
+    jacobian = rotations.matrix(rotations.exp(-shares[:, np.newaxis] * vector)).mean(axis=0)
+
+    product = rotations.right_jacobian_inverse(vector) @ jacobian
+
+    np.testing.assert_allclose(product, np.eye(3), rtol=0.0, atol=1e-5)
+
+
 # Angles
 
 
@@ -324,6 +352,10 @@ UNARY: dict[str, tuple[Callable[[FloatArray], FloatArray], tuple[int, ...]]] = {
     "matrix": (rotations.matrix, (3, 3)),
     "log": (rotations.log, (3,)),
     "exp of log": (lambda q: rotations.exp(rotations.log(q)), (4,)),
+    "right_jacobian_inverse of log": (
+        lambda q: rotations.right_jacobian_inverse(rotations.log(q)),
+        (3, 3),
+    ),
     "normalised": (rotations.normalised, (4,)),
     "yaw": (rotations.yaw, ()),
     "xyzw_from_wxyz": (rotations.xyzw_from_wxyz, (4,)),

@@ -429,6 +429,14 @@ WRONG: dict[str, tuple[tuple[str, ...], list[str]]] = {
         (*setting("sim_node.rate:=240"), "--set", "controller_node.rate:=480"),
         ["'rate'", "240", "480"],
     ),
+    "real time in one process": (
+        (*SHORT, "--set", "sim_node.mode:=realtime"),
+        ["--in-process", "'mode' realtime"],
+    ),
+    "pace in one process": (
+        (*SHORT, "--set", "sim_node.real_time_factor:=1.0"),
+        ["--in-process", "'real_time_factor'"],
+    ),
     "unfinished setting": (setting("sim_node.rate=240"), ["sim_node.rate=240", ":="]),
 }
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from physics import advance, character, kinetic_energy, touches
+from physics import LoneWorld, advance, character, kinetic_energy, touches
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
-from sim_node.world import World, WorldSettings
+from sim_node.world import WorldSettings
 
 SIZE = character("humanoid").layout.size
 BOX_URDF = """
@@ -48,9 +48,9 @@ def box_character(tmp_path: Path, is_base: bool) -> Character:
     return load_character(str(tmp_path / "box.yaml"))
 
 
-def fallen_humanoid(settings: WorldSettings | None = None) -> World:
+def fallen_humanoid(settings: WorldSettings | None = None) -> LoneWorld:
     """The humanoid half a second after its joints went limp: it slumps onto itself."""
-    world = World(character("humanoid"), settings or WorldSettings())
+    world = LoneWorld(character("humanoid"), settings or WorldSettings())
     world.body.set_state(np.array(character("humanoid").rest_position), np.zeros(SIZE))
     advance(world, np.zeros(SIZE), 120)
     return world
@@ -63,7 +63,7 @@ def wriggling(seed: int) -> Callable[[], FloatArray]:
     return lambda: 2.0 * motors * rng.normal(size=SIZE)
 
 
-def trajectory(world: World, effort: Callable[[], FloatArray], steps: int) -> bytes:
+def trajectory(world: LoneWorld, effort: Callable[[], FloatArray], steps: int) -> bytes:
     """Every bit of the states that follow."""
     states = []
     for _ in range(steps):
@@ -160,7 +160,7 @@ def test_a_step_is_one_step_of_the_length_and_the_gravity_that_were_set(
     step_s: float, gravity: float
 ) -> None:
     # Arrange
-    with World(character("lift"), WorldSettings(step_s=step_s, gravity=gravity)) as world:
+    with LoneWorld(character("lift"), WorldSettings(step_s=step_s, gravity=gravity)) as world:
         world.body.set_state(np.zeros(1), np.array([0.25]))
 
         # Act
@@ -180,7 +180,7 @@ def test_a_sliding_box_is_slowed_by_its_friction_times_the_grounds(
     # Arrange
     box = box_character(tmp_path, is_base)
     settings = WorldSettings(step_s=1e-3, friction=ground, link_friction=link)
-    with World(box, settings) as world:
+    with LoneWorld(box, settings) as world:
         start = np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
         world.body.set_state(start, np.zeros(6))
         advance(world, np.zeros(6), 200)  # it comes to rest on the ground
@@ -197,7 +197,7 @@ def test_a_sliding_box_is_slowed_by_its_friction_times_the_grounds(
 
 def test_a_box_rests_on_the_ground_at_z_zero(box: Character) -> None:
     # Arrange
-    with World(box, WorldSettings()) as world:
+    with LoneWorld(box, WorldSettings()) as world:
         world.body.set_state(np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0]), np.zeros(6))
 
         # Act

@@ -24,7 +24,7 @@ _LARGEST_NUMBER = 1e6  # m or s
 
 @dataclass(frozen=True)
 class ClipFrames:
-    """The frames of a clip in a character's layout, z-up, in its joint limits."""
+    """The frames of a clip in a character's layout, z-up, where it stands, in its joint limits."""
 
     times: FloatArray  # (f,) s, rising from 0
     positions: FloatArray  # (f, n) message form, save that rotations are in `orientations_xyzw`
@@ -100,8 +100,8 @@ def _in_layout(character: Character, path: Path, loop: str, frames: FloatArray) 
     orientations = rotations.exp(positions[:, layout.rotation_entries])
     rotation_of = {int(start): k for k, start in enumerate(layout.rotation_entries[:, 0])}
     if layout.has_floating_base:
-        root_position, root_turn = _root_in_world(character, path, frames)
-        positions[:, :3], orientations[:, 0] = root_position, root_turn
+        root = character.placement.moved(*_root_upright(character, path, frames))
+        positions[:, :3], orientations[:, 0] = root
     for name in character.clips.joints:
         joint = layout.joint(name)
         width = 4 if joint.type is JointType.SPHERICAL else 1
@@ -123,9 +123,10 @@ def _width(character: Character) -> int:
     return _ROOT_COLUMNS + sum(4 if ball else 1 for ball in balls)
 
 
-def _root_in_world(
+def _root_upright(
     character: Character, path: Path, frames: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Positions and orientations of the root in the character's own world, z up."""
     position, turn = frames[:, 1:4], _quaternions(path, "root", frames[:, 4:8])
     if character.clips.up_axis == "y":
         upright = rotations.ABOUT_X_QUARTER_TURN_XYZW

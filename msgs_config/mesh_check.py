@@ -1,0 +1,66 @@
+"""Meshes to collide with, checked before the engine reads them: it trusts every number in them.
+
+It reads COLLADA too, but follows missing parts of a file into a crash and leaves out what is not
+made of triangles, so that a link would collide with nothing.
+"""
+
+import re
+from math import isfinite
+from pathlib import Path
+
+from msgs_config.errors import CharacterError
+
+MAX_LINE = 4000  # characters; the engine cuts longer ones
+
+_OBJ_LISTS = ("v", "vt", "vn")  # in the order in which a corner of a face names them
+_OBJ_CORNER = re.compile(r"-?\d+(/-?\d+|//-?\d+|/-?\d+/-?\d+)?", re.ASCII)
+
+
+def check_mesh(path: Path) -> None:
+    """Check that a mesh is one that the engine reads, and that its faces have their vertices.
+
+    Raises:
+        CharacterError: it is not so; names the file.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in (".obj", ".stl"):
+        raise CharacterError(f"mesh {path} is to collide with; it must be an .obj or .stl file")
+    try:
+        if suffix == ".obj":
+            _check_obj(path.read_text(encoding="utf-8", errors="replace"))
+        else:
+            _check_stl(path)
+    except (OSError, ValueError) as error:
+        raise CharacterError(f"mesh {path} cannot be used: {str(error)[:200]}") from error
+
+
+def _check_stl(path: Path) -> None:
+    """The header of 80 bytes, the number of triangles, and 50 bytes for each."""
+    with path.open("rb") as file:
+        count = int.from_bytes(file.read(84)[80:], "little")
+    if count == 0 or path.stat().st_size != 84 + 50 * count:
+        raise ValueError("it is no whole binary STL file; the engine reads no text")
+
+
+def _check_obj(text: str) -> None:
+    counts = dict.fromkeys(_OBJ_LISTS, 0)
+    for number, line in enumerate(text.splitlines(), start=1):
+        if len(line) > MAX_LINE:
+            raise ValueError(f"line {number} is longer than {MAX_LINE}")
+        kind, *pieces = line.split() or [""]
+        if kind in counts:
+            counts[kind] += 1
+            if not all(isfinite(float(piece)) for piece in pieces):
+                raise ValueError(f"line {number} has a number that is not finite")
+        elif kind == "f":
+            _check_face(number, pieces, counts)
+
+
+def _check_face(number: int, corners: list[str], counts: dict[str, int]) -> None:
+    for corner in corners:
+        if not _OBJ_CORNER.fullmatch(corner):
+            raise ValueError(f"line {number} is no face")
+        for name, index in zip(_OBJ_LISTS, corner.split("/"), strict=False):
+            # counted from 1, or back from the last so far
+            if index and not 1 <= abs(int(index)) <= counts[name]:
+                raise ValueError(f"line {number} names a {name} that is not there: {index}")

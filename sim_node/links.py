@@ -1,0 +1,111 @@
+"""The links of one body in the engine: where they are, what pushes them, what they touch.
+
+Arrays have one row a link, in the order of `Character.links`; frames are URDF link frames.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from msgs_config import rotations
+from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.bullet import pybullet
+from msgs_config.character import Character
+from sim_node.contacts import TouchedLinks
+from sim_node.pushes import Push
+
+
+class Links:
+    """Reads and pushes the links of a body."""
+
+    def __init__(
+        self, client: int, body: int, character: Character, numbers: Sequence[int]
+    ) -> None:
+        """`numbers` are the engine's own of the character's links; -1 is the base."""
+        self._client = client
+        self._body = body
+        self._numbers = list(numbers)
+        self._row = {number: row for row, number in enumerate(numbers)}
+        poses = [link.inertial_pose for link in character.links]
+        self._offsets = np.array([pose.position for pose in poses])
+        turns = np.array([pose.orientation_xyzw for pose in poses])
+        self._turns_back = rotations.conjugate(turns)
+
+    def frames(self) -> tuple[FloatArray, FloatArray]:
+        """Origins (links, 3) in m and orientations xyzw (links, 4) in the world."""
+        centres, inertial_turns = self._inertial_frames()
+        turns = rotations.multiply(inertial_turns, self._turns_back)
+        return centres - rotations.rotate(turns, self._offsets), turns
+
+    def kinetic_energy(self) -> float:
+        """Kinetic energy of all links, J, by the engine's own masses, inertia and velocities."""
+        energy = 0.0
+        for number in self._numbers:
+            mass, _, inertia, *_ = pybullet.getDynamicsInfo(
+                self._body, number, physicsClientId=self._client
+            )
+            turn, linear, angular = self._inertial_motion(number)
+            spin = rotations.rotate(rotations.conjugate(turn), angular)  # about principal axes
+            energy += 0.5 * float(mass * (linear * linear).sum() + (spin * spin * inertia).sum())
+        return energy
+
+    def _inertial_motion(self, number: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Orientation xyzw, velocity (m/s) and angular velocity (rad/s, world) about the centre."""
+        body, client = self._body, self._client
+        if number < 0:
+            _, turn = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
+            linear, angular = pybullet.getBaseVelocity(body, physicsClientId=client)
+        else:
+            _, turn, *_, linear, angular = pybullet.getLinkState(
+                body,
+                number,
+                computeLinkVelocity=1,
+                computeForwardKinematics=1,
+                physicsClientId=client,
+            )
+        return np.array(turn), np.array(linear), np.array(angular)
+
+    def push(self, pushes: Sequence[Push]) -> None:
+        """Push links during the engine's next step, and only then.
+
+        A force acts at its point, which makes the torque `r x f` about the centre of mass more.
+        """
+        origins, turns = self.frames()
+        for push in pushes:
+            row, number = push.link, self._numbers[push.link]
+            at = origins[row] + rotations.rotate(turns[row], push.point)
+            for apply, vector, where in (
+                (pybullet.applyExternalForce, push.wrench[:3], (at,)),
+                (pybullet.applyExternalTorque, push.wrench[3:], ()),
+            ):
+                apply(
+                    self._body,
+                    number,
+                    vector,
+                    *where,
+                    flags=pybullet.WORLD_FRAME,
+                    physicsClientId=self._client,
+                )
+
+    def contact_forces(self, touched: TouchedLinks) -> tuple[FloatArray, BoolArray]:
+        """Net contact force (links, 3) in N, world axes, of what touches; and which links do.
+
+        A contact between two links of the body counts on both, in opposite directions.
+        """
+        forces = np.zeros((len(self._numbers), 3))
+        touching = np.zeros(len(self._numbers), dtype=np.bool_)
+        for number, force in touched.get(self._body, ()):
+            row = self._row[number]
+            forces[row] += force
+            touching[row] = True
+        return forces, touching
+
+    def _inertial_frames(self) -> tuple[FloatArray, FloatArray]:
+        """Centres of mass (links, 3) and orientations xyzw of the inertial frames."""
+        moving = self._numbers[1:]
+        states = [pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)]
+        if moving:
+            states += pybullet.getLinkStates(
+                self._body, moving, computeForwardKinematics=1, physicsClientId=self._client
+            )
+        return np.array([state[0] for state in states]), np.array([state[1] for state in states])

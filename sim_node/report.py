@@ -1,0 +1,25 @@
+"""What the diagnostics say of one character."""
+
+from sim_node.lockstep import Verdict
+from sim_node.port import Port
+from sim_node.realtime import CommandHold
+
+_MS = 1e-6  # of a nanosecond
+
+
+def report(port: Port) -> dict[str, object]:
+    """Counts of commands by verdict, of pushes and of saturations; the age of the commands."""
+    collector, actor = port.collector, port.actor
+    values: dict[str, object] = {verdict.value: collector.counts[verdict] for verdict in Verdict}
+    for verdict in ("accepted", "rejected"):
+        values[f"{verdict}_pushes"] = port.push_counts[verdict]
+    values["saturated_ticks"] = int(actor.saturated_ticks.sum())
+    saturated = actor.saturated_ticks > 0
+    names = [n for n, yes in zip(actor.character.vector_names, saturated, strict=True) if yes]
+    if names:
+        values["saturated"] = " ".join(names)
+    if isinstance(collector, CommandHold):
+        values["command_timeouts"] = collector.timeouts
+        age_ns = collector.age_ns
+        values["command_age_ms"] = "none" if age_ns is None else round(_MS * age_ns, 3)
+    return values

@@ -1,0 +1,281 @@
+"""Passive damping and soft limits: finite differences of a potential, energy, and stability."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from physics import character, random_rotation_vector
+
+from controller_node.references.clip_file import available_clips, read_clip
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character, Joint, SoftLimit
+from msgs_config.errors import ConfigurationError
+from msgs_config.joint_layout import JointType
+from sim_node.mobility import make_passive_forces, measure_mobility, passing_through_itself
+from sim_node.passive import PassiveForces, bounded_damping
+from sim_node.world import World, WorldSettings
+
+HUMANOID = character("humanoid")
+LAYOUT = HUMANOID.layout
+BALLS = [joint for joint in HUMANOID.moving_joints if joint.type is JointType.SPHERICAL]
+STEP = 1.0 / 240.0
+MIRRORED = np.array([-1.0, -1.0, 1.0])  # the URDF's z is the humanoid's right
+
+every_ball = pytest.mark.parametrize("ball", BALLS, ids=lambda ball: ball.name)
+
+
+@pytest.fixture(scope="module")
+def passive() -> PassiveForces:
+    return make_passive_forces(HUMANOID, STEP)
+
+
+def limit_of(ball: Joint) -> SoftLimit:
+    assert ball.soft_limit is not None
+    return ball.soft_limit
+
+
+def excess(limit: SoftLimit, turn: FloatArray) -> FloatArray:
+    """How far a rotation vector (3,) is outside."""
+    return np.maximum(turn - limit.upper, 0.0) + np.minimum(turn - limit.lower, 0.0)
+
+
+def potential(limit: SoftLimit, turn: FloatArray) -> float:
+    """k/2 e^2 of the rotation vector that is nearer to the bounds, r or the longer way round, J."""
+    angle = max(float(np.linalg.norm(turn)), 1e-9)
+    ways = [turn, turn * (1.0 - 2.0 * np.pi / angle)]
+    return 0.5 * limit.stiffness * min(float(np.sum(excess(limit, way) ** 2)) for way in ways)
+
+
+def torque(
+    passive: PassiveForces, ball: Joint, turn: FloatArray, velocity: FloatArray | None = None
+) -> FloatArray:
+    """The passive torque (3,) at a ball joint, with the others at rest at their rest pose."""
+    position, speeds = np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size)
+    entries = LAYOUT.joint(ball.name).entries
+    position[entries] = turn
+    if velocity is not None:
+        speeds[entries] = velocity
+    effort = passive.effort(position, speeds)
+    assert not np.delete(effort, range(entries.start, entries.stop)).any()
+    return effort[entries]
+
+
+def turns_outside(ball: Joint, count: int = 50) -> Iterator[FloatArray]:
+    """Random rotation vectors (3,) outside of a ball joint's bounds."""
+    rng = np.random.default_rng(1)
+    found = 0
+    while found < count:
+        turn = random_rotation_vector(rng)
+        if potential(limit_of(ball), turn) > 0.0:
+            found += 1
+            yield turn
+
+
+# --- soft limits ---------------------------------------------------------------------------------
+
+
+@every_ball
+def test_within_its_bounds_a_joint_is_left_alone(passive: PassiveForces, ball: Joint) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        turn = rng.uniform(limit_of(ball).lower, limit_of(ball).upper)
+        if np.linalg.norm(turn) < np.pi:
+            assert not torque(passive, ball, turn, rng.normal(size=3)).any()
+
+
+@every_ball
+def test_the_springs_power_is_what_the_potential_loses(passive: PassiveForces, ball: Joint) -> None:
+    # Arrange
+    rng, eps = np.random.default_rng(2), 1e-6
+    for turn in turns_outside(ball):
+        spin = rng.normal(size=3)
+
+        # Act
+        power = torque(passive, ball, turn) @ spin
+
+        # Assert
+        ahead, behind = (
+            rotations.log(rotations.multiply(rotations.exp(turn), rotations.exp(sign * eps * spin)))
+            for sign in (1.0, -1.0)
+        )
+        gain = potential(limit_of(ball), ahead) - potential(limit_of(ball), behind)
+        assert power == pytest.approx(-gain / (2.0 * eps), rel=1e-5, abs=1e-4)
+
+
+@every_ball
+def test_the_torque_begins_at_zero_and_does_not_jump_at_half_a_turn(
+    passive: PassiveForces, ball: Joint
+) -> None:
+    limit, rng = limit_of(ball), np.random.default_rng(3)
+    for axis in range(3):
+        turn = np.zeros(3)
+        turn[axis] = limit.upper[axis] + 1e-9
+        assert np.abs(torque(passive, ball, turn)).max() < 1e-5
+    for _ in range(50):
+        half_a_turn = random_rotation_vector(rng)
+        half_a_turn *= np.pi / np.linalg.norm(half_a_turn)
+        depths = [np.sum(excess(limit, sign * half_a_turn) ** 2) for sign in (1.0, -1.0)]
+        if depths[0] == pytest.approx(depths[1]):
+            continue  # the ridge of the potential, as far from the bounds on either side
+        before, after = (
+            torque(passive, ball, sign * (1.0 - 1e-9) * half_a_turn) for sign in (1.0, -1.0)
+        )
+        np.testing.assert_allclose(before, after, atol=1e-4)
+
+
+@every_ball
+def test_the_damper_only_takes_energy(passive: PassiveForces, ball: Joint) -> None:
+    rng = np.random.default_rng(4)
+    taken = 0.0
+    for turn in turns_outside(ball):
+        spin = rng.normal(size=3)
+        damping = torque(passive, ball, turn, spin) - torque(passive, ball, turn)
+        assert damping @ spin <= 1e-12
+        taken -= damping @ spin
+    assert taken > 0.0
+
+
+@every_ball
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_limb_that_is_swung_against_its_limit_comes_back_with_no_more_energy(
+    passive: PassiveForces, ball: Joint, axis: int
+) -> None:
+    # Arrange: weightless, in free space
+    limit, entries = limit_of(ball), LAYOUT.joint(ball.name).entries
+    position, velocity = np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size)
+    position[entries.start + axis] = limit.upper[axis] - 0.02
+    velocity[entries.start + axis] = 4.0
+    stored, energies = [], []
+    with World(WorldSettings(step_s=STEP, gravity=0.0, ground=False)) as world:
+        body = world.add(passing_through_itself(HUMANOID))
+        body.set_state(position, velocity)
+        for _ in range(240):
+            position, velocity = body.read()
+            effort = passive.effort(position, velocity)
+            stored.append(potential(limit, position[entries]))
+            if not effort.any():
+                energies.append(body.links.kinetic_energy())
+
+            # Act
+            body.apply(effort)
+            world.step()
+
+    # Assert: a free motion of this engine at this step gains up to 2 % in a second
+    deepest = int(np.argmax(stored))
+    assert stored[deepest] > 0.0
+    assert min(stored[deepest:]) == 0.0
+    assert max(energies) < 1.03 * energies[0]
+
+
+def test_the_soft_limits_leave_a_tenth_of_a_radian_to_every_frame_of_every_clip() -> None:
+    for clip in available_clips(HUMANOID):
+        frames = read_clip(HUMANOID, clip)
+        turns = rotations.log(frames.orientations_xyzw)[:, 1:]  # without the root
+        names = [joint.name for joint in LAYOUT.joints if joint.type is JointType.SPHERICAL]
+        limits = {ball.name: limit_of(ball) for ball in BALLS}
+        for index, name in enumerate(names):
+            assert (turns[:, index] >= np.add(limits[name].lower, 0.1)).all(), (clip, name)
+            assert (turns[:, index] <= np.subtract(limits[name].upper, 0.1)).all(), (clip, name)
+
+
+def test_left_and_right_have_the_same_soft_limits() -> None:
+    limits = {ball.name: limit_of(ball) for ball in BALLS}
+    for name, left in limits.items():
+        right = limits[name.replace("left_", "right_")]
+        bounds = np.array([left.lower, left.upper]) * MIRRORED
+        if name.startswith("left_"):
+            np.testing.assert_array_equal(np.sort(bounds, axis=0), [right.lower, right.upper])
+            assert (left.stiffness, left.damping) == (right.stiffness, right.damping)
+
+
+def test_a_soft_limit_too_stiff_for_the_engines_steps_is_refused_with_the_reason() -> None:
+    with pytest.raises(ConfigurationError, match=r"soft limit of '.*' has [\d.]+ times.*substeps"):
+        make_passive_forces(HUMANOID, 10.0 * STEP)
+
+
+# --- damping -------------------------------------------------------------------------------------
+
+
+def damped(whole: Character, damping: float) -> Character:
+    """The character with each of its joints damped."""
+    links = [
+        replace(link, joint=replace(link.joint, damping=damping))
+        if link.joint.type in (JointType.REVOLUTE, JointType.PRISMATIC, JointType.SPHERICAL)
+        else link
+        for link in whole.links
+    ]
+    return replace(whole, links=tuple(links))
+
+
+def test_damping_is_minus_d_v_in_every_joint_and_not_at_the_base() -> None:
+    whole = character("tests/data/damped.yaml")
+    velocity = np.random.default_rng(1).normal(size=whole.layout.size)
+    expected = dict.fromkeys(["shoulder"], 0.7) | {"wrist": 0.2, "root": 0.0}
+
+    passive = make_passive_forces(whole, 1e-5)
+    effort = passive.effort(np.array(whole.rest_position), velocity)
+
+    for joint in whole.layout.joints:
+        damping = expected.get(joint.name, 5.0)  # as the URDF says of hinges and sliders
+        np.testing.assert_allclose(effort[joint.entries], -damping * velocity[joint.entries])
+    assert passive.active
+    assert not passive.notes
+
+
+def test_what_has_neither_damping_nor_limits_has_no_passive_forces() -> None:
+    passive = make_passive_forces(character("franka_panda"), STEP)
+
+    assert not passive.active
+    assert not passive.effort(np.zeros(9), np.ones(9)).any()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.floats(1e-4, 1e-1))
+def test_no_mode_of_bounded_damping_takes_more_than_the_whole_velocity_in_a_step(
+    seed: int, size: int, step: float
+) -> None:
+    # Arrange
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(size, size))
+    mobility = root @ root.T + 0.01 * np.eye(size)
+    damping = 10.0 ** rng.uniform(-4.0, 4.0, size)
+
+    # Act
+    bounded = bounded_damping(damping, mobility, step)
+
+    # Assert
+    rates = np.linalg.eigvals(step * mobility @ np.diag(bounded)).real
+    assert rates.max() <= 1.0 + 1e-9
+    assert (bounded <= damping).all()
+    if np.linalg.eigvals(step * np.abs(mobility) @ np.diag(damping)).real.max() < 1.0 / size:
+        np.testing.assert_array_equal(bounded, damping)
+
+
+def test_a_damper_far_too_strong_for_the_step_stops_a_joint_and_says_so() -> None:
+    # Arrange
+    whole = damped(character("pendulum"), 1e4)
+    passive = make_passive_forces(whole, STEP)
+    with World(WorldSettings(step_s=STEP, gravity=0.0)) as world:
+        body = world.add(whole)
+        body.set_state(np.array([0.5]), np.array([3.0]))
+        speeds = []
+        for _ in range(5):
+            # Act
+            body.apply(passive.effort(*body.read()))
+            world.step()
+            speeds.append(float(body.read()[1][0]))
+
+    # Assert
+    assert max(map(abs, speeds)) < 1e-6
+    (note,) = passive.notes
+    assert "'hinge'" in note and "substeps" in note
+
+
+def test_the_mobility_is_the_inverse_mass_matrix_of_a_rod_and_of_a_mass() -> None:
+    inertia = 1.0 / 3.0  # m l^2 / 3 about its end
+
+    assert measure_mobility(character("pendulum"))[0, 0] == pytest.approx(1.0 / inertia, rel=1e-6)
+    assert measure_mobility(character("lift"))[0, 0] == pytest.approx(1.0, rel=1e-6)

@@ -1,0 +1,330 @@
+"""A signal ends every process promptly, well, and without a trace, whatever it is doing."""
+
+import os
+import re
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from ros import Process, Processes, SimulatorClient, wait_until
+from test_run import Run
+
+from experiment.domain import own_domain
+from msgs_config import topics
+
+PROJECT = Path(__file__).parents[1]
+SIGNALS = [signal.SIGINT, signal.SIGTERM]
+SHARED_MEMORY = Path("/dev/shm")
+PROMPTLY = 1.0  # s
+WHILE_STARTING = 3.0  # s; a library may have to finish something first
+A_FEW_STATES = 50
+SECONDS = 5.0  # s that a run of several processes may take
+INTERRUPTED = 130  # exit code of a command
+
+
+@pytest.fixture
+def own_graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A domain without the tests' own node, which would keep open what others have left."""
+    with own_domain() as domain:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield domain
+
+
+@contextmanager
+def observer(domain: int) -> Iterator[SimulatorClient]:
+    """A client that leaves the graph again."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    client = SimulatorClient(context)
+    try:
+        yield client
+    finally:
+        client.close()
+        context.try_shutdown()
+
+
+def belongings(pid: int) -> set[Path]:
+    """The files of Fast DDS in shared memory that a process has mapped or open, locks too."""
+    names = set[str]()
+    with suppress(OSError):  # it has ended, or closed a file meanwhile
+        names |= {line.split()[-1] for line in Path(f"/proc/{pid}/maps").read_text().splitlines()}
+        names |= {os.readlink(link) for link in Path(f"/proc/{pid}/fd").iterdir()}
+    shared = {Path(name) for name in names if name.startswith(f"{SHARED_MEMORY}/")}
+    return {path for path in shared if "fastrtps_" in path.name}
+
+
+def living() -> list[int]:
+    return [int(entry.name) for entry in Path("/proc").glob("[0-9]*")]
+
+
+def left_behind(files: set[Path]) -> set[Path]:
+    """Those that are still there, and nobody's; some are shared by all on this machine."""
+    return {file for file in files if file.exists()}.difference(*map(belongings, living()))
+
+
+def end(process: Process, *numbers: signal.Signals, within: float = PROMPTLY) -> set[Path]:
+    """End a process by signals in some seconds; what belonged to it, until its very end."""
+    files = belongings(process.pid)
+
+    def ended() -> bool:
+        files.update(belongings(process.pid))
+        return process.exit_code is not None
+
+    for number in numbers:
+        process.send(number)
+    wait_until(ended, f"the end after {numbers}", within)
+    return files
+
+
+def session_of(process: Process) -> list[int]:
+    """The processes that a process has started and that live, itself included."""
+    found = []
+    for pid in living():
+        with suppress(ProcessLookupError):
+            if os.getsid(pid) == process.pid:
+                found.append(pid)
+    return found
+
+
+def assert_ended_well(process: Process) -> None:
+    assert process.exit_code == 0
+    assert "Traceback" not in process.stderr
+    assert "error" not in process.stderr.lower()
+    assert session_of(process) == []
+
+
+# In the middle of something
+
+
+def hear_states(client: SimulatorClient) -> None:
+    client.spin_until(lambda: len(client.states) >= A_FEW_STATES, "states")
+
+
+def waiting(processes: Processes, client: SimulatorClient) -> Process:
+    simulator = processes.simulator()
+    client.first_state()
+    return simulator
+
+
+def waiting_for_subscribers(processes: Processes, client: SimulatorClient) -> Process:
+    simulator = processes.simulator(wait_for_subscribers=9)
+    client.spin_until(lambda: client.configuration.messages, "configuration")
+    return simulator
+
+
+def running(processes: Processes, client: SimulatorClient) -> Process:
+    processes.controller()
+    simulator = processes.simulator()
+    hear_states(client)
+    return simulator
+
+
+def paused(processes: Processes, client: SimulatorClient) -> Process:
+    simulator = running(processes, client)
+    assert client.pause(True).success
+    return simulator
+
+
+def in_real_time(processes: Processes, client: SimulatorClient) -> Process:
+    simulator = processes.simulator(mode="realtime")
+    hear_states(client)
+    return simulator
+
+
+def slowed_down(processes: Processes, client: SimulatorClient) -> Process:
+    simulator = processes.simulator(mode="realtime", real_time_factor=0.001, wait_for_subscribers=1)
+    client.first_state()
+    return simulator
+
+
+def idle(processes: Processes, client: SimulatorClient) -> Process:
+    configuration = client.listen(topics.CONFIGURATION.of(topics.CONTROLLER_NODE))
+    controller = processes.controller()
+    client.spin_until(lambda: configuration.messages, "configuration")
+    return controller
+
+
+def answering(processes: Processes, client: SimulatorClient) -> Process:
+    processes.simulator()
+    controller = processes.controller()
+    hear_states(client)
+    return controller
+
+
+def recording(processes: Processes, client: SimulatorClient) -> Process:
+    recorder = processes.node("recorder", directory="recording", progress_period=0.05)
+    running(processes, client)
+    client.spin_until(lambda: re.search(r"tick \d\d", recorder.stdout), "ticks")
+    return recorder
+
+
+Situation = Callable[[Processes, SimulatorClient], Process]
+SITUATIONS: list[Situation] = [
+    waiting,
+    waiting_for_subscribers,
+    running,
+    paused,
+    in_real_time,
+    slowed_down,
+    idle,
+    answering,
+    recording,
+]
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("situation", SITUATIONS)
+def test_a_signal_ends_a_node_within_a_second_and_leaves_nothing_behind(
+    processes: Processes, own_graph: int, situation: Situation, number: signal.Signals
+) -> None:
+    before = set(SHARED_MEMORY.iterdir())  # by others, some of whom may have been killed
+    with observer(own_graph) as client:
+        node = situation(processes, client)
+
+        files = end(node, number) - before
+
+        assert_ended_well(node)
+        processes.end()
+    assert files
+    assert not left_behind(files)
+
+
+@pytest.mark.parametrize("situation", [running, recording])
+def test_more_signals_disturb_nothing(
+    processes: Processes, own_graph: int, situation: Situation
+) -> None:
+    with observer(own_graph) as client:
+        node = situation(processes, client)
+
+        end(node, signal.SIGINT, signal.SIGTERM, signal.SIGINT)
+
+        assert_ended_well(node)
+
+
+# On its way there
+
+COMMON_STAGES = ["", "_rclpy_pybind11", "/yaml/_yaml.", "_multiarray_umath"]
+STAGES = {  # what each loads, one after the other, once it handles signals
+    "sim_node": [*COMMON_STAGES, "/pybullet.", "/dev/shm/fastrtps_"],
+    "controller_node": [*COMMON_STAGES, "/libmujoco.", "/dev/shm/fastrtps_"],
+    "recorder": COMMON_STAGES,  # once it is there, having heard nobody is an error
+}
+
+
+def has_come_to(process: Process, stage: str) -> bool:
+    """Whether a process handles signals, and has mapped a file that a stage begins with."""
+    place = Path("/proc") / str(process.pid)
+    caught = re.search(r"^SigCgt:\s*(\w+)", (place / "status").read_text(), re.MULTILINE)
+    assert caught is not None
+    handles = all(int(caught[1], 16) >> (number - 1) & 1 for number in SIGNALS)
+    return handles and stage in (place / "maps").read_text()
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize(
+    ("name", "stage"), [(name, stage) for name, stages in STAGES.items() for stage in stages]
+)
+def test_a_signal_ends_a_node_that_is_still_starting(
+    processes: Processes, own_graph: int, name: str, stage: str, number: signal.Signals
+) -> None:
+    del own_graph
+    before = set(SHARED_MEMORY.iterdir())
+    node = processes.node(name)
+    wait_until(lambda: has_come_to(node, stage), f"stage {stage}", step=os.sched_yield)
+
+    files = end(node, number, within=WHILE_STARTING) - before
+
+    assert_ended_well(node)
+    assert not left_behind(files)
+
+
+AMID_A_TEXT = """
+import os, signal, sys
+from msgs_config.process import run_node
+
+class Node:
+    def run(self, stop):
+        pass
+
+    def destroy_node(self):
+        pass
+
+def make_node():
+    exec("os.kill(os.getpid(), signal.SIGTERM); [None for _ in range(10)]")
+    return Node()
+
+sys.exit(run_node(make_node))
+"""
+
+
+def test_a_signal_amid_code_from_a_text_ends_a_node_well_too(
+    processes: Processes, tmp_path: Path
+) -> None:
+    # Dataclasses are made by such code. Python remembers a KeyboardInterrupt that has gone through
+    # it, caught or not, and in the end a module that was run by `-m` is killed by SIGINT.
+    (tmp_path / "amid.py").write_text(AMID_A_TEXT)
+
+    node = processes.python("-m", "amid")
+    node.wait()
+
+    assert_ended_well(node)
+
+
+# The command
+
+RUN = ("run", "--character", "pendulum", "--duration", "1e6")
+
+
+def assert_interrupted(run: Run) -> None:
+    assert run.process.wait(SECONDS) == INTERRUPTED
+    assert "interrupted" in run.process.stderr
+    assert "Traceback" not in run.process.stderr
+    assert run.family == {}
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("stage", ["", "_multiarray_umath", "/pybullet.", "/libmujoco."])
+def test_a_signal_ends_a_run_that_is_being_planned(
+    processes: Processes, tmp_path: Path, stage: str, number: signal.Signals
+) -> None:
+    run = Run(processes, *RUN, "--output", str(tmp_path / "run"))
+    wait_until(lambda: has_come_to(run.process, stage), f"stage {stage}", step=os.sched_yield)
+
+    run.process.send(number)
+
+    assert_interrupted(run)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_signal_ends_a_run_whose_nodes_are_starting_and_its_domain_is_free_again(
+    processes: Processes, tmp_path: Path, count: int, number: signal.Signals
+) -> None:
+    locks = tmp_path / "locks"
+    locks.mkdir()
+    run = Run(processes, *RUN, "--output", str(tmp_path / "run"), TMPDIR=str(locks))
+    wait_until(lambda: len(run.family) > count, f"{count} nodes", step=os.sched_yield)
+
+    run.process.send(number)
+
+    assert_interrupted(run)
+    assert [path for path in locks.rglob("*") if path.is_file()] == []
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_ends_a_run_in_one_process(
+    processes: Processes, tmp_path: Path, number: signal.Signals
+) -> None:
+    run = Run(processes, *RUN, "--in-process", "--output", str(tmp_path / "run"))
+    begun = tmp_path / "run" / "parameters" / "controller_node.yaml"
+    wait_until(begun.exists, "the begin of the run")
+
+    run.process.send(number)
+
+    assert_interrupted(run)
