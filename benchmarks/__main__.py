@@ -1,5 +1,6 @@
-"""`make bench`: what lockstep over topics costs, everything measured in one run."""
+"""`make bench`: all measurements, or with `--only NAME` one of them."""
 
+import argparse
 import os
 import sys
 
@@ -7,68 +8,33 @@ from msgs_config.process import limit_threads
 
 limit_threads()
 
-import numpy as np  # noqa: E402 - after the limit on threads
-from rich.console import Console  # noqa: E402
-from rich.table import Table  # noqa: E402
+from rich.console import Console  # noqa: E402 - after the limit on threads
 
-from benchmarks.closed_loop import in_process, over_topics  # noqa: E402
-from benchmarks.round_trip import round_trips  # noqa: E402
+from benchmarks.cost import measure_cost  # noqa: E402
+from benchmarks.lockstep import measure_lockstep  # noqa: E402
+from benchmarks.realtime import measure_realtime  # noqa: E402
 from experiment.domain import own_domain  # noqa: E402
-from experiment.plan import Plan, make_plan  # noqa: E402
-from msgs_config.arrays import FloatArray  # noqa: E402
 
-_COUNT = 5000  # round trips
-_DURATION = 20.0  # s of simulated time
-_REFERENCES: dict[str, dict[str, object]] = {
-    "pendulum": {"reference": "hold"},
-    "humanoid": {"reference": "clip", "clip": "walk"},
+_MEASUREMENTS = {
+    "lockstep": measure_lockstep,
+    "cost": measure_cost,
+    "realtime": measure_realtime,
 }
 
 
 def main() -> int:
-    """Measure and print the table."""
+    """Measure and print the tables."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--only", choices=_MEASUREMENTS, help="the one to measure")
+    only = parser.parse_args().only
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    table = Table(title="lockstep, one tick (µs)", title_justify="left")
-    for column in ("", "p50", "p99", "ticks/s", "real-time factor"):
-        table.add_column(column, justify="right" if column else "left")
-    ratios = []
+    console = Console()
     with own_domain() as domain:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
-        for name, reference in _REFERENCES.items():
-            plan = make_plan(name, _DURATION, reference, {}, {})
-            ratios.append(_measure(plan, table))
-    console = Console()
-    console.print(table)
-    for ratio in ratios:
-        console.print(ratio)
+        for name, measure in _MEASUREMENTS.items():
+            if only in (None, name):
+                measure(console)
     return 0
-
-
-def _measure(plan: Plan, table: Table) -> str:
-    """Add the rows of one character; returns what lockstep over topics adds, in round trips."""
-    name, rate = plan.character.name, plan.simulator.integer("rate")
-    layout = plan.character.layout
-    topics = over_topics(plan)
-    rows = {
-        "(a) bare round trip, taken directly": _row(round_trips(layout, _COUNT, direct=True)),
-        "(a') bare round trip, by executors": _row(round_trips(layout, _COUNT, direct=False)),
-        "(b) in one process": _row(in_process(plan)),
-        "(c) over topics": (topics["tick_us_p50"], topics["tick_us_p99"], topics["ticks_per_s"]),
-    }
-    for label, (p50, p99, per_second) in rows.items():
-        factor = "" if "bare" in label else f"{per_second / rate:.1f}"
-        table.add_row(f"{name} {label}", f"{p50:.0f}", f"{p99:.0f}", f"{per_second:.0f}", factor)
-    direct, executors, joined, apart = (values[0] for values in rows.values())
-    return (
-        f"{name}: ((c) - (b)) / (a) = {(apart - joined) / direct:.2f}, "
-        f"((c) - (b)) / (a') = {(apart - joined) / executors:.2f}"
-    )
-
-
-def _row(durations: FloatArray) -> tuple[float, float, float]:
-    """Median and 99th percentile in microseconds, and how many a second, of durations in s."""
-    p50, p99 = np.percentile(1e6 * durations, (50, 99))
-    return float(p50), float(p99), float(1.0 / durations.mean())
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
@@ -43,8 +44,12 @@ def round_trips(layout: JointLayout, count: int, *, direct: bool) -> FloatArray:
     )
     rclpy.init()
     node = Node("near_side")
-    try:
-        take = _taker(node, _PONG, way)
+    with ExitStack() as at_end:
+        at_end.callback(far.wait)
+        at_end.callback(far.terminate)
+        at_end.callback(rclpy.try_shutdown)
+        at_end.callback(node.destroy_node)
+        take = _taker(node, _PONG, way, at_end)
         publisher = topics.create_publisher(node, _PING)
         _wait(lambda: publisher.get_subscription_count() and node.count_publishers("pong"))
         message = encoder.encode(0, zeros, zeros, zeros)
@@ -55,17 +60,13 @@ def round_trips(layout: JointLayout, count: int, *, direct: bool) -> FloatArray:
             _wait(take)
             durations[index] = time.perf_counter() - started
         return durations[_WARM_UP:]
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
-        far.terminate()
-        far.wait()
 
 
-def _taker(node: Node, topic: Topic, way: str) -> Callable[[], bool]:
+def _taker(node: Node, topic: Topic, way: str, at_end: ExitStack) -> Callable[[], bool]:
     """What looks for a message once, and says whether there was one."""
     if way == _DIRECT:
         inbox, spinner = DirectSubscription(node, topic), Spinner(node)
+        at_end.callback(spinner.close)
 
         def take_directly() -> bool:
             if inbox.take() is not None:
@@ -84,6 +85,7 @@ def _taker(node: Node, topic: Topic, way: str) -> Callable[[], bool]:
     node.create_subscription(topic.message_type, topic.name, keep, topic.qos, raw=True)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    at_end.callback(executor.shutdown)
 
     def take_by_executor() -> bool:
         executor.spin_once(timeout_sec=0.1)
@@ -104,16 +106,18 @@ class _FarSide(Node):
 
     def __init__(self) -> None:
         super().__init__("far_side")
-        self._take = _taker(self, _PING, os.environ[_WAY])
+        self._at_end = ExitStack()
+        self._take = _taker(self, _PING, os.environ[_WAY], self._at_end)
         self._publisher = topics.create_publisher(self, _PONG)
         self._answer = bytes(int(os.environ[_SIZE]))
 
     def run(self, stop: StopSignal) -> None:
-        while not stop:
-            if self._take():
-                self._publisher.publish(self._answer)
+        with self._at_end:
+            while not stop:
+                if self._take():
+                    self._publisher.publish(self._answer)
 
 
 if __name__ == "__main__":
     limit_threads()
-    sys.exit(run_node(_FarSide))
+    sys.exit(run_node(lambda: _FarSide))

@@ -1,0 +1,152 @@
+"""What a tick of the simulator costs, and how that grows with the degrees of freedom (DoF)."""
+
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.chains import write_chain
+from benchmarks.nodes import Nodes
+from msgs_config import topics
+from msgs_config.arrays import FloatArray
+from msgs_config.messages import JointStateDecoder, JointStateEncoder
+from msgs_config.polling import DirectSubscription, Spinner
+from sim_node.parameters import Cast, Part, make_cast, make_role, make_settings
+from sim_node.simulation import Simulation
+
+_CHAINS = (1, 8, 32, 100)  # hinges
+_HUMANOIDS = (1, 2, 4, 8)
+_APART = 3.0  # m between humanoids
+_WARM_UP, _TICKS = 100, 1500
+_SMALL_TURN = 0.01  # rad by which each hinge is off the vertical
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a tick costs."""
+
+    label: str
+    dofs: int
+    alone_us: float  # median
+    over_topics_us: float  # median
+
+
+def measure_cost(console: Console) -> None:
+    """Measure and print a table for chains and one for humanoids."""
+    with tempfile.TemporaryDirectory() as directory:
+        chains = {_label(n, "hinge"): chain(Path(directory), n) for n in _CHAINS}
+        crowds = {_label(n, "humanoid"): humanoids(n) for n in _HUMANOIDS}
+        for kind in (chains, crowds):
+            costs = []
+            for label, given in kind.items():
+                console.print(f"cost: {label} ...")
+                costs.append(_measure(label, given))
+            console.print(_table(costs))
+
+
+def _label(count: int, kind: str) -> str:
+    return f"{count} {kind}" + "s" * (count > 1)
+
+
+def chain(directory: Path, hinges: int) -> dict[str, object]:
+    """Parameters of a simulator of a chain that swings freely."""
+    file = write_chain(directory, hinges)
+    return {"character": str(file), "initial_position": [_SMALL_TURN] * hinges}
+
+
+def humanoids(count: int) -> dict[str, object]:
+    """Parameters of a simulator of limp humanoids in a row."""
+    names = [f"humanoid_{index}" for index in range(count)]
+    places = {f"{n}.placement": [0.0, _APART * i, 0.0, 0.0] for i, n in enumerate(names)}
+    return {"character": "humanoid", "characters": names, **places}
+
+
+def make_simulation(cast: Cast) -> Simulation:
+    """The simulation of a cast, without ROS."""
+    roles = [make_role(part.character, part.values, part.name) for part in cast.parts]
+    return Simulation(roles, make_settings(cast.values))
+
+
+def _measure(label: str, given: Mapping[str, object]) -> Cost:
+    cast = make_cast(given)
+    dofs = sum(part.character.layout.size for part in cast.parts)
+    alone = np.median(1e6 * step_durations(cast))
+    return Cost(label, dofs, float(alone), _over_topics(cast, given))
+
+
+def step_durations(cast: Cast) -> FloatArray:
+    """Durations (ticks,) in s of the steps of a simulation without ROS and without efforts."""
+    with make_simulation(cast) as simulation:
+        efforts = [np.zeros(actor.layout.size) for actor in simulation.actors]
+        times = []
+        for _ in range(_WARM_UP + _TICKS + 1):
+            times.append(time.perf_counter())
+            simulation.step(efforts)
+    return np.diff(times)[_WARM_UP:]
+
+
+def _over_topics(cast: Cast, given: Mapping[str, object]) -> float:
+    """Median duration in µs of the ticks of `sim_node`, whose states are answered by zeros."""
+    ticks = _WARM_UP + _TICKS
+    with Nodes() as nodes:
+        nodes.start(topics.SIM_NODE, {**given, "max_ticks": ticks})
+        nodes.wait_until(lambda: nodes.reports)
+        spinner = Spinner(nodes.node)
+        limp = [_LimpController(nodes, part) for part in cast.parts]
+
+        def answer() -> None:
+            answered = [controller.answer() for controller in limp]
+            if any(answered):
+                spinner.received()
+            else:
+                spinner.rest()
+
+        nodes.wait_until(lambda: int(nodes.reports[-1]["tick"]) > ticks, answer)
+        spinner.close()
+        return float(nodes.reports[-1]["tick_us_p50"])
+
+
+class _LimpController:
+    """Answers the states of one character with zeros, at the least cost."""
+
+    def __init__(self, nodes: Nodes, part: Part) -> None:
+        names = [n for n in part.character.layout.dof_names if not n.startswith("root_")]
+        self._states = DirectSubscription(nodes.node, topics.JOINT_STATES.under(part.name))
+        self._torques = topics.create_publisher(nodes.node, topics.JOINT_TORQUES.under(part.name))
+        self._encoder, self._zeros = JointStateEncoder(names), np.zeros(len(names))
+        self._decoder = JointStateDecoder()
+
+    def answer(self) -> bool:
+        """Answer a state if there is one; whether there was."""
+        raw = self._states.take()
+        if raw is None:
+            return False
+        stamp_ns = self._decoder.decode(raw).stamp_ns
+        self._torques.publish(self._encoder.encode(stamp_ns, effort=self._zeros))
+        return True
+
+
+def _table(costs: list[Cost]) -> Table:
+    title = "one tick of the simulator (median), and a DoF's share over that of the smallest"
+    table = Table(title=title, title_justify="left")
+    for column in ("", "DoF", "alone µs", "ticks/s", "µs/DoF", "ratio"):
+        table.add_column(column, justify="right" if column else "left")
+    for column in ("topics µs", "µs/DoF", "ratio"):
+        table.add_column(column, justify="right")
+    first = costs[0]
+    for cost in costs:
+        row = [cost.label, str(cost.dofs), f"{cost.alone_us:.0f}", f"{1e6 / cost.alone_us:.0f}"]
+        row += _per_dof(cost.alone_us / cost.dofs, first.alone_us / first.dofs)
+        row += [f"{cost.over_topics_us:.0f}"]
+        row += _per_dof(cost.over_topics_us / cost.dofs, first.over_topics_us / first.dofs)
+        table.add_row(*row)
+    return table
+
+
+def _per_dof(value: float, smallest: float) -> list[str]:
+    return [f"{value:.2f}", f"{value / smallest:.2f}"]

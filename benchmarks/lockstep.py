@@ -1,0 +1,60 @@
+"""What lockstep over topics costs, beside a bare round trip and the loop in one process."""
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.closed_loop import in_process, over_topics
+from benchmarks.round_trip import round_trips
+from experiment.plan import Plan, make_plan
+from msgs_config.arrays import FloatArray
+
+_COUNT = 5000  # round trips
+_DURATION = 20.0  # s of simulated time
+_REFERENCES: dict[str, dict[str, object]] = {
+    "pendulum": {"reference": "hold"},
+    "humanoid": {"reference": "clip", "clip": "walk"},
+}
+
+
+def measure_lockstep(console: Console) -> None:
+    """Measure and print the table."""
+    table = Table(title="lockstep, one tick (µs)", title_justify="left")
+    for column in ("", "p50", "p99", "ticks/s", "real-time factor"):
+        table.add_column(column, justify="right" if column else "left")
+    ratios = []
+    for name, reference in _REFERENCES.items():
+        console.print(f"lockstep: {name} ...")
+        ratios.append(_measure(make_plan(name, _DURATION, reference, {}, {}), table))
+    console.print(table)
+    for ratio in ratios:
+        console.print(ratio)
+
+
+def _measure(plan: Plan, table: Table) -> str:
+    """Add the rows of one character; returns what lockstep over topics adds, in round trips."""
+    name, rate = plan.character.name, plan.simulator.integer("rate")
+    layout = plan.character.layout
+    last = over_topics(plan)[-1]
+    rows = {
+        "(a) bare round trip, taken directly": _row(round_trips(layout, _COUNT, direct=True)),
+        "(a') bare round trip, by executors": _row(round_trips(layout, _COUNT, direct=False)),
+        "(b) in one process": _row(in_process(plan)),
+        "(c) over topics": tuple(
+            float(last[key]) for key in ("tick_us_p50", "tick_us_p99", "ticks_per_s")
+        ),
+    }
+    for label, (p50, p99, per_second) in rows.items():
+        factor = "" if "bare" in label else f"{per_second / rate:.1f}"
+        table.add_row(f"{name} {label}", f"{p50:.0f}", f"{p99:.0f}", f"{per_second:.0f}", factor)
+    direct, executors, joined, apart = (values[0] for values in rows.values())
+    return (
+        f"{name}: ((c) - (b)) / (a) = {(apart - joined) / direct:.2f}, "
+        f"((c) - (b)) / (a') = {(apart - joined) / executors:.2f}"
+    )
+
+
+def _row(durations: FloatArray) -> tuple[float, ...]:
+    """Median and 99th percentile in microseconds, and how many a second, of durations in s."""
+    p50, p99 = np.percentile(1e6 * durations, (50, 99))
+    return float(p50), float(p99), float(1.0 / durations.mean())

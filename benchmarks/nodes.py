@@ -1,0 +1,96 @@
+"""Nodes of this package as child processes, and what the simulator reports of itself."""
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+from experiment.figures import PARAMETERS, write_parameters
+from experiment.processes import Child, Children
+from msgs_config import topics
+
+_PATIENCE = 120.0  # s for a whole run
+
+
+class Nodes:
+    """Child processes in a `with` block, and a node of this process that hears their reports."""
+
+    def __init__(self) -> None:
+        self.reports: list[dict[str, str]] = []  # those of the simulator, oldest first
+        self._simulator: Child | None = None
+
+    def __enter__(self) -> "Nodes":
+        self._stack = ExitStack()
+        rclpy.init()
+        self._stack.callback(rclpy.try_shutdown)
+        self.node = Node("benchmark")
+        self._stack.callback(self.node.destroy_node)
+        self._directory = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+        self._children = self._stack.enter_context(Children())
+        topic = topics.DIAGNOSTICS
+        self.node.create_subscription(topic.message_type, topic.name, self._listen, topic.qos)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.close()
+
+    def start(self, name: str, parameters: Mapping[str, object]) -> Child:
+        """Start one of the package's nodes."""
+        child = start_node(self._children, self._directory, name, parameters)
+        if name == topics.SIM_NODE:
+            self._simulator = child
+        return child
+
+    def wait_until(
+        self, done: Callable[[], object], step: Callable[[], object] | None = None
+    ) -> None:
+        """Take reports, or what else a step takes, until it is done.
+
+        Raises:
+            RuntimeError: the simulator failed, or it takes longer than two minutes.
+        """
+        deadline = time.monotonic() + _PATIENCE
+        while not done():
+            if step is None:
+                rclpy.spin_once(self.node, timeout_sec=0.05)
+            else:
+                step()
+            failed = self._simulator is not None and self._simulator.exit_code
+            if failed or time.monotonic() > deadline:
+                words = self._simulator.last_words() if self._simulator else "not started"
+                raise RuntimeError(f"the simulator does not report what is waited for: {words}")
+
+    def _listen(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name.endswith(topics.SIM_NODE):
+                self.reports.append({item.key: item.value for item in status.values})
+
+
+def start_node(
+    children: Children, directory: Path, name: str, parameters: Mapping[str, object]
+) -> Child:
+    """Start one of the package's nodes as a child; parameters and log go to a directory."""
+    (directory / PARAMETERS).mkdir(exist_ok=True)
+    file = write_parameters(directory, name, parameters)
+    arguments = ["--ros-args", "--params-file", str(file)]
+    log = directory / f"{name}.log"
+    return children.start(lambda: Child(name, f"{name}.main", arguments, log, dict(os.environ)))
+
+
+def private_memory(child: Child) -> float:
+    """Memory in MB that a child shares with nobody and no file holds."""
+    lines = Path(f"/proc/{child.pid}/smaps_rollup").read_text().splitlines()
+    (anonymous,) = (line.split()[1] for line in lines if line.startswith("Pss_Anon:"))
+    return 1e-3 * float(anonymous)

@@ -1,0 +1,42 @@
+"""The soak in short: what `make soak` does for half a million ticks."""
+
+import itertools
+
+import pytest
+
+from benchmarks import soak as soak_module
+from benchmarks.soak import soak
+from msgs_config.polling import DirectSubscription
+
+
+def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(domain: int) -> None:
+    del domain  # the processes inherit it
+
+    found = soak(15_000, seed=2, progress=lambda tick: None)
+
+    assert found.problems == []
+    assert found.ticks == 15_000
+    assert set(found.growth) == {"sim_node", "controller_node"}
+    assert set(found.disturbances) == {"push", "pause", "reset", "set_gain", "set_duration"}
+
+
+def test_a_tick_that_is_lost_is_found(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    del domain
+
+    class Leaky(DirectSubscription):
+        """Loses the 300th message that it takes."""
+
+        def __init__(self, *arguments: object) -> None:
+            super().__init__(*arguments)
+            self._taken = itertools.count(1)
+
+        def take(self) -> bytes | None:
+            raw = super().take()
+            return super().take() if raw is not None and next(self._taken) == 300 else raw
+
+    monkeypatch.setattr(soak_module, "DirectSubscription", Leaky)
+
+    found = soak(600, seed=2, progress=lambda tick: None)
+
+    (problem,) = found.problems
+    assert problem.startswith("after tick 299 comes")
