@@ -2,6 +2,7 @@
 
 import time
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +63,8 @@ class ControllerNode(Node):
         given = given_parameters(self)
         loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)))
         self._character = placed(loaded, given)
+        for note in self._character.notes:
+            self.get_logger().warning(note)
         self._layout = self._character.layout
         self._declared = PARAMETERS + character_parameters(self._character)
         self._values = resolve(self._declared, given)
@@ -89,9 +92,10 @@ class ControllerNode(Node):
         self._decoder = JointStateDecoder()
         self._torque_encoder = JointStateEncoder(names)
         self._reference_encoder = JointStateEncoder(self._layout.dof_names)
-        self._states = DirectSubscription(self, topics.JOINT_STATES)
         self._episodes = DirectSubscription(self, topics.EPISODE)
         self._simulators = DirectSubscription(self, topics.CONFIGURATION.of(topics.SIM_NODE))
+        # after them: a simulator that has found this subscription has found the others as well
+        self._states = DirectSubscription(self, topics.JOINT_STATES)
         self._references = topics.create_publisher(self, topics.REFERENCE)
         self._torques = topics.create_publisher(self, topics.JOINT_TORQUES)
         self._configurations = topics.create_publisher(self, topics.CONFIGURATION)
@@ -114,12 +118,13 @@ class ControllerNode(Node):
         try:
             while not stop:
                 self._report()
+                self._check_simulator()
                 raw = self._next_state()
                 if raw is None:
-                    self._check_simulator()
                     spinner.rest()
                 else:
                     spinner.received()
+                    spinner.serve()  # a flood of states must not keep services waiting
                     self._take_state(raw)
         finally:
             self._report(at_once=True)
@@ -128,13 +133,23 @@ class ControllerNode(Node):
     def _next_state(self) -> bytes | None:
         """The next state; in real time the newest, for the others have been overtaken."""
         raw = self._states.take()
-        while raw is not None and self._simulator_runs_on:
+        if raw is None or not self._simulator_runs_on:
+            return raw
+        for _ in range(topics.JOINT_STATES.qos.depth):
             newer = self._states.take()
             if newer is None:
                 break
-            self._counts["overtaken"] += 1
+            self._overtake(raw)
             raw = newer
         return raw
+
+    def _overtake(self, raw: bytes) -> None:
+        """Leave a state without an answer, save that it may be the first of an episode."""
+        self._counts["overtaken"] += 1
+        with suppress(MessageError, LayoutError):
+            state = state_in_layout(self._layout, self._decoder.decode(raw))
+            if state.effort is None:
+                self._episode_ns = state.stamp_ns
 
     def _check_simulator(self) -> None:
         """Compare a simulator that says what it simulates with this controller."""

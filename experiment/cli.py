@@ -30,10 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = _parser().parse_args(arguments)
         options.command(options)
-    except ActuatedCharactersError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_ERROR
-    except OSError as error:
+    except (ActuatedCharactersError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_ERROR
     except BaseException:  # a module that was being imported may have turned it into its own

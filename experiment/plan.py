@@ -20,6 +20,7 @@ _SHARED = ("rate", "gravity", "placement")  # the same on both sides; set on one
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
+    "characters": "nobody: a run has one character; start sim_node itself for several",
     "max_ticks": "--duration",
     "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",
 }

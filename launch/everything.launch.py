@@ -5,6 +5,7 @@ from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, Shut
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = "actuated_characters"
@@ -32,7 +33,10 @@ def generate_launch_description() -> LaunchDescription:
                 executable="recorder",
                 name="recorder",
                 namespace=LaunchConfiguration("namespace"),
-                parameters=[{"directory": LaunchConfiguration("directory")}],
+                # a text, also where it looks like a number
+                parameters=[
+                    {"directory": ParameterValue(LaunchConfiguration("directory"), value_type=str)}
+                ],
                 output="screen",
                 on_exit=Shutdown(reason="the recorder has ended"),
             ),

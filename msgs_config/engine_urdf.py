@@ -8,6 +8,7 @@ from msgs_config.character import Loading
 from msgs_config.errors import CharacterError
 from msgs_config.mesh_check import check_mesh
 from msgs_config.meshes import resolve_meshes
+from msgs_config.urdf_check import NUMBERS
 
 MAX_LINE_BYTES = 8000
 """The engine reads lines of up to 8191 bytes, and breaks a longer one in two."""
@@ -26,6 +27,10 @@ def engine_urdf(loading: Loading) -> str:
     for link in robot.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
+    for element in robot.iter():
+        for attribute in NUMBERS.get(element.tag, {}):
+            if attribute in element.attrib:
+                element.set(attribute, " ".join(element.attrib[attribute].split()))
     resolve_meshes(robot, loading.urdf_path)
     for path in {mesh.get("filename", "") for mesh in robot.iterfind("link//mesh")}:
         try:

@@ -1,6 +1,7 @@
 """Files from outside: found by name, read as data with a limit on size, never evaluated."""
 
 import importlib.util
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -33,16 +34,13 @@ def resolve(path: str, relative_to: Path, error: type[ActuatedCharactersError]) 
 
 
 def _package_directory(package: str, error: type[ActuatedCharactersError]) -> Path:
-    try:
-        spec = importlib.util.find_spec(package) if package.isidentifier() else None
-    except ValueError:  # a module that was not imported from anywhere, such as __main__
-        spec = None
-    if spec is not None and spec.submodule_search_locations:
-        return Path(spec.submodule_search_locations[0])
-    try:
+    with suppress(PackageNotFoundError, ValueError, OSError):  # OSError: no ROS environment
         return Path(get_package_share_directory(package))
-    except (PackageNotFoundError, ValueError, OSError) as cause:  # OSError: no ROS environment
-        raise error(f"package '{package}' is not installed") from cause
+    with suppress(ValueError):  # a module that was never found, such as the main one
+        spec = importlib.util.find_spec(package) if package.isidentifier() else None
+        if spec is not None and spec.submodule_search_locations:
+            return Path(spec.submodule_search_locations[0])
+    raise error(f"package '{package}' is not installed")
 
 
 def read_text(path: Path, error: type[ActuatedCharactersError]) -> str:

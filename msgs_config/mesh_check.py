@@ -27,7 +27,7 @@ def check_mesh(path: Path) -> None:
         raise CharacterError(f"mesh {path} is to collide with; it must be an .obj or .stl file")
     try:
         if suffix == ".obj":
-            _check_obj(path.read_text(encoding="utf-8", errors="replace"))
+            _check_obj(path.read_bytes().decode("latin-1"))
         else:
             _check_stl(path)
     except (OSError, ValueError) as error:
@@ -44,10 +44,11 @@ def _check_stl(path: Path) -> None:
 
 def _check_obj(text: str) -> None:
     counts = dict.fromkeys(_OBJ_LISTS, 0)
-    for number, line in enumerate(text.splitlines(), start=1):
+    # as the engine has it: Python's own splitting knows more characters that part and end
+    for number, line in enumerate(text.split("\n"), start=1):
         if len(line) > MAX_LINE:
             raise ValueError(f"line {number} is longer than {MAX_LINE}")
-        kind, *pieces = line.split() or [""]
+        kind, *pieces = re.split("[ \t]+", line.strip(" \t\r"))
         if kind in counts:
             counts[kind] += 1
             if not all(isfinite(float(piece)) for piece in pieces):

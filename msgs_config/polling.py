@@ -82,7 +82,9 @@ class Spinner:
 
     def rest_for(self, seconds: float) -> None:
         """Let others work for a time that is known; ends early rather than late."""
+        until = time.monotonic() + seconds
         self.serve()
+        seconds = until - time.monotonic()
         if seconds > _SHORT_REST:
             self._turn(min(seconds - _SHORT_REST, _SERVICE_PERIOD))
         elif seconds > _SLEEP_ERROR:

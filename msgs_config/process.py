@@ -82,16 +82,16 @@ def run_node(load: Callable[[], Callable[[], RunnableNode]]) -> int:
         load: Imports what the node needs, and gives what makes it.
     """
     stop = StopSignal()
-    node, code = None, 0
+    node, code = None, EXIT_ERROR
     try:
         with stop.ending_at_once():
             _start_ros()
             make_node = load()
         node = make_node()
         node.run(stop)
+        code = 0
     except ActuatedCharactersError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
-        code = EXIT_ERROR
     finally:
         _leave(node, code)
     return code

@@ -34,4 +34,5 @@ def _is_legal(robot: ElementTree.Element) -> bool:
     shapes = {shape.tag for part in parts for shape in part.iterfind("geometry/*")}
     limits = robot.findall("joint/limit")
     whole = all({"effort", "velocity"} <= set(limit.attrib) for limit in limits)
-    return robot.tag == "robot" and types <= _JOINT_TYPES and shapes <= _SHAPES and whole
+    named = robot.tag == "robot" and bool(robot.get("name"))
+    return named and types <= _JOINT_TYPES and shapes <= _SHAPES and whole

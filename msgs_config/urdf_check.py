@@ -17,7 +17,7 @@ _TYPES = (*_WITH_AXIS, "spherical", "fixed")
 _LARGEST = 1e30  # the engine's single precision ends at 3e38
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _ANY, _POSITIVE = -_LARGEST, 0.0
-_NUMBERS = {  # by element and attribute: how many, and the least that they may be
+NUMBERS = {  # by element and attribute: how many, and the least that they may be
     "origin": {"xyz": (3, _ANY), "rpy": (3, _ANY)},
     "axis": {"xyz": (3, _ANY)},
     "mass": {"value": (1, _POSITIVE)},
@@ -125,7 +125,7 @@ def _check_size(path: Path, joints: list[ElementTree.Element]) -> None:
 
 def _check_numbers(path: Path, part: ElementTree.Element) -> None:
     for element in part.iter():
-        for attribute, (count, minimum) in _NUMBERS.get(element.tag, {}).items():
+        for attribute, (count, minimum) in NUMBERS.get(element.tag, {}).items():
             text = element.get(attribute)
             if text is not None and not _are_numbers(text, count, minimum):
                 bound = f" of at least {minimum:g}" if minimum > -_LARGEST else ""

@@ -3,7 +3,6 @@
 from rclpy.node import Node
 
 _MOST_SAID = 100  # different ones, lest a hostile sender fill the memory and the log
-
 _LONGEST = 1000  # characters of a sentence, which may quote what was received
 
 
@@ -18,10 +17,10 @@ class Warnings:
         """Log a sentence, unless it, or another one of its kind, was logged before."""
         if len(sentence) > _LONGEST:
             sentence = sentence[:_LONGEST] + " ..."
-        if not self.has_said(kind or sentence) and len(self._said) < _MOST_SAID:
+        if not self.has_said(kind or sentence):
             self._said.add(kind or sentence)
             self._node.get_logger().warning(sentence)
 
     def has_said(self, kind: str) -> bool:
-        """Whether a sentence of a kind was logged."""
-        return kind in self._said
+        """Whether a sentence of a kind was logged, or so many that no more are."""
+        return kind in self._said or len(self._said) >= _MOST_SAID

@@ -1,6 +1,7 @@
 """What ROS tools show: the base as odometry and transform, and the shapes as markers."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -106,7 +107,7 @@ def _marker(number: int, shape: Shape) -> Marker:
     marker = Marker(type=_TYPES[shape.type], id=number, scale=_scale(shape))
     marker.color = ColorRGBA(r=red, g=green, b=blue, a=alpha)
     if shape.mesh:
-        marker.mesh_resource = f"file://{shape.mesh}"
+        marker.mesh_resource = Path(shape.mesh).as_uri()
         marker.mesh_use_embedded_materials = True
     return marker
 

@@ -101,10 +101,6 @@ class SimNode(Node):
     def _complete(self) -> bool:
         return all(port.collector.complete for port in self._ports)
 
-    @property
-    def _missing(self) -> list[str]:
-        return [name for port in self._ports for name in port.missing]
-
     def _wait_for_subscribers(self, stop: StopSignal, spinner: Spinner) -> None:
         wanted = self._values.integer("wait_for_subscribers")
         self._patience.restart(time.monotonic())
@@ -198,7 +194,8 @@ class SimNode(Node):
         joint = f"{port.actor.role.prefix}{port.collector.conflict}"
         if self._realtime and port.warnings.has_said(joint):
             return  # finding out who publishes takes its time
-        senders = publisher_names(self, port.torques)
+        # the world of real time cannot wait for a name that has not been discovered yet
+        senders = publisher_names(self, port.torques, wait_for_names=not self._realtime)
         sentence = (
             f"two different commands for '{joint}' at one tick; '{port.torques.name}' is "
             f"published by {', '.join(senders)}"
@@ -224,8 +221,8 @@ class SimNode(Node):
                 self._on_timeout()
 
     def _describe_waiting(self) -> str:
-        port = next(port for port in self._ports if port.missing)
-        return describe_waiting(self, port.torques, self._missing)
+        waiting = [port for port in self._ports if port.missing]
+        return "; ".join(describe_waiting(self, port.torques, port.missing) for port in waiting)
 
     def _on_timeout(self) -> None:
         action = self._values.text("on_timeout")

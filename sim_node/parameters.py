@@ -20,7 +20,7 @@ from sim_node.world import WorldSettings
 _LARGEST_COUNT = 2**62
 _PLANE, _NOTHING = "plane", "none"
 _BEFORE = (CHARACTER.name, PLACEMENT.name)  # what the other parameters depend on
-_NAME = re.compile("[A-Za-z][A-Za-z0-9_]*")
+_NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
 WORLD_PARAMETERS = [
     RATE,
@@ -187,8 +187,8 @@ def _names(given: Mapping[str, object]) -> list[str]:
     for name in names:
         if not _NAME.fullmatch(name) or names.count(name) > 1:
             raise ConfigurationError(
-                f"parameter 'characters' has {name!r}; it must list different names of letters, "
-                "digits and underscores"
+                f"parameter 'characters' has {name!r}; it must list different names of at most 64 "
+                "letters, digits and underscores"
             )
     return names or [""]
 

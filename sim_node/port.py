@@ -64,10 +64,12 @@ class Port:
     def forget(self) -> None:
         """Forget what was sent in the episode before, taken already or not."""
         self.collector.clear()
+        self.last_effort = self.collector.effort
         self._pushes.clear()
-        for _ in range(_MOST_FORGOTTEN):
-            if self._wrenches.take() is None:
-                return
+        for unread in (self._commands, self._wrenches):
+            for _ in range(_MOST_FORGOTTEN):
+                if unread.take() is None:
+                    break
 
     def take_command(self) -> Verdict | None:
         """Take a command if one is there; what was made of it."""

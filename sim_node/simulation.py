@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from msgs_config.arrays import FloatArray
+from msgs_config.errors import SimulationError
 from msgs_config.tick_clock import TickClock
 from sim_node.actor import Actor, Role
 from sim_node.pushes import Push
@@ -94,18 +95,22 @@ class Simulation:
         self.tick += 1
         for actor in self.actors:
             actor.end_tick(self.stamp_ns)
-        for actor in self.actors:
-            actor.check_divergence(self.tick, self.settings.speed_limit)
+        try:
+            for actor in self.actors:
+                actor.check_divergence(self.tick, self.settings.speed_limit)
+        except SimulationError:
+            self.tick -= 1  # nobody is to see that state; a reset's first one has its stamp
+            raise
 
     def reset(self) -> None:
         """Begin a new episode in a new world, whose first states have the next tick's stamp.
 
         All that follows is what would follow in a fresh simulation, to the bit.
         """
-        self._world.close()
         self.tick += 1
         self.episode += 1
-        self._world = self._fresh_world()
+        before, self._world = self._world, self._fresh_world()
+        before.close()
 
     def _fresh_world(self) -> World:
         world = World(self.settings.world)

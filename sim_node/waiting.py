@@ -19,12 +19,13 @@ def describe_waiting(node: Node, topic: Topic, missing: list[str]) -> str:
     return f"waiting for commands of {shown}{more}; {_describe_publishers(node, topic)}"
 
 
-def publisher_names(node: Node, topic: Topic) -> list[str]:
+def publisher_names(node: Node, topic: Topic, *, wait_for_names: bool = True) -> list[str]:
     """Full names of the nodes that publish on a topic.
 
-    A publisher is discovered a moment before the name of its node, which is worth a short wait.
+    A publisher is discovered a moment before the name of its node, which is worth a short wait
+    where there is time for it.
     """
-    deadline = time.monotonic() + _NAME_PATIENCE
+    deadline = time.monotonic() + (_NAME_PATIENCE if wait_for_names else 0.0)
     while True:
         infos = node.get_publishers_info_by_topic(topic.name)
         names = {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}

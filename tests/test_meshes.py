@@ -164,6 +164,8 @@ UNSOUND = {  # each of those with an index has crashed the engine
         "half a face": VERTICES + "f 1//1 2//1 3//",
         "no number": "v 0 0 zero\n",
         "not a number": "v 0 0 nan\n",
+        "blanks that are none to the engine": "v\x0b0 0 0\n" * 20 + "f 15 16 17\n",
+        "ends of lines that are none to the engine": "# x\x0cv 0 0 0\n" * 20 + "f 15 16 17\n",
         "a long line": VERTICES + "f" + " 1 2 3" * 1000,
     },
     "x.stl": {

@@ -276,11 +276,11 @@ def test_a_reset_helps_after_a_divergence(processes: Processes, client: Simulato
     assert (stepped[0], "'hinge'" in stepped[1]) == (False, True)
     assert response.success
     assert "paused" in response.message
-    until_reported(client, paused=True, episode=2, tick=3)
+    until_reported(client, paused=True, episode=2, tick=2)
     status = client.diagnostics.last.status[0]
     assert (status.level, status.message) == (status.OK, "running")
     assert client.pause(False).success
-    first = client.state(3)
+    first = client.state(2)  # no stamp is left out, or a recording would miss it
     assert list(first.position) == [0.5]
     assert list(client.answer(first, {"hinge": 0.5}).effort) == [0.5]
 

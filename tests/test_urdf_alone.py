@@ -100,3 +100,14 @@ def test_it_may_lie_in_a_package() -> None:
 def test_one_that_is_not_there_is_refused(name: str, words: str) -> None:
     with pytest.raises(CharacterError, match=words):
         load_character(name)
+
+
+def test_a_tab_between_numbers_is_a_blank_to_the_engine_too(tmp_path: Path) -> None:
+    path = tmp_path / "box.urdf"
+    path.write_text(
+        '<robot name="box"><link name="box"><inertial><origin xyz="1&#9;2&#9;3"/>'
+        '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        "</inertial></link></robot>"
+    )
+
+    assert load_character(str(path)).links[0].inertial_pose.position == (1.0, 2.0, 3.0)
