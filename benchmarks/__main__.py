@@ -15,6 +15,7 @@ from benchmarks.lockstep import measure_lockstep  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
 from experiment.domain import own_domain  # noqa: E402
 
+_WIDTH = 100  # characters; enough for every table
 _MEASUREMENTS = {
     "lockstep": measure_lockstep,
     "cost": measure_cost,
@@ -28,7 +29,7 @@ def main() -> int:
     parser.add_argument("--only", choices=_MEASUREMENTS, help="the one to measure")
     only = parser.parse_args().only
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    console = Console()
+    console = Console(width=_WIDTH)
     with own_domain() as domain:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
         for name, measure in _MEASUREMENTS.items():

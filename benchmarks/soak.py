@@ -10,9 +10,7 @@ import os
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +29,10 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.task import Future  # noqa: E402
 from rich.console import Console  # noqa: E402
-from rich.table import Table  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
 from benchmarks.nodes import private_memory, start_node  # noqa: E402
+from benchmarks.soak_findings import MEMORY_PERIOD, Findings  # noqa: E402
 from experiment.domain import own_domain  # noqa: E402
 from experiment.processes import Child, Children  # noqa: E402
 from msgs_config import topics  # noqa: E402
@@ -44,9 +42,7 @@ from msgs_config.tick_clock import TickClock  # noqa: E402
 from msgs_config.wrench_messages import WrenchArrays, encode_wrenches  # noqa: E402
 
 _RATE = 240  # Hz
-_SETTLED = 10_000  # ticks after which memory must not grow
 _MOST_GROWTH = 5.0  # MB
-_MEMORY_PERIOD = 5_000  # ticks between looks at the memory
 _QUIET_END = 2_000  # ticks without disturbances, so that all that was sent is counted
 _AHEAD = 2_000  # ticks that a push with a future stamp is ahead, so that it is not too late
 _MOST_STEPS = 3  # of one pause
@@ -58,29 +54,6 @@ Progress = Callable[[int], None]
 """Is told the number of ticks so far."""
 
 _Disturbance = Iterator[Future | None]
-
-
-@dataclass
-class Findings:
-    """What a soak has found; it has passed if there are no problems."""
-
-    ticks: int = 0
-    wall_time: float = 0.0  # s
-    repeated_states: int = 0
-    disturbances: Counter[str] = field(default_factory=Counter)
-    memory: dict[str, list[float]] = field(default_factory=dict)  # MB, a process's samples
-    report: dict[str, str] = field(default_factory=dict)  # the simulator's last one
-    problems: list[str] = field(default_factory=list)
-
-    @property
-    def growth(self) -> dict[str, float]:
-        """MB that each process has grown by, at the most, since it had settled."""
-        settled = _SETTLED // _MEMORY_PERIOD
-        return {
-            name: max(samples[settled:], default=0.0) - samples[settled]
-            for name, samples in self.memory.items()
-            if len(samples) > settled
-        }
 
 
 def soak(ticks: int, seed: int, progress: Progress) -> Findings:
@@ -148,7 +121,7 @@ class _Soak:
             time.sleep(_NAP)
             self._check_alive(heard_at)
             if self._tick >= next_look:
-                next_look += _MEMORY_PERIOD
+                next_look += MEMORY_PERIOD
                 self._look_at_memory()
                 progress(self._tick)
             if waits_for is not None:
@@ -288,7 +261,7 @@ def main() -> int:
     console = Console()
 
     def progress(tick: int) -> None:
-        if tick % (10 * _MEMORY_PERIOD) < _MEMORY_PERIOD:
+        if tick % (10 * MEMORY_PERIOD) < MEMORY_PERIOD:
             console.print(f"tick {tick} of {arguments.ticks}")
 
     with own_domain() as domain:
@@ -298,27 +271,10 @@ def main() -> int:
         except (RuntimeError, KeyboardInterrupt) as error:
             console.print(f"[red]not to the end: {error or 'interrupted'}")
             return 1
-    console.print(_table(found))
+    console.print(found.table())
     for problem in found.problems[:20]:
         console.print(f"[red]{problem}")
     return 1 if found.problems else 0
-
-
-def _table(found: Findings) -> Table:
-    table = Table(title="soak", title_justify="left", show_header=False)
-    rate = found.ticks / found.wall_time
-    table.add_row("ticks", f"{found.ticks} in {found.wall_time:.0f} s, {rate:.0f} a second")
-    table.add_row("states that came twice", str(found.repeated_states))
-    for name, count in sorted(found.disturbances.items()):
-        table.add_row(name, str(count))
-    for name, samples in found.memory.items():
-        growth = found.growth.get(name)
-        grown = "" if growth is None else f", grown by {growth:.2f} MB since it had settled"
-        table.add_row(f"memory of {name}", f"{samples[-1]:.1f} MB{grown}")
-    for key in ("accepted", "duplicate", "stale", "tick_us_p50", "tick_us_p99"):
-        table.add_row(key, found.report.get(key, "?"))
-    table.add_row("problems", str(len(found.problems)))
-    return table
 
 
 if __name__ == "__main__":

@@ -26,7 +26,9 @@ class RunListener:
     comes before it is kept.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, simulator: str = topics.SIM_NODE) -> None:
+        """`simulator` is the name of its status in the diagnostics."""
+        self._simulator = simulator
         self._decoder = JointStateDecoder()
         self._configuration: RunConfiguration | None = None
         self._configuration_text = ""
@@ -109,6 +111,6 @@ class RunListener:
 
     def _take_counts(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name.rpartition("/")[2] == topics.SIM_NODE:
+            if status.name == self._simulator:
                 values = {item.key: item.value for item in status.values}
                 self._counts |= {name: int(values[name]) for name in self._counts if name in values}

@@ -83,25 +83,30 @@ def make_plan(
         "commanded_joints": commanded,
         "initial_position": first.configuration.position.tolist(),
         "initial_velocity": first.velocity.tolist(),
-        # nobody is there to resume what has paused, or to wait for ever
-        "on_fault": "abort",
-        "lockstep_timeout": _LOCKSTEP_TIMEOUT,
     }
-    simulator = resolve(
-        simulator_parameters.PARAMETERS + simulator_parameters.character_parameters(character),
-        {**defaults, **simulator_given},
-    )
-    simulator["max_ticks"] = _ticks(duration, simulator.integer("rate"))
-    character.layout.mask(simulator.texts("commanded_joints"))  # they exist
-    gravity = simulator.number("gravity")
-    check_agreement(
-        DynamicsModel(character, gravity), character.layout, measure_probe(character, gravity)
-    )
+    simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
+    _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
     clamped = () if frames is None else frames.clamped
     kept = (f"kept within joint limits: {', '.join(clamped)}",) if clamped else ()
     notes = character.notes + kept
     return Plan(character, motion, simulator, controller, notes)
+
+
+def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:
+    # nobody is there to resume what has paused, or to wait for ever
+    defaults = {"on_fault": "abort", "lockstep_timeout": _LOCKSTEP_TIMEOUT}
+    parameters = simulator_parameters.PARAMETERS
+    own = simulator_parameters.character_parameters(character)
+    values = resolve(parameters + own, {**defaults, **given})
+    values["max_ticks"] = _ticks(duration, values.integer("rate"))
+    character.layout.mask(values.texts("commanded_joints"))  # they exist
+    return values
+
+
+def _check_engines(character: Character, gravity: float) -> None:
+    model, probe = DynamicsModel(character, gravity), measure_probe(character, gravity)
+    check_agreement(model, character.layout, probe)
 
 
 def _shared(

@@ -50,7 +50,7 @@ class RecorderNode(Node):
         self._directory = Path(values.text("directory"))
         self._progress_period = values.number("progress_period")
         self._bag = BagWriter(self._directory / BAG) if values.flag("write_bag") else None
-        self._listener = RunListener()
+        self._listener = RunListener(self.resolve_topic_name(topics.SIM_NODE).lstrip("/"))
         self._failure: str | None = None
         self._recorded_names: dict[str, str] = {}
         self._published: dict[str, int] = {}  # ns of wall time, of each topic's last message

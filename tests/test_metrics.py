@@ -540,6 +540,7 @@ def test_commands_are_counted_as_the_simulator_reports_them_last() -> None:
     messages = [
         report(SIMULATOR, 5, rejected=1, duplicate=2, tick=3),
         report("some_other_node", 6, rejected=70, duplicate=70),
+        report(f"other/{SIMULATOR}", 6, rejected=71, duplicate=71),  # another character's
         report(SIMULATOR, 7, rejected=4, duplicate=5, tick=20),
         report(SIMULATOR, 8),
     ]
