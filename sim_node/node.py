@@ -32,7 +32,12 @@ from sim_node.run_control import RunControl
 from sim_node.services import Services
 from sim_node.simulation import FIRST_TICK, Simulation
 from sim_node.tick_times import TickTimes
-from sim_node.waiting import describe_waiting, publisher_names
+from sim_node.waiting import (
+    UNKNOWN_NODE,
+    describe_conflict,
+    describe_waiting,
+    publisher_names,
+)
 
 _EXPLAIN_AFTER = 2.0  # s without a complete command before the node says what is missing
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
@@ -68,6 +73,7 @@ class SimNode(Node):
         self._diagnostics = DiagnosticsPublisher(self)
         self._next_diagnostics = 0.0
         self._timeouts = 0
+        self._conflicts: dict[str, Port] = {}  # joints of which commands compete in real time
         self._tick_times = TickTimes()
         self._begun = False
         self._control = RunControl()
@@ -192,24 +198,27 @@ class SimNode(Node):
         if self._control.paused and not self._control.runs:
             return
         joint = f"{port.actor.role.prefix}{port.collector.conflict}"
-        if self._realtime and port.warnings.has_said(joint):
-            return  # finding out who publishes takes its time
-        # the world of real time cannot wait for a name that has not been discovered yet
-        senders = publisher_names(self, port.torques, wait_for_names=not self._realtime)
-        sentence = (
-            f"two different commands for '{joint}' at one tick; '{port.torques.name}' is "
-            f"published by {', '.join(senders)}"
-        )
         if self._realtime:
-            port.warnings.say_once(f"{sentence}; the last one counts", kind=joint)
+            self._conflicts[joint] = port  # finding out who publishes takes its time
         else:
-            self._raise_fault(sentence)
+            senders = publisher_names(self, port.torques)
+            self._raise_fault(describe_conflict(joint, port.torques, senders))
+
+    def _tell_conflicts(self) -> None:
+        """Say once a joint whose commands compete in real time, when it is known."""
+        for joint, port in self._conflicts.items():
+            if not port.warnings.has_said(joint):
+                senders = publisher_names(self, port.torques, wait_for_names=False)
+                if UNKNOWN_NODE not in senders:
+                    sentence = describe_conflict(joint, port.torques, senders)
+                    port.warnings.say_once(f"{sentence}; the last one counts", kind=joint)
 
     def _look_at_the_clock(self) -> None:
         now = time.monotonic()
         if now >= self._next_diagnostics:
             self._next_diagnostics = now + DIAGNOSTICS_PERIOD
             self._publish_diagnostics()
+            self._tell_conflicts()
         for due in self._patience.due(now):
             waits = self._control.runs and not self._complete
             if due is Due.REPUBLISH:

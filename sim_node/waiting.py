@@ -7,6 +7,7 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 
 from msgs_config.topics import Topic
 
+UNKNOWN_NODE = "a node whose name is not known"
 _NAMES_SHOWN = 6
 _UNKNOWN = "_UNKNOWN_"  # in what ROS says of a node whose name has not come yet
 _NAME_PATIENCE, _NAME_POLL = 1.0, 0.01  # s
@@ -17,6 +18,14 @@ def describe_waiting(node: Node, topic: Topic, missing: list[str]) -> str:
     shown = ", ".join(missing[:_NAMES_SHOWN])
     more = f" and {len(missing) - _NAMES_SHOWN} more" if len(missing) > _NAMES_SHOWN else ""
     return f"waiting for commands of {shown}{more}; {_describe_publishers(node, topic)}"
+
+
+def describe_conflict(joint: str, topic: Topic, senders: list[str]) -> str:
+    """One sentence: the entry that is commanded twice, and who publishes commands."""
+    return (
+        f"two different commands for '{joint}' at one tick; '{topic.name}' is published by "
+        + ", ".join(senders)
+    )
 
 
 def publisher_names(node: Node, topic: Topic, *, wait_for_names: bool = True) -> list[str]:
@@ -31,7 +40,7 @@ def publisher_names(node: Node, topic: Topic, *, wait_for_names: bool = True) ->
         names = {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}
         unknown = {name for name in names if _UNKNOWN in name}
         if not unknown or time.monotonic() > deadline:
-            return sorted(names - unknown) + ["a node whose name is not known"] * bool(unknown)
+            return sorted(names - unknown) + [UNKNOWN_NODE] * bool(unknown)
         time.sleep(_NAME_POLL)
 
 
