@@ -21,7 +21,7 @@ class Verdict(Enum):
 
     ACCEPTED = "accepted"
     DUPLICATE = "duplicate"  # repeats what it has already
-    CONFLICT = "conflict"  # differs from what it has already; nothing of it is taken
+    CONFLICT = "conflict"  # differs from another for the same state
     STALE = "stale"  # answers an earlier state, and comes too late
     FUTURE = "future"  # answers a state that was never published
     REJECTED = "rejected"  # malformed; nothing of it is taken
@@ -52,12 +52,9 @@ class LockstepBarrier:
         self._dof_names = tuple(dof_names)
         self._required = required
         self._past: dict[int, _Tick] = {}  # by stamp, the oldest first
-        self._tick = self._empty()
-        self._filled = np.zeros_like(self._required)  # (n,) what nobody commanded
-        self._missing = int(required.sum())
         self.stamp_ns = 0
-        self.conflict: str | None = None  # the first entry of the last conflict
         self.counts: Counter[Verdict] = Counter()
+        self._begin()
 
     def open(self, stamp_ns: int) -> None:
         """Begin to wait for the commands that answer the state of this stamp."""
@@ -67,18 +64,18 @@ class LockstepBarrier:
             if len(self._past) > _REMEMBERED:
                 del self._past[next(iter(self._past))]
         self.stamp_ns = stamp_ns
-        self.conflict = None
-        self._tick = self._empty()
-        self._filled = np.zeros_like(self._required)  # (n,) what nobody commanded
-        self._missing = int(self._required.sum())
+        self._begin()
 
     def clear(self) -> None:
         """Forget the commands of the episode before."""
-        self._tick = self._empty()
         self._past.clear()
+        self._begin()
 
-    def _empty(self) -> _Tick:
-        return _Tick(np.zeros_like(self._required), np.zeros(len(self._required)))
+    def _begin(self) -> None:
+        self._tick = _Tick(np.zeros_like(self._required), np.zeros(len(self._required)))
+        self._filled = np.zeros_like(self._required)  # (n,) what nobody commanded
+        self._missing = int(self._required.sum())
+        self.conflict: str | None = None  # the first entry of the last conflict
 
     @property
     def complete(self) -> bool:

@@ -205,7 +205,7 @@ class SimNode(Node):
             self._raise_fault(describe_conflict(joint, port.torques, senders))
 
     def _tell_conflicts(self) -> None:
-        """Say once a joint whose commands compete in real time, when it is known."""
+        """Say who competes for a joint in real time, once for each, when their names are known."""
         for joint, port in self._conflicts.items():
             if not port.warnings.has_said(joint):
                 senders = publisher_names(self, port.torques, wait_for_names=False)

@@ -14,7 +14,8 @@ _NEVER = -1
 class CommandHold:
     """The last command of each degree of freedom, held until it is too old; then zero.
 
-    Offers the same as `LockstepBarrier`, save that a tick never waits: it is always complete.
+    Offers the same as `LockstepBarrier`, save that a tick never waits: it is always complete. Of
+    two commands in conflict the later one is taken.
     """
 
     complete = True
