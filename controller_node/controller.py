@@ -1,12 +1,13 @@
 """The controller without ROS: state in, effort and reference out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from controller_node.agreement import check_agreement
-from controller_node.control_laws import pd_effort, stable_pd_effort
 from controller_node.dynamics import DynamicsModel
+from controller_node.effort_series import EffortSeries
+from controller_node.laws import GainArrays, Instant, Law, Plant, make_law
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
@@ -17,44 +18,62 @@ from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock
 
 
 @dataclass(frozen=True)
-class GainArrays:
-    """Gains and limits in force, one entry a degree of freedom or a physical vector."""
+class Settings:
+    """What may change from one tick to the next."""
 
-    stiffness: FloatArray  # (n,) N m/rad or N/m
-    damping: FloatArray  # (n,) N m s/rad or N s/m
-    effort_limits: FloatArray  # (b,) N m or N
+    law: str
+    gains: GainArrays
+    follows_velocity: bool  # the reference's; else the desired velocity is zero
 
 
 class Controller:
     """Inverse dynamics in ticks: `(q, v, desired state) -> effort`.
 
     A function of what the state's message holds and of the tick, so that the same state always
-    gets the same answer.
+    gets the same answer; only the law `pid` remembers the ticks before.
     """
 
     def __init__(
         self,
         character: Character,
         reference: Reference,
-        gains: GainArrays,
+        settings: Settings,
         *,
-        law: str,
         rate_hz: int,
         gravity: float,
+        series: EffortSeries | None = None,
     ) -> None:
-        """Build the model of the dynamics; `law` is 'stable_pd' or 'pd'.
+        """Build the model of the dynamics; `series` is what the law `feedforward` applies.
 
         Raises:
             CharacterError: a joint moves neither mass nor inertia.
+            ConfigurationError: the law needs a series and there is none.
         """
         self.layout = character.layout
-        self.gains = gains
         self.clock = TickClock(rate_hz)
         self._reference = reference
-        self._law = _LAWS[law]
         self._model = DynamicsModel(character, gravity)
         self._check_inertia(character)
+        self._plant = Plant(self.layout, self._model, self.clock.period_s, series)
+        self._law: Law = make_law(settings.law, self._plant)
+        self._settings = settings
         self._next: tuple[int, ReferenceState] | None = None
+
+    @property
+    def settings(self) -> Settings:
+        """Law, gains and limits in force."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: Settings) -> None:
+        """Take others from the next state on. Raises as `check` does."""
+        if settings.law != self._settings.law:
+            self._law = make_law(settings.law, self._plant)
+        self._settings = settings
+
+    def check(self, settings: Settings) -> None:
+        """Raise ConfigurationError if settings cannot be taken."""
+        make_law(settings.law, self._plant)
 
     def _check_inertia(self, character: Character) -> None:
         """A joint that moves no inertia would make the mass matrix singular."""
@@ -83,9 +102,19 @@ class Controller:
         next_stamp = self.clock.stamp_ns(self.clock.tick(state.stamp_ns) + 1)
         upcoming = self._reference_at(next_stamp, episode_ns)
         self._next = next_stamp - episode_ns, upcoming
-        effort = self._law(self, state, now, upcoming)
-        reference = StampedReference(state.stamp_ns, now.configuration.position, now.velocity)
-        return self.layout.clipped(effort, self.gains.effort_limits), reference
+        instant = Instant(
+            time=(state.stamp_ns - episode_ns) / NANOSECONDS_PER_SECOND,
+            configuration=self.layout.configuration(state.position),
+            velocity=state.velocity,
+            now=self._desired(now),
+            upcoming=self._desired(upcoming),
+        )
+        gains = self._settings.gains
+        effort = self.layout.clipped(self._law(instant, gains), gains.effort_limits)
+        desired = instant.now
+        return effort, StampedReference(
+            state.stamp_ns, desired.configuration.position, desired.velocity
+        )
 
     def _reference_at(self, stamp_ns: int, episode_ns: int) -> ReferenceState:
         """The reference; the one of the next tick is this tick's when the tick has come."""
@@ -94,30 +123,8 @@ class Controller:
             return self._next[1]
         return self._reference.sample(since_ns / NANOSECONDS_PER_SECOND)
 
-    def _pd(self, state: StampedState, now: ReferenceState, upcoming: ReferenceState) -> FloatArray:
-        del upcoming  # the explicit law looks at the present alone
-        configuration = self.layout.configuration(state.position)
-        error = self.layout.difference(configuration, now.configuration)
-        velocity_error = now.velocity - state.velocity
-        return pd_effort(self.gains.stiffness, self.gains.damping, error, velocity_error)
-
-    def _stable_pd(
-        self, state: StampedState, now: ReferenceState, upcoming: ReferenceState
-    ) -> FloatArray:
-        del now  # the implicit law looks at the end of the control period
-        configuration = self.layout.configuration(state.position)
-        self._model.update(configuration, state.velocity)
-        return stable_pd_effort(
-            self._model.implicit_mass_matrix(self.clock.period_s),
-            self._model.bias_force(),
-            self.gains.stiffness,
-            self.gains.damping,
-            self.layout.difference(configuration, upcoming.configuration),
-            state.velocity,
-            upcoming.velocity,
-            self.clock.period_s,
-        )
-
-
-_LAWS = {"pd": Controller._pd, "stable_pd": Controller._stable_pd}
-LAWS = tuple(_LAWS)
+    def _desired(self, reference: ReferenceState) -> ReferenceState:
+        """The reference as the settings have it tracked."""
+        if self._settings.follows_velocity:
+            return reference
+        return replace(reference, velocity=np.zeros(self.layout.size))

@@ -33,6 +33,8 @@ class DynamicsModel:
         self._data = mujoco.MjData(self._model)
         self._mass_matrix = np.zeros((self._layout.size, self._layout.size))
         self._damping = character.passive_damping()
+        # M is stored by rows of its lower triangle, the diagonal last
+        self._diagonal = self._model.M_rowadr + self._model.M_rownnz - 1
         address = self._model.jnt_qposadr
         types = [joint.type for joint in self._layout.joints]
         rotation_offset = {JointType.SPHERICAL: 0, JointType.FLOATING: 3}
@@ -65,14 +67,20 @@ class DynamicsModel:
         mujoco.mj_fullM(self._model, self._data, self._mass_matrix)
         return self._mass_matrix.copy()
 
-    def implicit_mass_matrix(self, period: float) -> FloatArray:
-        """`M + D h` (n, n), for the acceleration over a period h in s.
+    def solve(self, force: FloatArray, added: FloatArray, period: float) -> FloatArray:
+        """The acceleration `a` (n,) of `(M + D h + diag(added)) a = force` over a period h in s.
 
-        The passive damping D is then that of the velocity at the period's end.
+        The passive damping D is then that of the velocity at the period's end. The factorisation
+        `L' D L` follows the tree of the links (Featherstone 2008, section 6.5), and uses no BLAS.
         """
-        matrix = self.mass_matrix()
-        np.einsum("ii->i", matrix)[:] += period * self._damping
-        return matrix
+        data, diagonal = self._data, self._diagonal
+        without = data.M[diagonal]
+        data.M[diagonal] = without + (period * self._damping + added)
+        mujoco.mj_factorM(self._model, data)
+        data.M[diagonal] = without
+        acceleration: FloatArray = np.empty(self._layout.size)
+        mujoco.mj_solveM(self._model, data, acceleration[np.newaxis], force[np.newaxis])
+        return acceleration
 
     def bias_force(self) -> FloatArray:
         """The bias force C (n,) at the state taken over.
@@ -83,6 +91,26 @@ class DynamicsModel:
         mujoco.mj_rne(self._model, self._data, 0, bias)
         bias += self._damping * self._data.qvel
         return bias
+
+    def inverse_dynamics(self, acceleration: FloatArray) -> FloatArray:
+        """The effort (n,) of an acceleration (n,) in the state taken over: `M dv/dt + C`."""
+        effort = np.empty(self._layout.size)
+        self._data.qacc[:] = acceleration
+        mujoco.mj_rne(self._model, self._data, 1, effort)
+        effort += self._damping * self._data.qvel
+        return effort
+
+    def gravity_force(self) -> FloatArray:
+        """The part of the bias force that is gravity's (n,): the effort that holds it still."""
+        data = self._data
+        velocity = data.qvel.copy()
+        data.qvel[:] = 0.0
+        mujoco.mj_comVel(self._model, data)
+        force = np.empty(self._layout.size)
+        mujoco.mj_rne(self._model, data, 0, force)
+        data.qvel[:] = velocity
+        mujoco.mj_comVel(self._model, data)
+        return force
 
     def kinetic_energy(self) -> float:
         """Kinetic energy of the state taken over, J."""

@@ -3,19 +3,20 @@
 import time
 from collections import Counter
 from contextlib import suppress
-from dataclasses import dataclass
 
 import numpy as np
 from rclpy.node import Node
 from std_msgs.msg import Header, String
 
+from controller_node.actuation import Actuation
+from controller_node.outputs import Answer, Outputs
 from controller_node.parameters import (
     PARAMETERS,
     character_parameters,
     commanded_joints,
     make_controller,
-    make_gains,
     make_reference,
+    make_settings,
     read_frames,
 )
 from msgs_config import configuration, topics
@@ -29,25 +30,15 @@ from msgs_config.errors import (
     LayoutError,
     MessageError,
 )
-from msgs_config.messages import JointStateDecoder, JointStateEncoder, decode, state_in_layout
+from msgs_config.messages import JointStateDecoder, decode, state_in_layout
 from msgs_config.node_parameters import LiveParameters, declare, given_parameters
 from msgs_config.parameters import Values, resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
-from msgs_config.stamped import StampedReference, StampedState
+from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from msgs_config.warnings import Warnings
-
-
-@dataclass(frozen=True)
-class _Answer:
-    """The last answer: a state that comes again gets it again, and nothing is computed anew."""
-
-    raw_state: bytes
-    stamp_ns: int
-    torques: bytes
-    reference: StampedReference
 
 
 class ControllerNode(Node):
@@ -74,7 +65,7 @@ class ControllerNode(Node):
             self.get_logger().warning(f"kept within joint limits: {', '.join(frames.clamped)}")
         reference = make_reference(self._character, frames)
         self._controller = make_controller(self._character, reference, self._values)
-        self._answer: _Answer | None = None
+        self._answer: Answer | None = None
         self._episode_ns: int | None = None
         self._warnings = Warnings(self)
         self._simulator_runs_on = False  # it waits for nobody
@@ -83,29 +74,32 @@ class ControllerNode(Node):
         self._counts: Counter[str] = Counter(answered=0, repeated=0, ignored=0, overtaken=0)
         self._answer_times = Durations()
         self._open_topics()
-        LiveParameters(self, self._declared, self._values, self._take_parameters)
+        LiveParameters(
+            self, self._declared, self._values, self._take_parameters, self._check_parameters
+        )
 
     def _open_topics(self) -> None:
-        commanded = self._layout.mask(commanded_joints(self._character, self._values))
-        self._commanded = np.flatnonzero(commanded)
-        names = [self._layout.dof_names[index] for index in self._commanded]
         self._decoder = JointStateDecoder()
-        self._torque_encoder = JointStateEncoder(names)
-        self._reference_encoder = JointStateEncoder(self._layout.dof_names)
         self._episodes = DirectSubscription(self, topics.EPISODE)
         self._simulators = DirectSubscription(self, topics.CONFIGURATION.of(topics.SIM_NODE))
         # after them: a simulator that has found this subscription has found the others as well
         self._states = DirectSubscription(self, topics.JOINT_STATES)
-        self._references = topics.create_publisher(self, topics.REFERENCE)
-        self._torques = topics.create_publisher(self, topics.JOINT_TORQUES)
-        self._configurations = topics.create_publisher(self, topics.CONFIGURATION)
+        commanded = np.flatnonzero(
+            self._layout.mask(commanded_joints(self._character, self._values))
+        )
+        self._actuation = Actuation(len(commanded), self._layout.size)
+        self.get_logger().info(f"{self._character.name}: {self._actuation}")
+        self._outputs = Outputs(self, self._layout, commanded)
         self._publish_configuration()
 
     def _publish_configuration(self) -> None:
         """Publish the parameters in force, and since which state they are."""
-        since_ns = None if self._answer is None else self._answer.stamp_ns
-        description = configuration.describe(self._character, self._values, since_ns)
-        self._configurations.publish(String(data=description))
+        since_ns = None if self._answer is None else self._answer.state.stamp_ns
+        self._outputs.publish_configuration(
+            configuration.describe(
+                self._character, self._values, since_ns, actuation=self._actuation.content()
+            )
+        )
 
     def run(self, stop: StopSignal) -> None:
         """Answer states until `stop`.
@@ -183,7 +177,7 @@ class ControllerNode(Node):
             return  # the simulator publishes the state again
         if self._answer is not None and self._answer.raw_state == raw:
             self._counts["repeated"] += 1
-            self._publish(self._answer)
+            self._outputs.publish(self._answer)
             return
         try:
             state = state_in_layout(self._layout, self._decoder.decode(raw))
@@ -198,44 +192,30 @@ class ControllerNode(Node):
             return  # the simulator publishes the state again
         self._check_rate(state)
         started = time.perf_counter()
-        self._answer = self._compute(raw, state, episode_ns)
+        effort, reference = self._controller.answer(state, episode_ns)
+        self._answer = self._outputs.answer(raw, state, effort, reference)
         self._answer_times.add(time.perf_counter() - started)
         self._counts["answered"] += 1
-        self._publish(self._answer)
+        self._outputs.publish(self._answer)
 
     def _is_heard(self) -> bool:
         """Whether all who are to hear the first answer are there; later ones wait for nobody."""
         if self._answer is not None:
             return True
         wanted = self._values.integer("wait_for_subscribers")
-        return bool(self._torques.get_subscription_count() >= wanted)
-
-    def _publish(self, answer: _Answer) -> None:
-        if self._references.get_subscription_count():
-            reference = answer.reference
-            self._references.publish(
-                self._reference_encoder.encode(
-                    reference.stamp_ns, reference.position, reference.velocity
-                )
-            )
-        self._torques.publish(answer.torques)
+        return self._outputs.torque_subscribers >= wanted
 
     def _check_rate(self, state: StampedState) -> None:
         """Say so if states come several ticks apart: their stamps fit any multiple of the rate."""
         if self._answer is None or state.effort is None or self._simulator_runs_on:
             return
         clock = self._controller.clock
-        apart = clock.tick(state.stamp_ns) - clock.tick(self._answer.stamp_ns)
+        apart = clock.tick(state.stamp_ns) - clock.tick(self._answer.state.stamp_ns)
         if apart > 1:
             rate = f"{clock.rate_hz} Hz"
             self._warnings.say_once(
                 f"states come {apart} ticks of {rate} apart; set 'rate' to the simulator's"
             )
-
-    def _compute(self, raw: bytes, state: StampedState, episode_ns: int) -> _Answer:
-        effort, reference = self._controller.answer(state, episode_ns)
-        torques = self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded])
-        return _Answer(raw, state.stamp_ns, torques, reference)
 
     def _episode_of(self, state: StampedState) -> int | None:
         """Stamp of the first state of the state's episode; None if it is not known yet.
@@ -262,10 +242,13 @@ class ControllerNode(Node):
             times = self._answer_times.percentiles_us("answer", (50, 99))
             self._diagnostics.publish({**self._counts, **times})
 
+    def _check_parameters(self, values: Values) -> None:
+        self._controller.check(make_settings(self._character, values))
+
     def _take_parameters(self, values: Values) -> None:
-        """Take changed gains, all at once; they count from the next state on."""
+        """Take changed settings, all at once; they count from the next state on."""
         self._values = values
-        self._controller.gains = make_gains(self._character, self._values)
+        self._controller.settings = make_settings(self._character, values)
         self._publish_configuration()
 
 

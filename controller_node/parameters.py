@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from controller_node.controller import LAWS, Controller, GainArrays
+from controller_node.controller import Controller, Settings
+from controller_node.effort_series import read_effort_series
+from controller_node.laws import LAWS, GainArrays
 from controller_node.references.base import Reference
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import ClipFrames, read_clip
@@ -18,7 +20,10 @@ PARAMETERS = [
     PLACEMENT,
     RATE,
     GRAVITY,
-    Parameter("law", "stable_pd", "the control law", choices=LAWS),
+    Parameter("law", "stable_pd", "the control law", choices=LAWS, live=True),
+    Parameter(
+        "feedforward", "", "the law feedforward's CSV file: time_s and degrees of freedom's efforts"
+    ),
     Parameter(
         "reference",
         "hold",
@@ -31,6 +36,13 @@ PARAMETERS = [
     ),
     Parameter(
         "wait_for_subscribers", 1, "answer when this many subscribe to joint_torques", maximum=1000
+    ),
+    Parameter(
+        "reference_velocity",
+        "clip",
+        "velocity to track: the reference's own, or zero as in the lecture's second form",
+        choices=("clip", "zero"),
+        live=True,
     ),
     Parameter("gain_scale.p", 1.0, "factor on every joint's stiffness, not the root's", live=True),
     Parameter("gain_scale.d", 1.0, "factor on every joint's damping, not the root's", live=True),
@@ -58,6 +70,13 @@ def character_parameters(character: Character) -> list[Parameter]:
                 live=True,
             ),
             Parameter(
+                f"gains.{name}.i",
+                gains.integral,
+                f"integral gain of '{name}', for the law pid",
+                unit="N m/(rad s) or N/(m s)",
+                live=True,
+            ),
+            Parameter(
                 f"effort_limit.{name}",
                 float(limit),
                 f"largest effort of '{name}'",
@@ -69,9 +88,9 @@ def character_parameters(character: Character) -> list[Parameter]:
     return parameters
 
 
-def make_gains(character: Character, values: Values) -> GainArrays:
-    """The gains and limits that the parameters' values say."""
-    scales = {"p": values.number("gain_scale.p"), "d": values.number("gain_scale.d")}
+def make_settings(character: Character, values: Values) -> Settings:
+    """Law, gains and limits that the parameters' values say."""
+    scales = {"p": values.number("gain_scale.p"), "d": values.number("gain_scale.d"), "i": 1.0}
     lengths = character.layout.vector_lengths
 
     def entries(kind: str) -> FloatArray:
@@ -83,7 +102,11 @@ def make_gains(character: Character, values: Values) -> GainArrays:
         return np.repeat(np.array(gains), lengths)
 
     limits = [values.number(f"effort_limit.{name}") for name in character.vector_names]
-    return GainArrays(entries("p"), entries("d"), np.array(limits))
+    return Settings(
+        law=values.text("law"),
+        gains=GainArrays(entries("p"), entries("d"), entries("i"), np.array(limits)),
+        follows_velocity=values.text("reference_velocity") == "clip",
+    )
 
 
 def read_frames(character: Character, values: Values) -> ClipFrames | None:
@@ -103,14 +126,19 @@ def make_reference(character: Character, frames: ClipFrames | None) -> Reference
 
 
 def make_controller(character: Character, reference: Reference, values: Values) -> Controller:
-    """The controller that the parameters' values say."""
+    """The controller that the parameters' values say.
+
+    Raises:
+        ActuatedCharactersError: a value is wrong, or the law's file cannot be used.
+    """
+    path = values.text("feedforward")
     return Controller(
         character,
         reference,
-        make_gains(character, values),
-        law=values.text("law"),
+        make_settings(character, values),
         rate_hz=values.integer("rate"),
         gravity=values.number("gravity"),
+        series=read_effort_series(character.layout, path) if path else None,
     )
 
 

@@ -108,10 +108,11 @@ class Link:
 
 @dataclass(frozen=True)
 class Gains:
-    """Stiffness and damping of a joint: N m/rad and N m s/rad, or N/m and N s/m."""
+    """Gains of a joint, of its error, of that one's rate, and of its integral over time."""
 
-    stiffness: float = 0.0
-    damping: float = 0.0
+    stiffness: float = 0.0  # N m/rad or N/m
+    damping: float = 0.0  # N m s/rad or N s/m
+    integral: float = 0.0  # N m/(rad s) or N/(m s)
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ _KEYS = [
 _JOINT_KEYS = [
     "stiffness",
     "damping",
+    "integral",
     "effort_limit",
     "lower",
     "upper",
@@ -267,6 +268,7 @@ class _Reader:
         return Gains(
             stiffness=self.number("stiffness", default=0.0, minimum=0.0),
             damping=self.number("damping", default=0.0, minimum=0.0),
+            integral=self.number("integral", default=0.0, minimum=0.0),
         )
 
 

@@ -3,6 +3,7 @@
 import json
 import math
 import platform
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
@@ -25,11 +26,12 @@ def describe(
     since_ns: int | None = None,
     probe: Probe | None = None,
     terrain: Loading | None = None,
+    actuation: Mapping[str, int | bool] | None = None,
 ) -> str:
     """The JSON text: the character with its files, the parameters in force, and the versions.
 
     `since_ns` is the stamp of the last state that was answered with other parameters, if any;
-    `probe` and `terrain` are a simulator's.
+    `probe` and `terrain` are a simulator's, `actuation` a controller's.
     """
     content = {
         "character": character.name,
@@ -42,6 +44,7 @@ def describe(
         "mass": character.mass,
         "terrain_urdf": None if terrain is None else terrain.urdf_text,
         "probe": None if probe is None else probe.content(),
+        "actuation": None if actuation is None else dict(actuation),
         "parameters_after_stamp_ns": since_ns,
         "parameters": {name: _finite(value) for name, value in values.items()},
         "versions": {"python": platform.python_version()} | _versions(),

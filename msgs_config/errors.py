@@ -19,6 +19,14 @@ class ClipError(ActuatedCharactersError):
     """A motion clip is missing or malformed, or does not fit the character."""
 
 
+class EffortSeriesError(ActuatedCharactersError):
+    """A file of efforts over time is missing or malformed, or does not fit the character."""
+
+
+class MotionError(ActuatedCharactersError):
+    """Keyframes, a trajectory or a test signal are malformed, or do not fit the character."""
+
+
 class LayoutError(ActuatedCharactersError):
     """Names or arrays do not fit the joint layout."""
 

@@ -43,8 +43,13 @@ class LiveParameters:
         parameters: Iterable[Parameter],
         values: Values,
         take: Callable[[Values], None],
+        check: Callable[[Values], object] = lambda values: None,
     ) -> None:
-        """Hand all values, the changed ones among them, to `take` after each change."""
+        """Hand all values, the changed ones among them, to `take` after each change.
+
+        `check` may refuse them before, by an ActuatedCharactersError.
+        """
+        self._check_values = check
         self._parameters = list(parameters)
         self._values = values
         self._take = take
@@ -53,7 +58,7 @@ class LiveParameters:
 
     def _check(self, changes: list[RosParameter]) -> SetParametersResult:
         try:
-            self._with(changes)
+            self._check_values(self._with(changes))
         except ActuatedCharactersError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
@@ -11,6 +12,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import Header, String
+from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 _DEEP_HISTORY = 5000
@@ -74,6 +76,9 @@ ODOM = Topic("odom", Odometry, STREAM_QOS)
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED_QOS)
 VISUALIZATION = Topic("visualization", MarkerArray, DISPLAY_QOS)
 REFERENCE = Topic("~/reference", JointState, STREAM_QOS)
+NET_WRENCH = Topic("~/net_wrench", WrenchStamped, STREAM_QOS)
+JOINT_TRAJECTORY = Topic("~/joint_trajectory", JointTrajectory, STREAM_QOS)
+ACTIVE_TRAJECTORY = Topic("~/active_trajectory", JointTrajectory, LATCHED_QOS)
 CLOCK = Topic("/clock", Clock, STREAM_QOS)
 EPISODE = Topic("episode", Header, LATCHED_QOS)
 CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS)

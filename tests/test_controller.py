@@ -153,7 +153,7 @@ def test_changed_gains_count_from_the_next_state_on() -> None:
     driver.answer(first, stamp(1))
 
     # Act
-    driver.gains = doubled.gains
+    driver.settings = doubled.settings
 
     # Assert
     effort, _ = driver.answer(second, stamp(1))
@@ -225,7 +225,7 @@ def test_the_panda_settles_where_its_springs_carry_its_weight() -> None:
     model = DynamicsModel(panda)
     model.update(panda.layout.configuration(last.position), np.zeros_like(rest))
     weight = model.bias_force()[arm]
-    stiffness = driver.gains.stiffness[arm]
+    stiffness = driver.settings.gains.stiffness[arm]
     error = (rest - last.position)[arm]
     assert np.abs(last.velocity).max() < 1e-4
     assert np.abs(weight).max() > 10.0

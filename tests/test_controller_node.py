@@ -218,7 +218,9 @@ REFUSED: dict[str, tuple[str, Any]] = {
     "infinite": ("gain_scale.p", float("inf")),
     "of another type": ("gains.hinge.p", "much"),
     "unknown": ("gains.tail.p", 1.0),
-    "fixed while it runs": ("law", "pd"),
+    "fixed while it runs": ("rate", 480),
+    "no law": ("law", "magic"),
+    "a law without its file": ("law", "feedforward"),
 }
 
 
@@ -238,6 +240,7 @@ def test_a_change_that_is_refused_leaves_the_old_value_in_force(
     assert {why: taken for why, (taken, _) in answers.items()} == dict.fromkeys(REFUSED, False)
     assert all(reason for _, reason in answers.values())
     assert "gains.hinge.p" in answers["negative"][1] and "-1.0" in answers["negative"][1]
+    assert "CSV file" in answers["a law without its file"][1]
     values = simulator.get_parameters("controller_node", ["gains.hinge.p", "gains.hinge.d", "law"])
     assert values == [50.0, 5.0, "stable_pd"]
     effort, _ = expected_answer("pendulum", after, before.stamp_ns)

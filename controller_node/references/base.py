@@ -9,10 +9,11 @@ from msgs_config.joint_layout import Configuration
 
 @dataclass(frozen=True)
 class ReferenceState:
-    """The desired configuration, and the velocity (n,) that leads on from it."""
+    """The desired configuration, the velocity that leads on from it, and how that changes."""
 
     configuration: Configuration
-    velocity: FloatArray
+    velocity: FloatArray  # (n,), a rotation's in the child frame
+    acceleration: FloatArray  # (n,), its rate of change, entry by entry
 
 
 class Reference(Protocol):

@@ -19,7 +19,8 @@ _STRAIGHT = 1e-9  # rad a cycle; below it the geometric series is its limit
 
 class ClipReference:
     """A clip in time. Between two frames every velocity is constant, so that it agrees exactly
-    with the interpolation: linear for coordinates, along the shortest turn for rotations.
+    with the interpolation: linear for coordinates, along the shortest turn for rotations. So the
+    acceleration is zero but at the frames themselves, where the velocity jumps.
 
     A clip that wraps goes on from where, and in the direction in which, it ended; one that does
     not holds its last frame at zero velocity.
@@ -40,6 +41,7 @@ class ClipReference:
             positions, orientations = self._closed(frames)
         self._positions, self._orientations = positions, orientations
         self._velocities = self._segment_velocities()
+        self._no_acceleration = np.zeros(layout.size)
         self._cycle_motion = lru_cache(maxsize=2)(self._motion_of)  # this tick's and the next's
 
     def sample(self, time: float) -> ReferenceState:
@@ -71,7 +73,8 @@ class ClipReference:
         self, position: FloatArray, orientations_xyzw: FloatArray, velocity: FloatArray
     ) -> ReferenceState:
         position[self._layout.rotation_entries] = rotations.log(orientations_xyzw)
-        return ReferenceState(Configuration(position, orientations_xyzw), velocity)
+        configuration = Configuration(position, orientations_xyzw)
+        return ReferenceState(configuration, velocity, self._no_acceleration)
 
     def _closed(self, frames: ClipFrames) -> tuple[FloatArray, FloatArray]:
         """The frames with the last ones led towards the first one of the next cycle."""

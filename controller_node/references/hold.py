@@ -11,7 +11,8 @@ class HoldReference:
 
     def __init__(self, character: Character) -> None:
         rest = character.layout.configuration(np.array(character.rest_position))
-        self._state = ReferenceState(rest, np.zeros(character.layout.size))
+        still = np.zeros(character.layout.size)
+        self._state = ReferenceState(rest, still, still)
 
     def sample(self, time: float) -> ReferenceState:
         """The rest pose at zero velocity, at whatever time."""
