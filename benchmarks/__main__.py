@@ -10,6 +10,7 @@ limit_threads()
 
 from rich.console import Console  # noqa: E402 - after the limit on threads
 
+from benchmarks.control_law import measure_control_laws  # noqa: E402
 from benchmarks.cost import measure_cost  # noqa: E402
 from benchmarks.lockstep import measure_lockstep  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
@@ -18,6 +19,7 @@ from experiment.domain import own_domain  # noqa: E402
 _WIDTH = 100  # characters; enough for every table
 _MEASUREMENTS = {
     "lockstep": measure_lockstep,
+    "laws": measure_control_laws,
     "cost": measure_cost,
     "realtime": measure_realtime,
 }

@@ -20,7 +20,7 @@ def check_agreement(model: DynamicsModel, layout: JointLayout, probe: Probe) -> 
     Raises:
         CharacterError: they differ by more than 1 %; says in what, by how much, and where to look.
     """
-    model.update(layout.configuration(probe.position), probe.velocity)
+    model.update(probe.position, probe.velocity)
     measured = [*(model.mass_matrix() @ probe.acceleration), probe.kinetic_energy]
     expected = [*(probe.effort - model.bias_force()), model.kinetic_energy()]
     size = np.maximum(np.abs(measured), np.abs(expected))

@@ -77,8 +77,7 @@ class Controller:
 
     def _check_inertia(self, character: Character) -> None:
         """A joint that moves no inertia would make the mass matrix singular."""
-        rest = self.layout.configuration(np.array(character.rest_position))
-        self._model.update(rest, np.zeros(self.layout.size))
+        self._model.update(np.array(character.rest_position), np.zeros(self.layout.size))
         diagonal = np.diag(self._model.mass_matrix())
         if self.layout.size and diagonal.min() <= 0.0:
             name = self.layout.dof_names[int(diagonal.argmin())]
@@ -104,7 +103,7 @@ class Controller:
         self._next = next_stamp - episode_ns, upcoming
         instant = Instant(
             time=(state.stamp_ns - episode_ns) / NANOSECONDS_PER_SECOND,
-            configuration=self.layout.configuration(state.position),
+            position=state.position,
             velocity=state.velocity,
             now=self._desired(now),
             upcoming=self._desired(upcoming),

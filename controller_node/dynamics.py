@@ -4,12 +4,11 @@ import mujoco
 import numpy as np
 
 from msgs_config import rotations
-from msgs_config.arrays import FloatArray
+from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character, Joint, Link
-from msgs_config.joint_layout import Configuration, JointType
+from msgs_config.joint_layout import JointType
 
 _GRAVITY = 9.81
-_WXYZ = (3, 0, 1, 2)  # MuJoCo's order of a quaternion's components
 
 _MUJOCO_TYPES = {
     JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE,
@@ -35,32 +34,39 @@ class DynamicsModel:
         self._damping = character.passive_damping()
         # M is stored by rows of its lower triangle, the diagonal last
         self._diagonal = self._model.M_rowadr + self._model.M_rownnz - 1
-        address = self._model.jnt_qposadr
-        types = [joint.type for joint in self._layout.joints]
-        rotation_offset = {JointType.SPHERICAL: 0, JointType.FLOATING: 3}
-        rotation_starts = [
-            start + rotation_offset[joint_type]
-            for start, joint_type in zip(address, types, strict=True)
-            if joint_type in rotation_offset
-        ]
-        self._quaternion_entries = np.array(rotation_starts, dtype=np.intp).reshape(-1, 1) + range(
-            4
-        )
-        rotation_vectors = self._layout.rotation_entries.ravel()
-        self._scalar_dofs = np.setdiff1d(np.arange(self._layout.size), rotation_vectors)
-        quaternions = self._quaternion_entries.ravel()
-        self._scalar_entries = np.setdiff1d(np.arange(self._model.nq), quaternions)
+        # no position at all: no distance, no angle, and as quaternions (wxyz) no turn
+        self._identity = np.zeros(self._model.nq)
+        self._identity[_quaternion_starts(self._model)] = 1.0
+        self._start, self._desired = self._identity.copy(), self._identity.copy()
 
-    def update(self, configuration: Configuration, velocity: FloatArray) -> None:
-        """Take over a state; velocity (n,)."""
+    def update(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Take over a state: position (n,), message form, and velocity (n,)."""
         data = self._data
-        data.qpos[self._scalar_entries] = configuration.position[self._scalar_dofs]
-        data.qpos[self._quaternion_entries] = configuration.orientations_xyzw[:, _WXYZ]
+        self._convert(position, data.qpos)
         data.qvel[:] = velocity
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_comPos(self._model, data)
         mujoco.mj_crb(self._model, data)
         mujoco.mj_comVel(self._model, data)
+
+    def error_of(self, position: FloatArray, desired: FloatArray) -> FloatArray:
+        """What leads from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.
+
+        It is the velocity, and so a rotation's part is in the child frame, that leads there in 1 s.
+        """
+        error: FloatArray = np.empty(self._layout.size)
+        self._convert(position, self._start)
+        self._convert(desired, self._desired)
+        mujoco.mj_differentiatePos(self._model, error, 1.0, self._start, self._desired)
+        return error
+
+    def _convert(self, position: FloatArray, qpos: FloatArray) -> None:
+        """Write a position (n,), message form, as MuJoCo has it.
+
+        It is where the velocity of the same numbers leads to in 1 s, from no position at all.
+        """
+        qpos[:] = self._identity
+        mujoco.mj_integratePos(self._model, qpos, position, 1.0)
 
     def mass_matrix(self) -> FloatArray:
         """The mass matrix M (n, n) at the state taken over: kg, kg m, kg m^2."""
@@ -120,6 +126,64 @@ class DynamicsModel:
     def link_poses(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m, quaternions xyzw (links, 4) of the link frames in the world."""
         return self._data.xpos[1:].copy(), rotations.xyzw_from_wxyz(self._data.xquat[1:])
+
+    def link_jacobian(self, link: int) -> FloatArray:
+        """The Jacobian J (6, n) of one link: `(velocity, angular velocity) = J v`, world axes.
+
+        The velocity (m/s) is that of the link's centre of mass; `link` is an index of
+        `Character.links`. A wrench (6,) at the centre of mass is the generalised force `J^T w`.
+        """
+        jacobian = np.empty((6, self._layout.size))
+        mujoco.mj_jacBodyCom(self._model, self._data, jacobian[:3], jacobian[3:], link + 1)
+        return jacobian
+
+    @property
+    def weight(self) -> float:
+        """Weight of all links together, N."""
+        return float(-self._model.opt.gravity[2] * self._model.body_subtreemass[1])
+
+    def centre_of_mass(self) -> FloatArray:
+        """Centre of mass (3,) of all links in the world, m."""
+        centre: FloatArray = self._data.subtree_com[1].copy()
+        return centre
+
+    def centre_of_mass_jacobian(self) -> FloatArray:
+        """The Jacobian J (3, n) of the centre of mass: its velocity in the world is `J v`, m/s."""
+        jacobian = np.empty((3, self._layout.size))
+        mujoco.mj_jacSubtreeCom(self._model, self._data, jacobian, 1)
+        return jacobian
+
+    def centre_of_mass_velocity(self) -> FloatArray:
+        """Velocity (3,) of the centre of mass in the world, m/s."""
+        return rotations.apply(self.centre_of_mass_jacobian(), self._data.qvel)
+
+    def link_frames(self, links: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Origins (k, 3) in m and axes (k, 3, 3), as columns, of some link frames in the world.
+
+        `links` (k,) are indices of `Character.links`.
+        """
+        bodies = links + 1
+        return self._data.xpos[bodies], self._data.xmat[bodies].reshape(-1, 3, 3)
+
+    def point_jacobian(self, link: int, point: FloatArray) -> FloatArray:
+        """The Jacobian J (6, n) of a point (3,) that moves with a link; point in the world, m.
+
+        `(velocity, angular velocity) = J v`, world axes. A force (N) at the point and a moment
+        (N m) about it are the generalised force `J^T w` of the wrench (6,).
+        """
+        jacobian = np.empty((6, self._layout.size))
+        mujoco.mj_jac(self._model, self._data, jacobian[:3], jacobian[3:], point, link + 1)
+        return jacobian
+
+
+def _quaternion_starts(model: mujoco.MjModel) -> list[int]:
+    """First entry of each quaternion among MuJoCo's positions."""
+    before = {mujoco.mjtJoint.mjJNT_BALL: 0, mujoco.mjtJoint.mjJNT_FREE: 3}
+    return [
+        int(address) + before[kind]
+        for address, kind in zip(model.jnt_qposadr, model.jnt_type, strict=True)
+        if kind in before
+    ]
 
 
 def _compile(character: Character, gravity: float) -> mujoco.MjModel:

@@ -13,7 +13,7 @@ from controller_node.effort_series import EffortSeries
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
-from msgs_config.joint_layout import Configuration, JointLayout
+from msgs_config.joint_layout import JointLayout
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Instant:
     """What a law looks at in one tick."""
 
     time: float  # s since the episode's first state
-    configuration: Configuration
+    position: FloatArray  # (n,)
     velocity: FloatArray  # (n,)
     now: ReferenceState
     upcoming: ReferenceState  # one tick later
@@ -83,23 +83,23 @@ def _pd(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
 
 
 def _pd_gravity(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
-    plant.model.update(instant.configuration, instant.velocity)
+    plant.model.update(instant.position, instant.velocity)
     return _pd(plant, instant, gains) + plant.model.gravity_force()
 
 
 def _stable_pd(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
-    plant.model.update(instant.configuration, instant.velocity)
+    plant.model.update(instant.position, instant.velocity)
     return _implicit(plant, instant, gains, 0.0)
 
 
 def _computed_torque(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
-    plant.model.update(instant.configuration, instant.velocity)
+    plant.model.update(instant.position, instant.velocity)
     return _implicit(plant, instant, gains, plant.model.inverse_dynamics(instant.now.acceleration))
 
 
 def _errors(plant: Plant, instant: Instant) -> tuple[FloatArray, FloatArray]:
     """Errors (n,) of configuration and velocity, of the reference against the state."""
-    error = plant.layout.difference(instant.configuration, instant.now.configuration)
+    error = plant.model.error_of(instant.position, instant.now.configuration.position)
     return error, instant.now.velocity - instant.velocity
 
 
@@ -112,7 +112,7 @@ def _implicit(
         model.bias_force(),
         gains.stiffness,
         gains.damping,
-        plant.layout.difference(instant.configuration, instant.upcoming.configuration),
+        model.error_of(instant.position, instant.upcoming.configuration.position),
         instant.velocity,
         instant.upcoming.velocity,
         period,

@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from experiment.cli_render import add_render
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, one_of
 from msgs_config.parameters import Parameter
 from msgs_config.process import EXIT_ERROR, limit_threads
@@ -88,6 +89,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
     run.add_argument("--no-record", action="store_true", help="write no bag")
     run.add_argument(
+        "--contacts", action="store_true", help="have the bag hold what touched what, too"
+    )
+    run.add_argument(
         "--in-process", action="store_true", help="one process without ROS: the same states, no bag"
     )
     run.add_argument(
@@ -97,6 +101,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NODE.NAME:=VALUE",
         help="a parameter of sim_node or controller_node; may be repeated",
     )
+    add_render(commands)
     listing = commands.add_parser("list", help="list the characters and their clips")
     listing.set_defaults(command=_list)
     parameters = commands.add_parser(
@@ -133,6 +138,10 @@ def _run(options: argparse.Namespace) -> None:
             "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
             "nor a 'real_time_factor'"
         )
+    if options.contacts and (options.in_process or options.no_record):
+        raise ConfigurationError(
+            "--contacts is about the bag; with --in-process or --no-record there is none"
+        )
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     prepare_directory(directory, overwrite=options.overwrite)
@@ -147,7 +156,13 @@ def _run(options: argparse.Namespace) -> None:
             if options.in_process:
                 run_in_process(plan, directory, progress=progress)
             else:
-                run_over_topics(plan, directory, write_bag=not options.no_record, progress=progress)
+                run_over_topics(
+                    plan,
+                    directory,
+                    write_bag=not options.no_record,
+                    progress=progress,
+                    contacts=options.contacts,
+                )
         except KeyboardInterrupt:
             print(f"the results in {directory} are not complete", file=sys.stderr)
             raise

@@ -15,6 +15,7 @@ from msgs_config.errors import RecordingError, RunError
 
 BAG, PARAMETERS, LOGS = "bag", "parameters", "logs"
 SUMMARY, SERIES, PLOT = "summary.json", "measurements.csv", "plot.png"
+STRIP = "strip.png"  # what `render` makes of the bag
 
 
 def prepare_directory(directory: Path, *, overwrite: bool) -> None:
@@ -23,7 +24,8 @@ def prepare_directory(directory: Path, *, overwrite: bool) -> None:
     Raises:
         RunError: there are results and `overwrite` is not set, or files that no run has made.
     """
-    results = [directory / name for name in (BAG, PARAMETERS, LOGS, SUMMARY, SERIES, PLOT)]
+    names = (BAG, PARAMETERS, LOGS, SUMMARY, SERIES, PLOT, STRIP)
+    results = [directory / name for name in names]
     try:
         present = set(directory.iterdir()) if directory.exists() else set()
         if present - set(results):

@@ -18,9 +18,18 @@ from msgs_config.process import StopSignal
 PARAMETERS = [
     Parameter("directory", "recording", "where bag, summary.json and measurements.csv go"),
     Parameter("write_bag", True, "write the bag; without it the recorder only measures"),
+    Parameter("contacts", False, "record what touched what at each tick, and with which wrenches"),
+    Parameter(
+        "applied_wrench",
+        True,
+        "record what pushed at each tick, empty or not, which a run with pushes is repeated by",
+    ),
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
 _DRAIN_PERIOD = 0.004  # s between looks at the topics: one waking up for many messages
+
+# Each has a parameter of its name: the simulator works them out for who listens, at each tick.
+_COSTLY = [topics.CONTACTS, topics.APPLIED_WRENCH]
 
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
 _TOPICS = [
@@ -29,6 +38,7 @@ _TOPICS = [
     topics.DIAGNOSTICS,
     topics.CONFIGURATION.of(topics.SIM_NODE),
     topics.CONFIGURATION.of(topics.CONTROLLER_NODE),
+    topics.EXTERNAL_WRENCH,
     topics.REFERENCE.of(topics.CONTROLLER_NODE),
     topics.JOINT_TORQUES,
     topics.JOINT_STATES,
@@ -55,7 +65,8 @@ class RecorderNode(Node):
         self._recorded_names: dict[str, str] = {}
         self._published: dict[str, int] = {}  # ns of wall time, of each topic's last message
         self._inboxes: list[tuple[str, DirectSubscription]] = []
-        for topic in _TOPICS:
+        wanted = [topic for topic in _COSTLY if values.flag(topic.name)]
+        for topic in wanted + _TOPICS:
             resolved = self._recorded_names[topic.name] = self.resolve_topic_name(topic.name)
             if self._bag is not None:
                 self._bag.add_topic(resolved, topic.message_type, topic.qos)

@@ -23,8 +23,12 @@ Progress = Callable[[int], None]
 """Is told the number of ticks so far."""
 
 
-def run_over_topics(plan: Plan, directory: Path, *, write_bag: bool, progress: Progress) -> None:
+def run_over_topics(
+    plan: Plan, directory: Path, *, write_bag: bool, progress: Progress, contacts: bool = False
+) -> None:
     """Run recorder, controller and simulator as three processes; leaves the figures in a directory.
+
+    With `contacts` the bag holds what touched what, too.
 
     Raises:
         RunError: one of the processes failed; with its own message.
@@ -37,7 +41,12 @@ def run_over_topics(plan: Plan, directory: Path, *, write_bag: bool, progress: P
             arguments = ["--ros-args", "--params-file", str(file), *more]
             return children.start(lambda: Child(name, module, arguments, log, environment))
 
-        listening = {"directory": str(directory), "write_bag": write_bag, "progress_period": 0.1}
+        listening = {
+            "directory": str(directory),
+            "write_bag": write_bag,
+            "contacts": contacts,
+            "progress_period": 0.1,
+        }
         recorder = start("recorder", "experiment.recorder_main", listening)
         # both must be there before the first answer, lest a tick go unrecorded
         both = ("-p", "wait_for_subscribers:=2")

@@ -205,6 +205,8 @@ class JointLayout:
         """Effort (n,) with each vector's length at most its limit (b,), the direction kept."""
         with np.errstate(over="ignore"):
             norms = self.norms(effort)
+        if not (norms > limits).any():
+            return effort
         if np.isinf(norms).any():  # too large to be squared: measured in its own largest entry
             largest = np.maximum.reduceat(np.abs(effort), self.vector_starts)
             units = np.where(np.isinf(norms), largest, 1.0)

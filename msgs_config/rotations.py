@@ -6,6 +6,8 @@ Products go through `einsum`, which uses no BLAS: the last bits of a BLAS depend
 it picks, and what the simulator reads must not.
 """
 
+from math import factorial
+
 import numpy as np
 
 from msgs_config.arrays import FloatArray
@@ -14,6 +16,7 @@ IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
 _TINY = 1e-150  # keeps 0 / 0 away; the product with a vector of length zero is zero all the same
 
 _SMALL = 1e-2  # rad
+_SERIES_END = 10.0  # rad^2, just over half a turn, where 15 terms give all digits
 
 
 def _product_table() -> FloatArray:
@@ -111,12 +114,97 @@ def right_jacobian_inverse(rotation_vector: FloatArray) -> FloatArray:
     half = np.maximum(0.5 * angle, 0.5 * _SMALL)
     closed = (1.0 - half / np.tan(half)) / (4.0 * half * half)
     series = 1.0 / 12.0 + angle * angle / 720.0  # where the closed form would lose its digits
-    cross = np.einsum("...i,ijk->...kj", rotation_vector, _PRODUCT[:3, :3, :3])
+    cross = _cross_matrix(rotation_vector)
     squared = np.einsum("...ij,...jk->...ik", cross, cross)
     inverse: FloatArray = (
         np.eye(3) + 0.5 * cross + np.where(angle < _SMALL, series, closed) * squared
     )
     return inverse
+
+
+def angular_motion(
+    rotation_vector: FloatArray, rate: FloatArray, second_rate: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Angular velocity and acceleration (..., 3) of `exp(r(t))`, in the child frame.
+
+    From the rotation vector r in rad, its rate in rad/s and the rate's in rad/s^2, of one shape.
+    With angle a the velocity is `Jr u = u - A r x u + B r x (r x u)` of u, the rate of r, where
+    `A = (1 - cos a) / a^2` and `B = (a - sin a) / a^3`; the acceleration is its derivative.
+
+    Source of Jr: Solà, Deray and Atchuthan 2018, equation 143.
+    """
+    r, u = rotation_vector, rate
+    along, speed = _dot(r, u), _dot(u, u)
+    a, b, a_slope, b_slope = _jacobian_coefficients(_dot(r, r))
+    cross = _cross_matrix(r)
+    rates = np.array((u, second_rate))
+    once = apply(cross, rates)
+    twice = apply(cross, once)
+    velocity, acceleration = rates - a * once + b * twice
+    acceleration += b * (speed * r - along * u)  # u x (r x u)
+    acceleration -= along * (a_slope * once[0] - b_slope * twice[0])
+    return velocity, acceleration
+
+
+def rotation_vector_rates(
+    rotation_vector: FloatArray, velocity: FloatArray, acceleration: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The inverse of `angular_motion`: rate and second rate (..., 3) of a rotation vector.
+
+    From an angular velocity in rad/s and acceleration in rad/s^2 in the child frame, of one shape
+    with the rotation vectors, which are in rad and of norm below 2 pi.
+    """
+    inverse = right_jacobian_inverse(rotation_vector)
+    rate = apply(inverse, velocity)
+    _, convective = angular_motion(rotation_vector, rate, np.zeros_like(rate))
+    return rate, apply(inverse, acceleration - convective)
+
+
+def _jacobian_coefficients(
+    square: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """A and B of the right Jacobian, and `dA/da / a` and `dB/da / a`, of squared angles a^2.
+
+    Up to half a turn by their power series: there, at small angles, the closed forms lose digits.
+    """
+    powers = np.minimum(square, _SERIES_END) ** _EXPONENTS
+    a, b, a_slope, b_slope = np.einsum("ij,...j->i...", _JACOBIAN_SERIES, powers)[..., np.newaxis]
+    large = square > _SERIES_END
+    if large.any():
+        square = np.maximum(square, _SERIES_END)
+        angle, fourth = np.sqrt(square), square * square
+        sine, versine = np.sin(angle), 1.0 - np.cos(angle)
+        a = np.where(large, versine / square, a)
+        b = np.where(large, (angle - sine) / (angle * square), b)
+        a_slope = np.where(large, (angle * sine - 2.0 * versine) / fourth, a_slope)
+        closed = (3.0 * sine + angle * versine - 3.0 * angle) / (angle * fourth)
+        b_slope = np.where(large, closed, b_slope)
+    return a, b, a_slope, b_slope
+
+
+def _jacobian_series() -> FloatArray:
+    """Coefficients (4, 15) of the powers of a^2 in A, B, `dA/da / a` and `dB/da / a`."""
+    order = range(_EXPONENTS.size + 1)
+    a = np.array([(-1.0) ** k / factorial(2 * k + 2) for k in order])
+    b = np.array([(-1.0) ** k / factorial(2 * k + 3) for k in order])
+    rise = 2.0 * np.arange(1, len(order))  # d/da / a of a^(2 k) is 2 k a^(2 k - 2)
+    return np.array([a[:-1], b[:-1], rise * a[1:], rise * b[1:]])
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Scalar products (..., 1) of vectors (..., m)."""
+    product: FloatArray = np.einsum("...i,...i->...", a, b)[..., np.newaxis]
+    return product
+
+
+def _cross_matrix(vectors: FloatArray) -> FloatArray:
+    """Matrices (..., 3, 3) whose product with u is the vector product `v x u`."""
+    matrices: FloatArray = np.einsum("...i,ijk->...kj", vectors, _PRODUCT[:3, :3, :3])
+    return matrices
+
+
+_EXPONENTS = np.arange(15.0)
+_JACOBIAN_SERIES = _jacobian_series()
 
 
 def normalised(q_xyzw: FloatArray) -> FloatArray:

@@ -55,8 +55,10 @@ def encode_wrenches(wrenches: WrenchArrays) -> bytes:
     content = bytearray(CDR_LITTLE_ENDIAN)
     content += struct.pack("<iI", *split_stamp(wrenches.stamp_ns))
     content += cdr_names(wrenches.links, frame_id=WORLD)
-    turns = np.tile(_NO_TURN_XYZW, (len(wrenches.points), 1))
-    transforms = np.hstack((wrenches.points, turns))
+    transforms: Rows = ()  # mostly: then as little work as can be
+    if len(wrenches.points):
+        turns = np.tile(_NO_TURN_XYZW, (len(wrenches.points), 1))
+        transforms = np.hstack((wrenches.points, turns))
     for rows in (transforms, (), wrenches.wrenches):
         content += struct.pack("<I", len(rows))
         if len(rows):
@@ -82,9 +84,8 @@ def decode_wrenches(raw: bytes) -> WrenchArrays:
 
 
 def select(
-    stamp_ns: int, names: Sequence[str], forces: FloatArray, touched: BoolArray
+    stamp_ns: int, names: Sequence[str], wrenches: FloatArray, touched: BoolArray
 ) -> WrenchArrays:
-    """The wrenches of those links of which `touched` (links,) is true; forces (links, 3), N."""
+    """Those of the wrenches (links, 6), N and N m, of which `touched` (links,) is true."""
     chosen = np.flatnonzero(touched).tolist()
-    wrenches = np.hstack((forces[chosen], np.zeros((len(chosen), 3))))
-    return WrenchArrays.of_rows(stamp_ns, [names[row] for row in chosen], wrenches, [])
+    return WrenchArrays.of_rows(stamp_ns, [names[row] for row in chosen], wrenches[chosen], [])

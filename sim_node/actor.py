@@ -36,7 +36,9 @@ class Role:
 class Contacts:
     """What touched a character's links during a tick."""
 
-    forces: FloatArray  # (links, 3) net force on each, N, world axes; the mean over the tick
+    # (links, 6) net force, N, and torque about the centre of mass, N m, world axes; of several
+    # substeps the mean, with each torque about the centre at its own substep
+    wrenches: FloatArray
     touching: BoolArray  # (links,)
 
 
@@ -102,13 +104,15 @@ class Actor:
         self._body.apply(total)
         if self.pushes:
             self._body.links.push(self.pushes)
+        if self.contacts is not None:
+            self._centres = self._body.links.centres()
 
     def add_contacts(self, touched: TouchedLinks, share: float) -> None:
         """Take up the contacts of the last engine step, which is a share of the tick."""
         assert self.contacts is not None
-        forces, touching = self._body.links.contact_forces(touched)
+        wrenches, touching = self._body.links.contact_wrenches(touched, self._centres)
         self.contacts = Contacts(
-            self.contacts.forces + share * forces, self.contacts.touching | touching
+            self.contacts.wrenches + share * wrenches, self.contacts.touching | touching
         )
 
     def end_tick(self, stamp_ns: int) -> None:
@@ -134,7 +138,7 @@ class Actor:
 
     def _no_contacts(self) -> Contacts:
         links = len(self.character.links)
-        return Contacts(np.zeros((links, 3)), np.zeros(links, dtype=np.bool_))
+        return Contacts(np.zeros((links, 6)), np.zeros(links, dtype=np.bool_))
 
     def _read(self, stamp_ns: int, effort: FloatArray | None) -> None:
         position, velocity = self._body.read()

@@ -87,18 +87,30 @@ class Links:
                     physicsClientId=self._client,
                 )
 
-    def contact_forces(self, touched: TouchedLinks) -> tuple[FloatArray, BoolArray]:
-        """Net contact force (links, 3) in N, world axes, of what touches; and which links do.
+    def centres(self) -> FloatArray:
+        """Centres of mass (links, 3) in the world, m."""
+        return self._inertial_frames()[0]
 
-        A contact between two links of the body counts on both, in opposite directions.
+    def contact_wrenches(
+        self, touched: TouchedLinks, centres: FloatArray
+    ) -> tuple[FloatArray, BoolArray]:
+        """Net contact wrench (links, 6) of what touches, world axes; and which links do.
+
+        It is the force in N, and the torque in N m about `centres` (links, 3), the links' centres
+        of mass when the engine's step began. A contact between two links of the body counts on
+        both, in opposite directions.
         """
-        forces = np.zeros((len(self._numbers), 3))
+        sums = [[0.0] * 6 for _ in self._numbers]  # plain numbers: of few contacts it is faster
         touching = np.zeros(len(self._numbers), dtype=np.bool_)
-        for number, force in touched.get(self._body, ()):
+        origins = centres.tolist()
+        for number, (fx, fy, fz), (px, py, pz) in touched.get(self._body, ()):
             row = self._row[number]
-            forces[row] += force
+            cx, cy, cz = origins[row]
+            x, y, z = px - cx, py - cy, pz - cz
+            moment = (y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
+            sums[row] = [a + b for a, b in zip(sums[row], (fx, fy, fz, *moment), strict=True)]
             touching[row] = True
-        return forces, touching
+        return np.array(sums), touching
 
     def _inertial_frames(self) -> tuple[FloatArray, FloatArray]:
         """Centres of mass (links, 3) and orientations xyzw of the inertial frames."""

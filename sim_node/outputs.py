@@ -65,7 +65,8 @@ class Outputs:
         """Publish all of a tick but its state, which comes last."""
         actor, stamp_ns = self._actor, self._actor.state.stamp_ns
         if actor.contacts is not None and self.wants_contacts:
-            touching = select(stamp_ns, self._links, actor.contacts.forces, actor.contacts.touching)
+            contacts = actor.contacts
+            touching = select(stamp_ns, self._links, contacts.wrenches, contacts.touching)
             self._contacts.publish(encode_wrenches(touching))
         if self._wrenches.get_subscription_count():
             self._wrenches.publish(encode_wrenches(self._applied(stamp_ns)))

@@ -44,7 +44,7 @@ def random_scenes(name: str) -> Iterator[tuple[LoneWorld, DynamicsModel, np.rand
     with LoneWorld(whole, WorldSettings(step_s=INSTANT)) as world:
         for _ in range(STATES):
             position, velocity = free_random_state(world.body, whole, rng)
-            model.update(whole.layout.configuration(position), velocity)
+            model.update(position, velocity)
             yield world, model, rng
 
 
@@ -116,7 +116,7 @@ def test_both_engines_weigh_the_character_alike_under_another_gravity(name: str)
     rng = np.random.default_rng(2)
     with LoneWorld(whole, WorldSettings(step_s=INSTANT, gravity=1.62)) as world:
         position, velocity = free_random_state(world.body, whole, rng)
-        model.update(whole.layout.configuration(position), velocity)
+        model.update(position, velocity)
 
         # Act
         measured = acceleration(world, damping(whole, world))

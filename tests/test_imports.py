@@ -36,6 +36,7 @@ EDGE = {  # the files that speak ROS, beside all of experiment/
     "sim_node/services.py",
     "sim_node/waiting.py",
     "controller_node/node.py",
+    "controller_node/outputs.py",
 }
 FINDS_PACKAGES = "msgs_config/files.py"  # ament_index_python, to resolve package://
 ENGINES = {
@@ -47,6 +48,7 @@ MAY_USE_BULLET = {
     "sim_node/body.py",
     "sim_node/contacts.py",
     "sim_node/links.py",
+    "sim_node/stage.py",
     "sim_node/world.py",
 }
 KNOW_NO_ROS = [
@@ -59,6 +61,7 @@ KNOW_NO_ROS = [
     "msgs_config.rotations",
     "msgs_config.tick_clock",
     "sim_node.actor",
+    "sim_node.camera",
     "sim_node.lockstep",
     "sim_node.pace",
     "sim_node.parameters",
@@ -69,10 +72,20 @@ KNOW_NO_ROS = [
     "sim_node.realtime",
     "sim_node.run_control",
     "sim_node.simulation",
+    "controller_node.actuation",
     "controller_node.agreement",
     "controller_node.control_laws",
     "controller_node.controller",
+    "controller_node.effort_series",
+    "controller_node.laws",
     "controller_node.parameters",
+    "controller_node.references.curve",
+    "controller_node.references.keyframe_file",
+    "controller_node.references.keyframes",
+    "controller_node.references.limits",
+    "controller_node.references.signals",
+    "controller_node.references.trajectory",
+    "experiment.equation",
 ]
 KNOW_NO_ENGINE = [
     "msgs_config.joint_layout",
@@ -82,9 +95,20 @@ KNOW_NO_ENGINE = [
     "msgs_config.rotations",
     "msgs_config.tick_clock",
     "sim_node.lockstep",
+    "sim_node.looks",
     "sim_node.passive",
     "sim_node.patience",
+    "sim_node.surfaces",
+    "sim_node.view",
+    "controller_node.actuation",
     "controller_node.control_laws",
+    "controller_node.effort_series",
+    "controller_node.references.curve",
+    "controller_node.references.keyframe_file",
+    "controller_node.references.keyframes",
+    "controller_node.references.limits",
+    "controller_node.references.signals",
+    "controller_node.references.trajectory",
 ]
 
 SOURCES = sorted(

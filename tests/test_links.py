@@ -28,7 +28,7 @@ from physics import (
 
 from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
-from msgs_config.arrays import FloatArray
+from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.bullet import pybullet
 from msgs_config.character import Character, Loading
 from msgs_config.character_loading import load_character
@@ -54,7 +54,7 @@ pushed_characters = pytest.mark.parametrize("name", PUSHED, ids=character_id)
 def frames_differ(world: LoneWorld, whole: Character, model: DynamicsModel) -> tuple[float, float]:
     """By how much, m and rad, link frames at the present state are not where MuJoCo has them."""
     position, velocity = world.body.read()
-    model.update(whole.layout.configuration(position), velocity)
+    model.update(position, velocity)
     expected_origins, expected_turns = model.link_poses()
     origins, turns = world.body.links.frames()
     far = np.abs(origins - expected_origins).max()
@@ -169,7 +169,7 @@ class Pushing:
         """Go to another random state."""
         position, velocity = free_random_state(self.world.body, self.whole, self.rng)
         self.state = position, velocity
-        self.model.update(self.whole.layout.configuration(position), velocity)
+        self.model.update(position, velocity)
 
     def acceleration(self, *pushes: tuple[int, FloatArray, FloatArray, FloatArray]) -> FloatArray:
         """What pushes add to the acceleration (n,) in one instant."""
@@ -352,11 +352,28 @@ def at_height(z: float, x: float = 0.0) -> FloatArray:
     return np.array([x, 0.0, z, 0.0, 0.0, 0.0])
 
 
+def contact_wrenches(world: World, body: Body, centres: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Contact wrenches (links, 6) of the last step, about the centres of mass before."""
+    return body.links.contact_wrenches(world.touched_links(), centres)
+
+
+def contact_forces(world: World, body: Body) -> tuple[FloatArray, BoolArray]:
+    """Contact forces (links, 3) of the last step."""
+    wrenches, touching = contact_wrenches(world, body, body.links.centres())
+    return wrenches[:, :3], touching
+
+
+def about_origin(wrenches: FloatArray, centres: FloatArray) -> FloatArray:
+    """The sum (6,) of wrenches on links, its torque about the world's origin."""
+    forces, torques = wrenches[:, :3], wrenches[:, 3:]
+    return np.concatenate((forces.sum(axis=0), (np.cross(centres, forces) + torques).sum(axis=0)))
+
+
 def test_in_the_air_nothing_touches(box: Character) -> None:
     with LoneWorld(box, WorldSettings()) as world:
         world.body.set_state(at_height(1.0), np.zeros(6))
         world.step()
-        forces, touching = world.body.links.contact_forces(world.touched_links())
+        forces, touching = contact_forces(world, world.body)
 
     np.testing.assert_array_equal(forces, np.zeros((1, 3)))
     np.testing.assert_array_equal(touching, [False])
@@ -367,7 +384,7 @@ def test_what_is_only_near_does_not_touch(box: Character, gap: float) -> None:
     with LoneWorld(box, WorldSettings(gravity=0.0)) as world:
         world.body.set_state(at_height(0.1 + gap), np.zeros(6))
         world.step()
-        forces, touching = world.body.links.contact_forces(world.touched_links())
+        forces, touching = contact_forces(world, world.body)
 
     np.testing.assert_array_equal(forces, np.zeros((1, 3)))
     assert not touching.any()
@@ -380,7 +397,7 @@ def test_the_ground_carries_the_weight_of_a_box_at_rest(box: Character) -> None:
 
         # Act
         advance(world, np.zeros(6), 480)
-        forces, touching = world.body.links.contact_forces(world.touched_links())
+        forces, touching = contact_forces(world, world.body)
 
     # Assert
     np.testing.assert_allclose(forces, [[0.0, 0.0, BOX_MASS * 9.81]], rtol=0.0, atol=1e-9)
@@ -405,7 +422,7 @@ def test_a_slope_carries_the_weight_too_by_pressure_and_friction(
 
         # Act
         advance(world, np.zeros(6), 960)
-        forces, _ = world.body.links.contact_forces(world.touched_links())
+        forces, _ = contact_forces(world, world.body)
         speed = np.abs(world.body.read()[1]).max()
 
     # Assert
@@ -425,13 +442,39 @@ def test_the_friction_of_a_sliding_box_is_against_its_motion(box: Character) -> 
 
             # Act
             world.step()
-            forces, _ = world.body.links.contact_forces(world.touched_links())
+            forces, _ = contact_forces(world, world.body)
 
             # Assert: it is what slows the box, and in the mean it is Coulomb's
             pulls.append(forces[0, 0])
             slowing = BOX_MASS * (world.body.read()[1][0] - before[0]) / settings.step_s
             assert forces[0, 0] == pytest.approx(slowing, abs=1e-9)
     assert np.mean(pulls) == pytest.approx(-0.4 * 0.5 * BOX_MASS * 9.81, rel=1e-2)
+
+
+def test_contacts_and_gravity_are_all_that_changes_the_momentum_of_a_tumbling_box(
+    box: Character,
+) -> None:
+    # Arrange: it falls on an edge, spinning and with speed along the ground, and rolls over
+    step_s, weight = 1.0 / 240.0, np.array([0.0, 0.0, -BOX_MASS * 9.81])
+    start = np.array([0.3, -0.2, 0.6, 0.4, 0.5, 0.2])
+    turned = 0.0
+    with LoneWorld(box, WorldSettings(link_friction=1.0)) as world:
+        world.body.set_state(start, np.array([1.0, 0.5, -1.0, 3.0, 4.0, -2.0]))
+        for _ in range(240):
+            before = np.concatenate(momentum(world.body, box))
+            centres = world.body.links.centres()
+
+            # Act
+            advance(world, np.zeros(6))
+            wrenches, _ = contact_wrenches(world, world.body, centres)
+
+            # Assert: Newton's and Euler's law, about the world's origin
+            rate = (np.concatenate(momentum(world.body, box)) - before) / step_s
+            gravity = np.concatenate((weight, np.cross(centres[0], weight)))
+            total = about_origin(wrenches, centres) + gravity
+            np.testing.assert_allclose(total, rate, rtol=1e-9, atol=1e-9)
+            turned = max(turned, float(np.abs(wrenches[:, 3:]).max()))
+    assert turned > 10.0
 
 
 @pytest.mark.parametrize("lower_first", [True, False])
@@ -448,8 +491,8 @@ def test_of_two_boxes_on_each_other_the_lower_is_pressed_by_its_own_weight_alone
         # Act
         for _ in range(960):
             world.step()
-        carried, _ = lower.links.contact_forces(world.touched_links())
-        resting, _ = upper.links.contact_forces(world.touched_links())
+        carried, _ = contact_forces(world, lower)
+        resting, _ = contact_forces(world, upper)
 
     # Assert: from below by both weights, from above by one
     weight = BOX_MASS * 9.81
@@ -474,9 +517,7 @@ def test_two_boxes_that_collide_press_equally_in_opposite_directions(
 
             # Act
             world.step()
-            forces = [
-                body.links.contact_forces(world.touched_links())[0][0] for body in (resting, coming)
-            ]
+            forces = [contact_forces(world, body)[0][0] for body in (resting, coming)]
 
             # Assert: Newton's third law, and his second for each
             rates = (momenta(box, resting, coming) - before) / step_s
@@ -531,8 +572,8 @@ class Untouched:
     def close(self) -> None:
         self._world.close()
 
-    def force(self, before: RawState, after: RawState) -> FloatArray:
-        """The force (3,) in N, over a step, of all that touched."""
+    def wrench(self, before: RawState, after: RawState) -> FloatArray:
+        """The wrench (6,) over a step of all that touched, N, and N m about the world's origin."""
         body = self._world.body
         put_raw_state(body, before, before)
         self._world.body.apply(np.zeros(self._whole.layout.size))
@@ -541,7 +582,7 @@ class Untouched:
         momenta = []
         for motion in (after, free):
             put_raw_state(body, before, motion)
-            momenta.append(momentum(body, self._whole)[0])
+            momenta.append(np.concatenate(momentum(body, self._whole)))
         return (momenta[0] - momenta[1]) / self._step_s
 
 
@@ -549,29 +590,54 @@ def in_the_void(gravity: float = 9.81) -> WorldSettings:
     return WorldSettings(gravity=gravity, ground=False)
 
 
-def test_the_contact_forces_of_a_falling_humanoid_are_what_changes_its_momentum() -> None:
-    # Arrange: limp, and moving over the ground, so that there is friction
+def test_the_contact_wrenches_of_a_falling_humanoid_are_what_changes_its_momentum() -> None:
+    # Arrange: limp, moving over the ground and turning, so that there is friction; it lies in the
+    # end, with links of its own on each other
     whole = character("humanoid")
     velocity = np.zeros(whole.layout.size)
     velocity[:2] = 1.0, 0.5
+    velocity[5] = 2.0
     untouched = Untouched("humanoid", in_the_void())
-    largest = 0.0
+    largest = np.zeros(6)
     with LoneWorld(whole, WorldSettings()) as world:
         world.body.set_state(np.array(whole.rest_position), velocity)
         for _ in range(480):
-            before = raw_state(world.body)
+            before, centres = raw_state(world.body), world.body.links.centres()
 
             # Act
             advance(world, np.zeros(whole.layout.size))
-            forces, touching = world.body.links.contact_forces(world.touched_links())
+            wrenches, touching = contact_wrenches(world, world.body, centres)
 
             # Assert
-            expected = untouched.force(before, raw_state(world.body))
-            np.testing.assert_allclose(forces.sum(axis=0), expected, rtol=1e-9, atol=1e-7)
-            assert not forces[~touching].any()
-            largest = max(largest, float(np.abs(expected).max()))
+            expected = untouched.wrench(before, raw_state(world.body))
+            total = about_origin(wrenches, centres)
+            np.testing.assert_allclose(total, expected, rtol=1e-9, atol=1e-7)
+            assert not wrenches[~touching].any()
+            largest = np.maximum(largest, np.abs(expected))
     untouched.close()
-    assert largest > 1000.0
+    assert (largest > 200.0).all()
+
+
+def test_the_torque_of_a_standing_humanoids_contacts_is_about_each_foots_centre_of_mass() -> None:
+    # Arrange: what presses on a sole, 0.177 m by 0.09 m, acts on it, and not beside it
+    whole = character("humanoid")
+    half_length, half_width = 0.0885, 0.045
+    with LoneWorld(whole, WorldSettings()) as world:
+        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
+        advance(world, np.zeros(whole.layout.size), 9)
+        centres = world.body.links.centres()
+
+        # Act
+        advance(world, np.zeros(whole.layout.size))
+        wrenches, touching = contact_wrenches(world, world.body, centres)
+
+    # Assert
+    for row in np.flatnonzero(touching):
+        (fx, fy, fz), (tx, ty, _) = wrenches[row, :3], wrenches[row, 3:]
+        height = centres[row, 2]
+        ahead, aside = (-ty - height * fx) / fz, (tx - height * fy) / fz
+        assert abs(ahead) < half_length + 1e-3
+        assert abs(aside) < half_width + 1e-3
 
 
 def test_a_fallen_humanoid_that_has_come_to_rest_weighs_what_it_weighs() -> None:
@@ -586,7 +652,7 @@ def test_a_fallen_humanoid_that_has_come_to_rest_weighs_what_it_weighs() -> None
         # Act
         for _ in range(240):
             advance(world, np.zeros(whole.layout.size))
-            total += world.body.links.contact_forces(world.touched_links())[0].sum(axis=0) / 240.0
+            total += contact_forces(world, world.body)[0].sum(axis=0) / 240.0
         gained = momentum(world.body, whole)[0] - start
 
     # Assert: the mean over a second
@@ -602,7 +668,7 @@ def test_a_standing_humanoid_touches_the_ground_with_its_feet_alone() -> None:
 
         # Act
         advance(world, np.zeros(whole.layout.size), 10)
-        forces, touching = world.body.links.contact_forces(world.touched_links())
+        forces, touching = contact_forces(world, world.body)
 
     # Assert
     names = {whole.links[row].name for row in np.flatnonzero(touching)}
@@ -636,7 +702,7 @@ def test_a_contact_is_the_links_own_whatever_the_order_of_the_urdf(tmp_path: Pat
 
         # Act
         world.step()
-        forces, touching = world.body.links.contact_forces(world.touched_links())
+        forces, touching = contact_forces(world, world.body)
 
     # Assert
     assert [link.name for link in whole.links] == ["base", "left", "foot", "right"]
@@ -655,7 +721,7 @@ def test_contacts_inside_a_character_cancel() -> None:
         for _ in range(120):
             # Act
             advance(world, effort)
-            forces, touching = world.body.links.contact_forces(world.touched_links())
+            forces, touching = contact_forces(world, world.body)
 
             # Assert
             largest = np.abs(forces).max()
@@ -686,13 +752,11 @@ def test_two_humanoids_that_collide_press_equally_in_opposite_directions() -> No
 
             # Act
             world.step()
-            forces = [
-                body.links.contact_forces(world.touched_links())[0].sum(axis=0) for body in bodies
-            ]
+            forces = [contact_forces(world, body)[0].sum(axis=0) for body in bodies]
 
             # Assert: Newton's third law, and his second for each
             for body, state, force in zip(bodies, before, forces, strict=True):
-                expected = untouched.force(state, raw_state(body))
+                expected = untouched.wrench(state, raw_state(body))[:3]
                 np.testing.assert_allclose(force, expected, rtol=1e-9, atol=1e-7)
             np.testing.assert_allclose(forces[0], -forces[1], rtol=1e-9, atol=1e-7)
             largest = max(largest, float(np.abs(forces).max()))

@@ -300,6 +300,64 @@ def test_the_right_jacobians_inverse_undoes_the_right_jacobian(angle: float) -> 
     np.testing.assert_allclose(product, np.eye(3), rtol=0.0, atol=1e-5)
 
 
+# The rates of a rotation vector
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-160, 1e-8, 1e-3, 0.5, 3.16, 3.17, 4.0, 6.2])
+def test_a_coning_motion_turns_as_its_three_turns_about_axes_do(angle: float) -> None:
+    # exp(angle (cos p, sin p, 0)) is Rz(p) Rx(angle) Rz(-p)
+    phase, speed = 0.7, 1.3
+    towards = np.array([np.cos(phase), np.sin(phase), 0.0])
+    across = np.array([-np.sin(phase), np.cos(phase), 0.0])
+
+    velocity, acceleration = rotations.angular_motion(
+        angle * towards, angle * speed * across, -angle * speed**2 * towards
+    )
+
+    up = np.array([0.0, 0.0, 1.0])
+    expected = speed * (np.sin(angle) * across - 2.0 * np.sin(0.5 * angle) ** 2 * up)
+    np.testing.assert_allclose(velocity, expected, rtol=1e-13, atol=EXACT)
+    expected = -(speed**2) * np.sin(angle) * towards
+    np.testing.assert_allclose(acceleration, expected, rtol=1e-13, atol=3.0 * EXACT)
+
+
+@PROPERTY
+@given(rotation_vectors(6.0), directions(), directions())
+def test_angular_velocity_and_acceleration_are_the_difference_quotients(
+    vector: FloatArray, rate: FloatArray, second_rate: FloatArray
+) -> None:
+    step = 1e-5
+
+    def moved(time: float) -> tuple[FloatArray, FloatArray]:
+        """The rotation vector and its rate at a time, with a third rate of zero."""
+        now = vector + time * rate + 0.5 * time**2 * second_rate
+        return now, rate + time * second_rate
+
+    velocity, acceleration = rotations.angular_motion(vector, rate, second_rate)
+    before, after = moved(-step), moved(step)
+    relative = rotations.multiply(
+        rotations.conjugate(rotations.exp(before[0])), rotations.exp(after[0])
+    )
+    np.testing.assert_allclose(rotations.log(relative) / (2.0 * step), velocity, atol=1e-8)
+    gained = (
+        rotations.angular_motion(*after, second_rate)[0]
+        - rotations.angular_motion(*before, second_rate)[0]
+    )
+    np.testing.assert_allclose(gained / (2.0 * step), acceleration, atol=1e-8)
+
+
+@PROPERTY
+@given(rotation_vectors(), directions(), directions())
+def test_the_rates_of_a_rotation_vector_give_the_motion_that_they_are_of(
+    vector: FloatArray, velocity: FloatArray, acceleration: FloatArray
+) -> None:
+    rate, second_rate = rotations.rotation_vector_rates(vector, velocity, acceleration)
+    motion = rotations.angular_motion(vector, rate, second_rate)
+
+    np.testing.assert_allclose(motion[0], velocity, atol=1e-10)
+    np.testing.assert_allclose(motion[1], acceleration, atol=1e-9)
+
+
 # Angles
 
 
@@ -355,6 +413,14 @@ UNARY: dict[str, tuple[Callable[[FloatArray], FloatArray], tuple[int, ...]]] = {
     "right_jacobian_inverse of log": (
         lambda q: rotations.right_jacobian_inverse(rotations.log(q)),
         (3, 3),
+    ),
+    "angular_motion along log": (
+        lambda q: rotations.angular_motion(rotations.log(q), q[..., :3], q[..., 1:])[1],
+        (3,),
+    ),
+    "rotation_vector_rates at log": (
+        lambda q: rotations.rotation_vector_rates(rotations.log(q), q[..., :3], q[..., 1:])[1],
+        (3,),
     ),
     "normalised": (rotations.normalised, (4,)),
     "yaw": (rotations.yaw, ()),

@@ -437,6 +437,11 @@ WRONG: dict[str, tuple[tuple[str, ...], list[str]]] = {
         (*SHORT, "--set", "sim_node.real_time_factor:=1.0"),
         ["--in-process", "'real_time_factor'"],
     ),
+    "contacts without a bag": ((*SHORT, "--contacts"), ["--contacts", "--in-process"]),
+    "contacts that are not to be recorded": (
+        (*ENDLESS, "--contacts", "--no-record"),
+        ["--contacts", "--no-record"],
+    ),
     "unfinished setting": (setting("sim_node.rate=240"), ["sim_node.rate=240", ":="]),
 }
 

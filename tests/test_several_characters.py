@@ -181,7 +181,7 @@ def test_without_weight_and_ground_what_touches_presses_equally_in_opposite_dire
             # Act
             run.step([nothing, nothing])
             one, other = (
-                actor.contacts.forces.sum(axis=0) for actor in run.actors if actor.contacts
+                actor.contacts.wrenches[:, :3].sum(axis=0) for actor in run.actors if actor.contacts
             )
 
             # Assert

@@ -134,6 +134,37 @@ def test_contacts_name_the_links_that_touch_and_carry_the_weight(
     assert np.mean(forces, axis=0)[2] == pytest.approx(weight, rel=0.2)
 
 
+@pytest.mark.parametrize("substeps", [1, 2])
+def test_contacts_carry_the_whole_wrench_on_each_link(
+    processes: Processes, client: SimulatorClient, substeps: int
+) -> None:
+    contacts = client.listen(topics.CONTACTS)
+    processes.simulator("humanoid", substeps=substeps, wait_for_subscribers=1)
+
+    client.drive(client.first_state(), 60, np.random.default_rng(3))
+    client.spin_until(lambda: 61 in contacts.ticks(), "contacts")
+
+    names = [link.name for link in character("humanoid").links]
+    by_tick, rng, largest = contacts.by_tick(), np.random.default_rng(3), 0.0
+    with simulation("humanoid", substeps=substeps) as run:
+        run.watches_contacts = True
+        for tick in range(2, 62):
+            effort = np.zeros(run.layout.size)
+            effort[6:] = rng.uniform(-20.0, 20.0, run.layout.size - 6)
+            run.advance(effort)
+            if tick not in by_tick:  # before the simulator knew of the listener
+                continue
+            expected = run.actor.contacts
+            assert expected is not None
+            rows = [names.index(name) for name in by_tick[tick].joint_names]
+            assert rows == np.flatnonzero(expected.touching).tolist()
+            for row, wrench in zip(rows, by_tick[tick].wrench, strict=True):
+                assert vector(wrench.force).tolist() == expected.wrenches[row, :3].tolist()
+                assert vector(wrench.torque).tolist() == expected.wrenches[row, 3:].tolist()
+                largest = max(largest, float(np.abs(vector(wrench.torque)).max()))
+    assert largest > 1.0
+
+
 def test_contacts_come_at_every_tick_also_where_nothing_touches(
     processes: Processes, client: SimulatorClient
 ) -> None:
@@ -216,7 +247,7 @@ def test_markers_are_the_shapes_of_the_links_where_the_other_engine_has_them(
     assert {(m.header.frame_id, m.action) for m in shown} == {("world", Marker.ADD)}
     assert all(m.color.a > 0.0 and min(vector(m.scale)) > 0.0 for m in shown)
     model = DynamicsModel(whole)
-    model.update(whole.layout.configuration(np.array(state.position)), np.array(state.velocity))
+    model.update(np.array(state.position), np.array(state.velocity))
     origins, turns = model.link_poses()
     firsts = itertools.accumulate((len(TYPES[shape.type]) for _, shape in shapes), initial=0)
     for (row, shape), first in zip(shapes, firsts, strict=False):

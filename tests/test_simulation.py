@@ -352,7 +352,7 @@ def test_nothing_touched_before_the_first_tick() -> None:
         contacts = run.actor.contacts
 
     assert contacts is not None
-    np.testing.assert_array_equal(contacts.forces, np.zeros((len(LINKS), 3)))
+    np.testing.assert_array_equal(contacts.wrenches, np.zeros((len(LINKS), 6)))
     assert not contacts.touching.any()
 
 
@@ -368,7 +368,7 @@ def test_contact_forces_are_the_mean_over_the_tick(substeps: int) -> None:
         for _ in range(480):
             run.advance(np.zeros(HUMANOID.size))
             assert run.actor.contacts is not None
-            given += run.actor.contacts.forces.sum(axis=0) / 240.0
+            given += run.actor.contacts.wrenches[:, :3].sum(axis=0) / 240.0
         gained, _ = momentum(run.actor._body, whole)
 
     # Assert: the impulse of all contacts, N s; a falling body's pose changes within a step
@@ -384,17 +384,17 @@ def test_a_contact_in_any_of_a_ticks_substeps_is_one() -> None:
         for effort in efforts:
             # Act
             coarse.advance(effort)
-            touched, forces = np.zeros(len(LINKS), dtype=np.bool_), np.zeros((len(LINKS), 3))
+            touched, wrenches = np.zeros(len(LINKS), dtype=np.bool_), np.zeros((len(LINKS), 6))
             for _ in range(4):
                 fine.advance(effort)
                 assert fine.actor.contacts is not None
                 touched |= fine.actor.contacts.touching
-                forces += 0.25 * fine.actor.contacts.forces
+                wrenches += 0.25 * fine.actor.contacts.wrenches
 
             # Assert
             assert coarse.actor.contacts is not None
             np.testing.assert_array_equal(coarse.actor.contacts.touching, touched)
-            np.testing.assert_allclose(coarse.actor.contacts.forces, forces, rtol=1e-12)
+            np.testing.assert_allclose(coarse.actor.contacts.wrenches, wrenches, atol=1e-9)
 
 
 # --- errors --------------------------------------------------------------------------------------

@@ -1,0 +1,71 @@
+"""What a control law itself takes for the humanoid, beside PyBullet's own stable PD in Python."""
+
+import time
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.deep_mimic import DeepMimicStablePd
+from controller_node.laws import LAWS
+from controller_node.parameters import make_controller
+from controller_node.references.base import Reference, ReferenceState
+from experiment.loop import ticks_in_process
+from experiment.metrics import Tick
+from experiment.plan import make_plan
+
+_DURATION = 5.0  # s of simulated time
+_ROUNDS = 5  # over all states; the best round counts, in which others disturbed the least
+_WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
+_NEEDS_A_FILE = "feedforward"
+
+
+def measure_control_laws(console: Console) -> None:
+    """Measure and print the table."""
+    console.print("control laws: humanoid ...")
+    ticks = list(ticks_in_process(make_plan("humanoid", _DURATION, _WALK, {}, {})))
+    with DeepMimicStablePd() as theirs:
+        theirs_us = min(theirs.duration_us(ticks) for _ in range(_ROUNDS))
+    table = Table(title="one control law (µs a tick)", title_justify="left")
+    for column in ("", "law", "with reference", "law / PyBullet's"):
+        table.add_column(column, justify="right" if column else "left")
+    for name in LAWS:
+        if name == _NEEDS_A_FILE:
+            continue
+        law_us, whole_us = _ours(name, ticks)
+        table.add_row(name, f"{law_us:.0f}", f"{whole_us:.0f}", f"{law_us / theirs_us:.3f}")
+    table.add_row("PyBullet's stable PD (deep_mimic)", f"{theirs_us:.0f}", "", "")
+    console.print(table)
+
+
+class _Known:
+    """A reference that has been worked out before, so that it takes no time."""
+
+    def __init__(self, reference: Reference) -> None:
+        self._sample = lru_cache(maxsize=None)(reference.sample)
+
+    def sample(self, time: float) -> ReferenceState:
+        """The desired state."""
+        return self._sample(time)
+
+
+def _ours(law: str, ticks: Sequence[Tick]) -> tuple[float, float]:
+    """Durations in µs of an answer: with the desired states known before, and with all of it."""
+    plan = make_plan("humanoid", _DURATION, _WALK, {}, {"law": law})
+    first = ticks[0].state.stamp_ns
+
+    def answers_us(reference: Reference) -> float:
+        controller = make_controller(plan.character, reference, plan.controller)
+        return _duration_us(lambda: [controller.answer(t.state, first) for t in ticks], ticks)
+
+    return answers_us(_Known(plan.reference)), answers_us(plan.reference)
+
+
+def _duration_us(work: Callable[[], object], ticks: Sequence[Tick]) -> float:
+    durations = []
+    for _ in range(_ROUNDS):
+        started = time.perf_counter()
+        work()
+        durations.append(time.perf_counter() - started)
+    return 1e6 * min(durations) / len(ticks)

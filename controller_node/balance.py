@@ -1,0 +1,200 @@
+"""Balance on two feet by joint efforts alone: what the ground is to do, through the Jacobians.
+
+A virtual force draws the centre of mass over the middle of the feet. Only the ground can exert it,
+on the soles: each foot gets its part w, and the joints the efforts that press it so against the
+ground, `-J^T w`. A sole bears no more than its edges allow; what is missing bends the body.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.dynamics import DynamicsModel
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character, ShapeType
+from msgs_config.errors import CharacterError, one_of
+
+_ROOT_ENTRIES = 6  # of the floating base, the first ones
+_LEAST_LOAD = 1.0  # N on the feet together, where the law would have them pull
+_MOST_LOAD = 2.0  # weights, on the feet together
+_FULL_FOOTING, _NO_FOOTING = 0.75, 0.5  # cosines of a sole's tilt: 41 and 60 degrees
+_LEAST_TIPPING = 1e-9  # N m^2, where the feet are in one place
+
+
+@dataclass(frozen=True)
+class BalanceGains:
+    """How the centre of mass is held. The defaults suit the humanoid, 45 kg."""
+
+    stiffness: float = 1000.0  # N/m, horizontally, of the centre of mass to the feet's middle
+    damping: float = 600.0  # N s/m, of the centre of mass
+    friction: float = 0.3  # largest horizontal force, as a share of the vertical one
+
+
+@dataclass(frozen=True)
+class _Sole:
+    """The lower face of a foot's box, in the frame of its link."""
+
+    centre: FloatArray  # (3,) m
+    edges: FloatArray  # (3, 2) directions of the face's edges, as columns
+    half_lengths: FloatArray  # (2,) of the edges, m
+    normal: FloatArray  # (3,) away from the ground
+
+
+@dataclass(frozen=True)
+class GroundWrenches:
+    """What the ground is to exert on the two feet, world axes."""
+
+    points: FloatArray  # (2, 3) the soles' middles, m
+    forces: FloatArray  # (2, 3) N
+    moments: FloatArray  # (2, 3) about those points, N m
+
+
+class Balance:
+    """The virtual force of a character that stands on two feet, as joint efforts.
+
+    It has no memory: the same state gets the same effort.
+
+    Sources: Pratt et al. 2001, "Virtual Model Control" (the virtual force); Hyon, Hale and Cheng
+    2007, "Full-Body Compliant Human-Humanoid Interaction" (the feet's shares, the Jacobians'
+    transposes, gravity).
+    """
+
+    def __init__(self, character: Character, feet: Sequence[str]) -> None:
+        """Find the soles of the two links named: the faces of their boxes below in the rest pose.
+
+        Raises:
+            CharacterError: the base is fixed, there are not two feet, or one of them is no link,
+                has no box, or is moved by no joint.
+        """
+        if not character.layout.has_floating_base:
+            raise CharacterError(
+                f"{character.file}: the base is fixed; there is nothing to balance"
+            )
+        if len(feet) != 2 or feet[0] == feet[1]:
+            given = ", ".join(feet) or "none"
+            raise CharacterError(f"{character.file}: balance needs two feet; given: {given}")
+        model = DynamicsModel(character)
+        model.update(np.array(character.rest_position), np.zeros(character.layout.size))
+        self._feet = np.array([_link(character, foot) for foot in feet])
+        _, axes = model.link_frames(self._feet)
+        soles = [
+            _sole(character, model, foot, turn) for foot, turn in zip(self._feet, axes, strict=True)
+        ]
+        self._centres = np.array([sole.centre for sole in soles])
+        self._edges = np.array([sole.edges for sole in soles])
+        self._half_lengths = np.array([sole.half_lengths for sole in soles])
+        self._normals = np.array([sole.normal for sole in soles])
+
+    def effort(self, model: DynamicsModel, gains: BalanceGains) -> FloatArray:
+        """The effort (n,) to add to that of the tracking law; `model` has the present state.
+
+        Beside the feet's part it has the bias force: where the virtual force is the weight's
+        opposite, nothing moves. The root's entries are zero, and all are once it has fallen.
+        """
+        ground = self.ground_wrenches(model, gains)
+        effort = model.bias_force()
+        for foot, point, force, moment in zip(
+            self._feet, ground.points, ground.forces, ground.moments, strict=True
+        ):
+            jacobian = model.point_jacobian(foot, point)
+            effort -= np.einsum("ij,i->j", jacobian, np.concatenate((force, moment)))
+        effort[:_ROOT_ENTRIES] = 0.0
+        return effort * self._footing(model)
+
+    def _footing(self, model: DynamicsModel) -> float:
+        """1 while a foot can be flat on the ground, 0 when both are tilted too far."""
+        _, axes = model.link_frames(self._feet)
+        level = float(np.einsum("fj,fj->f", axes[:, 2], self._normals).max())
+        return min(max((level - _NO_FOOTING) / (_FULL_FOOTING - _NO_FOOTING), 0.0), 1.0)
+
+    def ground_wrenches(self, model: DynamicsModel, gains: BalanceGains) -> GroundWrenches:
+        """The virtual force, shared by the feet, and its moment as far as their soles bear it.
+
+        Where they do not bear it all, the force acts beside the centre of mass and turns the body:
+        so bends at the hips who cannot stand otherwise.
+        """
+        origins, axes = model.link_frames(self._feet)
+        points = origins + rotations.apply(axes, self._centres)
+        middle, across = 0.5 * (points[0] + points[1]), points[1] - points[0]
+        arm = model.centre_of_mass() - middle
+        force = _virtual_force(model, arm, gains)
+        moment = cross(arm, force)
+        shift = _shift(moment, across, float(force[2]))
+        moment -= shift * cross(across, force)
+        shares = np.array(((0.5 - shift,), (0.5 + shift,)))
+        edges = np.einsum("fij,fjk->fki", axes, self._edges)  # now as rows
+        limits = shares * force[2] * self._half_lengths[:, ::-1]
+        return GroundWrenches(points, shares * force, _bearable(shares * moment, edges, limits))
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """The product `a x b` (3,) of two vectors (3,), ten times as fast as numpy's own."""
+    ax, ay, az = a.tolist()
+    bx, by, bz = b.tolist()
+    return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
+
+
+def _virtual_force(model: DynamicsModel, offset: FloatArray, gains: BalanceGains) -> FloatArray:
+    """The force (3,) on a centre of mass that is at an offset (3,) from the feet's middle, m.
+
+    It is one that feet can exert: upwards, not too large, and inside the cone of friction.
+    """
+    velocity = model.centre_of_mass_velocity()
+    force = -gains.stiffness * offset - gains.damping * velocity
+    vertical = model.weight - gains.damping * float(velocity[2])
+    force[2] = max(min(vertical, _MOST_LOAD * model.weight), _LEAST_LOAD)
+    horizontal, bound = float(np.hypot(force[0], force[1])), gains.friction * float(force[2])
+    if horizontal > bound:
+        force[:2] *= bound / horizontal
+    return force
+
+
+def _shift(moment: FloatArray, across: FloatArray, load: float) -> float:
+    """Which share of the load, beside a half, goes to the second foot: -0.5 to 0.5.
+
+    The centre of pressure comes as near to the one of the moment (3,) about the feet's middle as
+    it can on the line `across` (3,) from the first foot to the second.
+    """
+    x, y, _ = across.tolist()
+    tipping = y * float(moment[0]) - x * float(moment[1])
+    wanted: float = tipping / max(load * (x * x + y * y), _LEAST_TIPPING)
+    return min(max(wanted, -0.5), 0.5)
+
+
+def _bearable(moments: FloatArray, edges: FloatArray, limits: FloatArray) -> FloatArray:
+    """What soles bear of moments (2, 3): the parts about their edges (2, 2, 3), which are rows.
+
+    With each at most its limit (2, 2) in N m, the load times half the other edge's length, the
+    centre of pressure is inside the sole.
+    """
+    about_edges = rotations.apply(edges, moments)
+    bounded = np.minimum(np.maximum(about_edges, -limits), limits)
+    bearable: FloatArray = np.einsum("fki,fk->fi", edges, bounded)
+    return bearable
+
+
+def _link(character: Character, name: str) -> int:
+    names = [link.name for link in character.links]
+    if name not in names:
+        raise CharacterError(f"{character.file}: {one_of('foot', name, names)}")
+    return names.index(name)
+
+
+def _sole(character: Character, model: DynamicsModel, foot: int, axes: FloatArray) -> _Sole:
+    """The lower face of a foot whose link frame has its axes (3, 3) so in the rest pose."""
+    link = character.links[foot]
+    if not model.point_jacobian(foot, np.zeros(3))[:, _ROOT_ENTRIES:].any():
+        raise CharacterError(f"{character.file}: no joint moves the foot '{link.name}'")
+    boxes = [shape for shape in link.shapes if shape.type is ShapeType.BOX]
+    if not boxes:
+        raise CharacterError(f"{character.file}: the foot '{link.name}' has no box, so no sole")
+    pose, half = boxes[0].pose, 0.5 * np.array(boxes[0].size)
+    turn = rotations.matrix(np.array(pose.orientation_xyzw))
+    heights = rotations.apply(turn.T, axes[2])  # of the box's axes above its middle
+    normal = int(np.argmax(np.abs(heights)))
+    up = np.copysign(1.0, heights[normal]) * turn[:, normal]
+    others = [axis for axis in range(3) if axis != normal]
+    centre = np.array(pose.position) - half[normal] * up
+    return _Sole(centre, turn[:, others], half[others], up)

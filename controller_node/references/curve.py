@@ -1,0 +1,154 @@
+"""Piecewise polynomials through knots on a configuration space, ball joints and base included."""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.references.base import ReferenceState
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.joint_layout import Configuration, JointLayout
+
+# The coefficients of u, u^2, ... of a polynomial on 0 <= u <= 1 that begins at zero, a row each;
+# the columns are its end, its first derivatives at 0 and at 1, and its second ones.
+_LINEAR = np.array([[1.0]])
+_CUBIC = np.array([[0.0, 1.0, 0.0], [3.0, -2.0, -1.0], [-2.0, 1.0, 1.0]])
+_QUINTIC = np.array(
+    [
+        [0.0, 1.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.5, 0.0],
+        [10.0, -6.0, -4.0, -1.5, 0.5],
+        [-15.0, 8.0, 7.0, 1.5, -1.0],
+        [6.0, -3.0, -3.0, -0.5, 0.5],
+    ]
+)
+_DEGREE = len(_QUINTIC)
+
+
+@dataclass(frozen=True)
+class Knots:
+    """What a curve goes through: p configurations at rising times, and how fast if that is set.
+
+    Without velocities the curve between them is linear, with velocities cubic, with accelerations
+    too it is quintic.
+    """
+
+    times: FloatArray  # (p,) s
+    configurations: Configuration  # (p, n), (p, k, 4)
+    velocities: FloatArray | None = None  # (p, n), a rotation's in the child frame
+    accelerations: FloatArray | None = None  # (p, n), their rates of change
+
+
+class Curve:
+    """A motion through knots, at rest before the first and from the last one on.
+
+    Between two knots each coordinate is a polynomial in time, and so is the rotation vector r of
+    each rotation `q_i exp(r)`, where `q_i` is the rotation at the knot before. It takes the shorter
+    way round. Where knots have velocities (accelerations) the curve's own are continuous, since
+    those of r at a segment's ends are made from them.
+    """
+
+    def __init__(self, layout: JointLayout, *parts: Knots) -> None:
+        """Join parts, each of a degree of its own; one begins with the last knot of the other."""
+        self._layout = layout
+        first, *others = parts
+        later = [part.times[1:] for part in others]
+        self._knot_times: list[float] = np.concatenate([first.times, *later]).tolist()
+        self._positions = np.concatenate([part.configurations.position[:-1] for part in parts])
+        self._orientations = np.concatenate(
+            [part.configurations.orientations_xyzw[:-1] for part in parts]
+        )
+        self._coefficients = np.concatenate([_coefficients(layout, part) for part in parts])
+        self._at_first = self._at_rest(first.configurations, 0)
+        self._at_last = self._at_rest(parts[-1].configurations, -1)
+
+    @property
+    def start(self) -> float:
+        """Time in s of the first knot."""
+        return self._knot_times[0]
+
+    def sample(self, time: float) -> ReferenceState:
+        """The state at a time in s, on the clock of the knots."""
+        if time < self._knot_times[0]:
+            return self._at_first
+        if time >= self._knot_times[-1]:
+            return self._at_last
+        segment = bisect_right(self._knot_times, time) - 1
+        moved, velocity, acceleration = self._polynomials(segment, time)
+        position, orientations = self._positions[segment] + moved, self._orientations[segment]
+        entries = self._layout.rotation_entries
+        if not len(entries):
+            return ReferenceState(Configuration(position, orientations), velocity, acceleration)
+        turned = moved[entries]
+        orientations = rotations.multiply(orientations, rotations.exp(turned))
+        position[entries] = rotations.log(orientations)
+        velocity[entries], acceleration[entries] = rotations.angular_motion(
+            turned, velocity[entries], acceleration[entries]
+        )
+        return ReferenceState(Configuration(position, orientations), velocity, acceleration)
+
+    def coordinate(self, entry: int, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Times in s and values of a hinge or slider at shares (m,) of each segment, (p - 1, m)."""
+        begins = np.array(self._knot_times[:-1])[:, np.newaxis]
+        durations = np.diff(self._knot_times)[:, np.newaxis]
+        powers = shares ** np.arange(1.0, _DEGREE + 1.0)[:, np.newaxis]
+        moved = np.einsum("sd,dm->sm", self._coefficients[:, :, entry], powers)
+        return begins + durations * shares, self._positions[:, entry, np.newaxis] + moved
+
+    def _polynomials(self, segment: int, time: float) -> FloatArray:
+        """What the segment's polynomials and their first two derivatives are, (3, n)."""
+        begin = self._knot_times[segment]
+        rate = 1.0 / (self._knot_times[segment + 1] - begin)
+        u = (time - begin) * rate
+        u2, u3, u4 = u * u, u * u * u, u * u * u * u
+        first, second = rate, rate * rate
+        basis = np.array(
+            [
+                [u, u2, u3, u4, u4 * u],
+                [first, 2.0 * first * u, 3.0 * first * u2, 4.0 * first * u3, 5.0 * first * u4],
+                [0.0, 2.0 * second, 6.0 * second * u, 12.0 * second * u2, 20.0 * second * u3],
+            ]
+        )
+        values: FloatArray = np.einsum("ij,jk->ik", basis, self._coefficients[segment])
+        return values
+
+    def _at_rest(self, configurations: Configuration, knot: int) -> ReferenceState:
+        position = configurations.position[knot].copy()
+        orientations = configurations.orientations_xyzw[knot]
+        position[self._layout.rotation_entries] = rotations.log(orientations)
+        still = np.zeros(self._layout.size)
+        return ReferenceState(Configuration(position, orientations), still, still)
+
+
+def segment_offsets(layout: JointLayout, configurations: Configuration) -> FloatArray:
+    """What leads from each configuration (p, n) to the next, (p - 1, n): rad and m."""
+    position, orientations = configurations.position, configurations.orientations_xyzw
+    return layout.difference(
+        Configuration(position[:-1], orientations[:-1]),
+        Configuration(position[1:], orientations[1:]),
+    )
+
+
+def _coefficients(layout: JointLayout, knots: Knots) -> FloatArray:
+    """Coefficients (p - 1, 5, n) of u, u^2, ... where u goes from 0 to 1 over each segment."""
+    ends = segment_offsets(layout, knots.configurations)
+    durations = np.diff(knots.times)[:, np.newaxis]
+    conditions, table = [ends], _LINEAR
+    velocities, accelerations = knots.velocities, knots.accelerations
+    if velocities is not None:
+        # at its first knot a rotation vector is zero, and its rates are those of the rotation
+        rates, entries = velocities[1:].copy(), layout.rotation_entries
+        second_rates = np.zeros_like(rates) if accelerations is None else accelerations[1:].copy()
+        rates[:, entries], second_rates[:, entries] = rotations.rotation_vector_rates(
+            ends[:, entries], rates[:, entries], second_rates[:, entries]
+        )
+        conditions += [durations * velocities[:-1], durations * rates]
+        table = _CUBIC
+        if accelerations is not None:
+            squares = durations * durations
+            conditions += [squares * accelerations[:-1], squares * second_rates]
+            table = _QUINTIC
+    coefficients = np.zeros((len(ends), _DEGREE, layout.size))
+    coefficients[:, : len(table)] = np.einsum("dc,csn->sdn", table, np.array(conditions))
+    return coefficients

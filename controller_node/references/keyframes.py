@@ -1,0 +1,119 @@
+"""Keyframes as a reference: poses at times, and the path between them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.references.base import ReferenceState
+from controller_node.references.curve import Curve, Knots, segment_offsets
+from controller_node.references.limits import JointLimits
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+from msgs_config.joint_layout import Configuration, JointLayout
+
+_SHARES = np.linspace(0.0, 1.0, 65)  # of a segment, where its path is compared with the limits
+_NOTICED = 1e-6  # rad or m
+
+
+@dataclass(frozen=True)
+class Keyframes:
+    """The keyframes of a file, in a character's layout and where it stands."""
+
+    times: FloatArray  # (p,) s, rising
+    configurations: Configuration  # (p, n), (p, k, 4)
+    smooth: bool  # else linear
+    period: float | None = None  # s, of a loop
+    notes: tuple[str, ...] = ()  # what their author may have overlooked
+
+
+class KeyframesReference:
+    """Keyframes in time.
+
+    A loop goes on from the last keyframe to the first one of the next period, and is periodic from
+    time 0 on. Else the first keyframe is held until its time comes, and the last one ever after.
+    """
+
+    def __init__(self, layout: JointLayout, keyframes: Keyframes) -> None:
+        self._curve = curve_through(layout, keyframes)
+        self._first = float(keyframes.times[0])
+        self._period = keyframes.period
+
+    def sample(self, time: float) -> ReferenceState:
+        """The desired state `time` seconds after the episode's first state."""
+        if self._period is not None:
+            time = (time - self._first) % self._period
+            if time >= self._period:  # a modulo of less than nothing can round up
+                time = 0.0
+        return self._curve.sample(time)
+
+
+def curve_through(layout: JointLayout, keyframes: Keyframes) -> Curve:
+    """The path through keyframes; that of a loop is one period, from its first keyframe on.
+
+    A smooth path is continuous to the acceleration. At a keyframe it moves as the parabola through
+    this one and its two neighbours does, at the two ends of what is no loop it is at rest.
+    """
+    times, configurations = keyframes.times, keyframes.configurations
+    if keyframes.period is not None:
+        times = np.append(times - times[0], keyframes.period)
+        configurations = Configuration(
+            _closed(configurations.position), _closed(configurations.orientations_xyzw)
+        )
+    if not keyframes.smooth or len(times) == 1:
+        return Curve(layout, Knots(times, configurations))
+    durations = np.diff(times)[:, np.newaxis]
+    slopes = segment_offsets(layout, configurations) / durations
+    rates = _parabolas(slopes, durations, loops=keyframes.period is not None)
+    return Curve(layout, Knots(times, configurations, *rates))
+
+
+def _closed(rows: FloatArray) -> FloatArray:
+    """The rows, with the first once more at the end."""
+    return np.concatenate([rows, rows[:1]])
+
+
+def _parabolas(
+    slopes: FloatArray, durations: FloatArray, *, loops: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Velocity and acceleration (p, n) at each knot, from slopes (p - 1, n) between them.
+
+    They are in exponential coordinates about the knot, where what leads back to the knot before is
+    the negative of what leads from there.
+    """
+    if loops:
+        before, after = np.roll(slopes, 1, axis=0), slopes
+        time_before, time_after = np.roll(durations, 1, axis=0), durations
+    else:
+        before, after = slopes[:-1], slopes[1:]
+        time_before, time_after = durations[:-1], durations[1:]
+    both = time_before + time_after
+    velocities = (before * time_after + after * time_before) / both
+    accelerations = 2.0 * (after - before) / both
+    if loops:
+        return _closed(velocities), _closed(accelerations)
+    ends = ((1, 1), (0, 0))  # at rest
+    return np.pad(velocities, ends), np.pad(accelerations, ends)
+
+
+def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
+    """What to say of each joint that the path leads out of its limits between two keyframes."""
+    if len(keyframes.times) == 1:
+        return ()
+    limits, curve = JointLimits(character), curve_through(character.layout, keyframes)
+    begin = keyframes.times[0] if keyframes.period is not None else 0.0
+    at_keyframes = keyframes.configurations.position
+    lower = np.minimum(limits.lower, at_keyframes.min(axis=0))  # a rest pose may lie beyond
+    upper = np.maximum(limits.upper, at_keyframes.max(axis=0))
+    notes = []
+    for index in np.flatnonzero(np.isfinite(lower) | np.isfinite(upper)).tolist():
+        times, values = curve.coordinate(index, _SHARES)
+        beyond = np.maximum(lower[index] - values, values - upper[index])
+        worst = np.unravel_index(beyond.argmax(), beyond.shape)
+        if beyond[worst] > _NOTICED:
+            notes.append(
+                f"the path between keyframes leaves the limits of "
+                f"'{character.layout.dof_names[index]}', {limits.text(index)}, by "
+                f"{beyond[worst]:.2g} {limits.unit(index)} at {begin + times[worst]:.3g} s; one "
+                "more keyframe there, or 'interpolation: linear', keeps it within"
+            )
+    return tuple(notes)

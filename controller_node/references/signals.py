@@ -1,0 +1,132 @@
+"""Test signals: a step and a sine away from the rest pose."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller_node.references.base import ReferenceState
+from controller_node.references.limits import LARGEST_NUMBER, JointLimits
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+from msgs_config.errors import MotionError, one_of
+from msgs_config.joint_layout import Configuration, JointLayout
+
+
+class StepReference:
+    """The rest pose, and from `time` on one that is away from it, at rest too.
+
+    The entries of a ball joint that are named make one rotation vector in its child frame, by
+    which it is turned from its rest pose.
+    """
+
+    def __init__(
+        self, character: Character, dof_names: Sequence[str], size: float, time: float
+    ) -> None:
+        """A step of each degree of freedom named by `size`, in rad or m, at `time` in s.
+
+        Raises:
+            MotionError: a name is unknown or repeated, a number is of no use, or the step would
+                leave a joint's limits.
+        """
+        _check_number("the step's size", size)
+        _check_number("the step's time", time, minimum=0.0)
+        chosen = _chosen(character.layout, dof_names)
+        _check_limits(character, chosen, [size], "step")
+        rest = character.layout.configuration(np.array(character.rest_position))
+        still = np.zeros(character.layout.size)
+        away = _moved(character.layout, rest, size * chosen)
+        self._time = time
+        self._before = ReferenceState(rest, still, still)
+        self._after = ReferenceState(away, still, still)
+
+    def sample(self, time: float) -> ReferenceState:
+        """The desired state `time` seconds after the episode's first state."""
+        return self._after if time >= self._time else self._before
+
+
+class SineReference:
+    """An oscillation about the rest pose that begins there: `amplitude sin(2 pi f t)`.
+
+    The entries of a ball joint that are named make one rotation vector in its child frame, so
+    that it turns about a fixed axis.
+    """
+
+    def __init__(
+        self,
+        character: Character,
+        dof_names: Sequence[str],
+        amplitude: float,
+        frequency_hz: float,
+    ) -> None:
+        """An oscillation of each degree of freedom named; `amplitude` in rad or m.
+
+        Raises:
+            MotionError: a name is unknown or repeated, a number is of no use, or the oscillation
+                would leave a joint's limits.
+        """
+        _check_number("the sine's amplitude", amplitude)
+        _check_number("the sine's frequency", frequency_hz, minimum=0.0)
+        chosen = _chosen(character.layout, dof_names)
+        _check_limits(character, chosen, [amplitude, -amplitude], "sine")
+        self._layout = character.layout
+        self._rest = character.layout.configuration(np.array(character.rest_position))
+        self._amplitudes = amplitude * chosen
+        self._angular_frequency = 2.0 * math.pi * frequency_hz
+
+    def sample(self, time: float) -> ReferenceState:
+        """The desired state `time` seconds after the episode's first state."""
+        rate = self._angular_frequency
+        sine, cosine = math.sin(rate * time), math.cos(rate * time)
+        return ReferenceState(
+            _moved(self._layout, self._rest, sine * self._amplitudes),
+            rate * cosine * self._amplitudes,
+            -rate * rate * sine * self._amplitudes,
+        )
+
+
+def _moved(layout: JointLayout, rest: Configuration, offset: FloatArray) -> Configuration:
+    """The rest pose moved by an offset (n,), a rotation's in its child frame."""
+    position, entries = rest.position + offset, layout.rotation_entries
+    turned = rotations.multiply(rest.orientations_xyzw, rotations.exp(offset[entries]))
+    position[entries] = rotations.log(turned)
+    return Configuration(position, turned)
+
+
+def _chosen(layout: JointLayout, dof_names: Sequence[str]) -> FloatArray:
+    """One (n,) at each degree of freedom named, zero elsewhere."""
+    if not dof_names:
+        raise MotionError("no degree of freedom is named; there must be one or more")
+    chosen = np.zeros(layout.size)
+    for name in dof_names:
+        if name not in layout.dof_names:
+            raise MotionError(one_of("degree of freedom", name, list(layout.dof_names)))
+        index = layout.dof_names.index(name)
+        if chosen[index]:
+            raise MotionError(f"degree of freedom '{name}' is named twice; once is enough")
+        chosen[index] = 1.0
+    return chosen
+
+
+def _check_number(what: str, value: float, minimum: float = -LARGEST_NUMBER) -> None:
+    if not minimum <= value <= LARGEST_NUMBER:  # NaN is not
+        raise MotionError(f"{what} is {value:g}; it must be from {minimum:g} to {LARGEST_NUMBER:g}")
+
+
+def _check_limits(
+    character: Character, chosen: FloatArray, sizes: list[float], signal: str
+) -> None:
+    limits, rest = JointLimits(character), np.array(character.rest_position)
+    for size in sizes:
+        excess = limits.excess(rest + size * chosen) * chosen
+        for index in np.flatnonzero(excess)[:1].tolist():
+            down, up = limits.lower[index] - rest[index], limits.upper[index] - rest[index]
+            right = f"its size must be from {down:g} to {up:g}"
+            if signal == "sine":
+                right = f"its amplitude must be at most {max(0.0, min(-down, up)):g}"
+            raise MotionError(
+                f"the {signal} leads '{character.layout.dof_names[index]}' to "
+                f"{rest[index] + size:g}, {excess[index]:.3g} {limits.unit(index)} beyond its "
+                f"limits, {limits.text(index)}; {right}"
+            )

@@ -1,0 +1,234 @@
+"""Pictures of a recorded run, or of any poses: single ones and strips of several."""
+
+from collections.abc import Callable, Mapping, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.image import imsave
+
+from experiment.recording import Recording
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from msgs_config.character import Character
+from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.parameters import resolve
+from sim_node.camera import DEFAULT_SIZE, Camera, Picture
+from sim_node.parameters import WORLD_PARAMETERS, make_settings
+from sim_node.stage import Size
+from sim_node.world import WorldSettings
+
+SMALLEST, LARGEST = 16, 4096  # pixels along an edge of a picture
+
+_MOST_PIXELS = 2**26  # of a strip
+_TILE_HEIGHT = 400  # pixels, where nothing else is said
+_NARROWEST, _WIDEST = 0.5, 1.6  # width over height, where nothing else is said
+_COLUMNS = 8  # at the most, where nothing else is said
+_GAP = 3  # pixels between pictures
+_WHITE = 255
+_CAPTION_SHARE = 15  # a caption's height is one part in so many of its picture's ...
+_LEAST_CAPTION = 16  # ... but not less than so many pixels
+_DPI = 72  # so that a point is a pixel
+
+Progress = Callable[[int], None]
+"""Is told the number of pictures so far."""
+
+
+def render_still(
+    recording: Recording, time: float, *, size: Size = DEFAULT_SIZE, ghost: bool = False
+) -> Picture:
+    """A picture (h, w, 3) of the state that is nearest to a time in s since the first state.
+
+    Args:
+        recording: The run.
+        time: When.
+        size: Width and height in pixels.
+        ghost: Draw the reference, too, transparent.
+
+    Raises:
+        ConfigurationError: the recording does not reach to that time, or the size is not sensible.
+        RecordingError: a ghost is asked for, and there is no reference.
+    """
+    return strip(recording, [time], size=size, ghost=ghost, labels=False)
+
+
+def strip(
+    recording: Recording,
+    times: Sequence[float] | int = 8,
+    *,
+    columns: int | None = None,
+    ghost: bool = False,
+    labels: bool = True,
+    size: Size | None = None,
+    progress: Progress | None = None,
+) -> Picture:
+    """Pictures of a run side by side, all of one scale; each follows the root along the ground.
+
+    Args:
+        recording: The run.
+        times: When, s since the first state; or how many pictures, evenly from first to last.
+        columns: Pictures in a row.
+        ghost: Draw the reference, too, transparent, wherever there is one.
+        labels: Write the time above each picture.
+        size: Width and height of each picture in pixels.
+        progress: Is called after each picture.
+
+    Raises:
+        ConfigurationError: the recording does not reach to a time, or a size is not sensible.
+        RecordingError: a ghost is asked for, and there is no reference.
+    """
+    rows = _rows(recording.times, times)
+    references = recording.reference_position
+    if ghost and np.isnan(references).any(axis=1).all():
+        raise RecordingError("the recording has no reference to draw")
+    world = _world(recording.parameters)
+    return pose_strip(
+        recording.character,
+        recording.position[rows],
+        [f"{time:.2f} s" for time in recording.times[rows]] if labels else None,
+        ghosts=references[rows] if ghost else None,
+        columns=columns,
+        size=size,
+        world=world,
+        progress=progress,
+    )
+
+
+def pose_strip(
+    character: Character,
+    positions: FloatArray,
+    captions: Sequence[str] | None = None,
+    *,
+    ghosts: FloatArray | None = None,
+    columns: int | None = None,
+    size: Size | None = None,
+    world: WorldSettings | None = None,
+    progress: Progress | None = None,
+) -> Picture:
+    """Pictures (h, w, 3) of a character side by side, all of one scale.
+
+    Args:
+        character: The character.
+        positions: Where it is in each picture (p, n), message form.
+        captions: What stands above each picture (p,).
+        ghosts: Where its transparent copy is in each picture (p, n); NaN draws none.
+        columns: Pictures in a row; by default all, up to 8.
+        size: Width and height of each picture in pixels; by default as suits the poses.
+        world: Says what there is besides; by default the plane z = 0.
+        progress: Is called after each picture.
+
+    Raises:
+        ConfigurationError: there are no positions, or a size is not sensible.
+        CharacterError: a file of the character cannot be used.
+    """
+    positions = np.atleast_2d(positions)
+    count = len(positions)
+    if not count or (columns is not None and columns < 1):
+        raise ConfigurationError(f"{count} pictures in rows of {columns}; both must be 1 or more")
+    if captions is not None and len(captions) != count:
+        raise ConfigurationError(f"{len(captions)} captions for {count} pictures")
+    world = world or WorldSettings()
+    with Camera(character, ground=world.ground, terrain=world.terrain) as camera:
+        no_ghosts = np.full_like(positions, np.nan)
+        ghosts = no_ghosts if ghosts is None else np.atleast_2d(ghosts)
+        has_ghost: BoolArray = np.logical_and.reduce(np.isfinite(ghosts), axis=1)
+        seen = np.concatenate((positions, ghosts[has_ghost]))
+        size = _natural_size(camera, seen) if size is None else size
+        _check_size(size, count)
+        view = camera.view(seen, size=size)
+        tiles = []
+        for row, position in enumerate(positions):
+            picture = camera.picture(
+                position,
+                ghost=ghosts[row] if has_ghost[row] else None,
+                view=camera.followed(view, positions[0], position),
+                size=size,
+            )
+            tiles.append(picture if captions is None else _captioned(picture, captions[row]))
+            if progress is not None:
+                progress(row + 1)
+    return _side_by_side(tiles, columns or min(count, _COLUMNS))
+
+
+def save_png(picture: Picture, path: Path) -> None:
+    """Write a picture (h, w, 3) as a PNG file, whole or not at all.
+
+    Raises:
+        RecordingError: the file cannot be written.
+    """
+    content = BytesIO()
+    imsave(content, picture, format="png")
+    try:
+        path.write_bytes(content.getvalue())
+    except OSError as error:
+        raise RecordingError(f"cannot write picture {path}: {error.strerror}") from error
+
+
+def _rows(known: FloatArray, times: Sequence[float] | int) -> IntArray:
+    """The states (p,) that are nearest to times in s, or evenly from the first to the last."""
+    end = float(known[-1])
+    if isinstance(times, int):
+        if times < 1:
+            raise ConfigurationError(f"{times} pictures; it must be 1 or more")
+        wanted = np.linspace(0.0, end, times)
+    else:
+        wanted = np.array(times, dtype=float)
+    for time in wanted.tolist():
+        if not 0.0 <= time <= end:
+            raise ConfigurationError(f"time {time:g} s is not in the recording: 0 to {end:g} s")
+    rows: IntArray = np.abs(known[:, np.newaxis] - wanted).argmin(axis=0)
+    return rows
+
+
+def _world(parameters: Mapping[str, Any]) -> WorldSettings:
+    """What lay there in a run; of the simulator's parameters those that are unbounded are null."""
+    names = {parameter.name for parameter in WORLD_PARAMETERS}
+    given = {k: v for k, v in parameters.items() if k in names and v is not None}
+    return make_settings(resolve(WORLD_PARAMETERS, given)).world
+
+
+def _natural_size(camera: Camera, positions: FloatArray) -> Size:
+    aspect = min(max(camera.aspect(positions), _NARROWEST), _WIDEST)
+    return round(aspect * _TILE_HEIGHT), _TILE_HEIGHT
+
+
+def _check_size(size: Size, count: int) -> None:
+    width, height = size
+    if not all(SMALLEST <= edge <= LARGEST for edge in size):
+        raise ConfigurationError(
+            f"size {width}x{height} is not sensible; "
+            f"it must be {SMALLEST}x{SMALLEST} to {LARGEST}x{LARGEST} pixels"
+        )
+    if count * width * height > _MOST_PIXELS:
+        raise ConfigurationError(
+            f"{count} pictures of {width}x{height} have more than {_MOST_PIXELS >> 20} million "
+            "pixels in all; take fewer or smaller ones"
+        )
+
+
+def _captioned(picture: Picture, caption: str) -> Picture:
+    """A picture with a line of text above it."""
+    height, width, _ = picture.shape
+    line = max(_LEAST_CAPTION, height // _CAPTION_SHARE)
+    figure = Figure(figsize=((width + 0.5) / _DPI, (line + 0.5) / _DPI), dpi=_DPI)
+    canvas = FigureCanvasAgg(figure)
+    figure.text(0.5, 0.5, caption, ha="center", va="center", fontsize=0.7 * line)
+    canvas.draw()
+    text = np.asarray(canvas.buffer_rgba())[:, :, :3]
+    return np.concatenate((text, picture))
+
+
+def _side_by_side(tiles: Sequence[Picture], columns: int) -> Picture:
+    """Pictures of one size in rows, white between them and where there is none."""
+    height, width, _ = tiles[0].shape
+    columns = min(columns, len(tiles))
+    rows = -(-len(tiles) // columns)
+    shape = (rows * (height + _GAP) - _GAP, columns * (width + _GAP) - _GAP, 3)
+    whole = np.full(shape, _WHITE, dtype=np.uint8)
+    for number, tile in enumerate(tiles):
+        row, column = divmod(number, columns)
+        top, left = row * (height + _GAP), column * (width + _GAP)
+        whole[top : top + height, left : left + width] = tile
+    return whole
