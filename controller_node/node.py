@@ -9,15 +9,14 @@ from rclpy.node import Node
 from std_msgs.msg import Header, String
 
 from controller_node.actuation import Actuation
+from controller_node.motion import make_motion
 from controller_node.outputs import Answer, Outputs
 from controller_node.parameters import (
     PARAMETERS,
     character_parameters,
     commanded_joints,
     make_controller,
-    make_reference,
     make_settings,
-    read_frames,
 )
 from msgs_config import configuration, topics
 from msgs_config.character_loading import load_character
@@ -60,11 +59,10 @@ class ControllerNode(Node):
         self._declared = PARAMETERS + character_parameters(self._character)
         self._values = resolve(self._declared, given)
         declare(self, self._declared, self._values)
-        frames = read_frames(self._character, self._values)
-        if frames is not None and frames.clamped:
-            self.get_logger().warning(f"kept within joint limits: {', '.join(frames.clamped)}")
-        reference = make_reference(self._character, frames)
-        self._controller = make_controller(self._character, reference, self._values)
+        motion = make_motion(self._character, self._values)
+        for note in motion.notes:
+            self.get_logger().warning(note)
+        self._controller = make_controller(self._character, motion.reference, self._values)
         self._answer: Answer | None = None
         self._episode_ns: int | None = None
         self._warnings = Warnings(self)

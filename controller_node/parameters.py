@@ -5,10 +5,8 @@ import numpy as np
 from controller_node.controller import Controller, Settings
 from controller_node.effort_series import read_effort_series
 from controller_node.laws import LAWS, GainArrays
+from controller_node.motion import MOTION_PARAMETERS
 from controller_node.references.base import Reference
-from controller_node.references.clip import ClipReference
-from controller_node.references.clip_file import ClipFrames, read_clip
-from controller_node.references.hold import HoldReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character import ROOT_TORQUE, Character
 from msgs_config.joint_layout import ROOT
@@ -24,13 +22,7 @@ PARAMETERS = [
     Parameter(
         "feedforward", "", "the law feedforward's CSV file: time_s and degrees of freedom's efforts"
     ),
-    Parameter(
-        "reference",
-        "hold",
-        "what to track: the rest pose, or a motion clip",
-        choices=("hold", "clip"),
-    ),
-    Parameter("clip", "walk", "name of a clip of the character, or path of a .txt file"),
+    *MOTION_PARAMETERS,
     Parameter(
         "root_assistance", True, "drive a floating base by the lecture's root force and torque"
     ),
@@ -107,22 +99,6 @@ def make_settings(character: Character, values: Values) -> Settings:
         gains=GainArrays(entries("p"), entries("d"), entries("i"), np.array(limits)),
         follows_velocity=values.text("reference_velocity") == "clip",
     )
-
-
-def read_frames(character: Character, values: Values) -> ClipFrames | None:
-    """The clip that the parameters name; None if they track none.
-
-    Raises:
-        ClipError: the clip does not exist or does not fit the character.
-    """
-    if values.text("reference") != "clip":
-        return None
-    return read_clip(character, values.text("clip"))
-
-
-def make_reference(character: Character, frames: ClipFrames | None) -> Reference:
-    """The reference that plays a clip, or holds the rest pose where there is none."""
-    return HoldReference(character) if frames is None else ClipReference(character.layout, frames)
 
 
 def make_controller(character: Character, reference: Reference, values: Values) -> Controller:

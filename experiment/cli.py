@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from experiment.cli_render import add_render
+from experiment.cli_study import add_study
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, one_of
 from msgs_config.parameters import Parameter
 from msgs_config.process import EXIT_ERROR, limit_threads
@@ -102,6 +103,7 @@ def _parser() -> argparse.ArgumentParser:
         help="a parameter of sim_node or controller_node; may be repeated",
     )
     add_render(commands)
+    add_study(commands)
     listing = commands.add_parser("list", help="list the characters and their clips")
     listing.set_defaults(command=_list)
     parameters = commands.add_parser(

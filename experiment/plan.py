@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from controller_node import parameters as controller_parameters
 from controller_node.agreement import check_agreement
 from controller_node.dynamics import DynamicsModel
+from controller_node.motion import make_motion
 from controller_node.references.base import Reference
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
@@ -75,9 +76,8 @@ def make_plan(
         controller_parameters.PARAMETERS + controller_parameters.character_parameters(character),
         controller_given,
     )
-    frames = controller_parameters.read_frames(character, controller)
-    motion = controller_parameters.make_reference(character, frames)
-    first = motion.sample(0.0)
+    motion = make_motion(character, controller)
+    first = motion.reference.sample(0.0)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {
         "commanded_joints": commanded,
@@ -87,10 +87,8 @@ def make_plan(
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
-    clamped = () if frames is None else frames.clamped
-    kept = (f"kept within joint limits: {', '.join(clamped)}",) if clamped else ()
-    notes = character.notes + kept
-    return Plan(character, motion, simulator, controller, notes)
+    notes = character.notes + motion.notes
+    return Plan(character, motion.reference, simulator, controller, notes)
 
 
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:

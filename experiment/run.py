@@ -2,16 +2,17 @@
 
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from experiment.domain import own_domain
-from experiment.figures import LOGS, read_figures, write_figures, write_parameters
+from experiment.figures import LOGS, PARAMETERS, read_figures, write_figures, write_parameters
 from experiment.loop import ticks_in_process
 from experiment.metrics import Measurement
 from experiment.plan import Plan
 from experiment.processes import Child, Children
+from experiment.pusher import PlannedPush, write_pushes
 from msgs_config import configuration
 from msgs_config.errors import RunError
 
@@ -24,11 +25,18 @@ Progress = Callable[[int], None]
 
 
 def run_over_topics(
-    plan: Plan, directory: Path, *, write_bag: bool, progress: Progress, contacts: bool = False
+    plan: Plan,
+    directory: Path,
+    *,
+    write_bag: bool,
+    progress: Progress,
+    contacts: bool = False,
+    pushes: Sequence[PlannedPush] = (),
 ) -> None:
     """Run recorder, controller and simulator as three processes; leaves the figures in a directory.
 
-    With `contacts` the bag holds what touched what, too.
+    With `contacts` the bag holds what touched what, too. The pushes are sent by a fourth process,
+    and are all there before the first tick.
 
     Raises:
         RunError: one of the processes failed; with its own message.
@@ -50,9 +58,18 @@ def run_over_topics(
         recorder = start("recorder", "experiment.recorder_main", listening)
         # both must be there before the first answer, lest a tick go unrecorded
         both = ("-p", "wait_for_subscribers:=2")
-        controller = start("controller_node", "controller_node.main", plan.controller, *both)
+        all_three = ("-p", f"wait_for_subscribers:={3 if pushes else 2}")
+        others = [recorder]
+        if pushes:
+            file = directory / PARAMETERS / "pushes.json"
+            write_pushes(file, pushes)
+            sending = {"file": str(file)}
+            others.insert(0, start("pusher", "experiment.pusher_main", sending, *both))
+        others.insert(
+            0, start("controller_node", "controller_node.main", plan.controller, *all_three)
+        )
         simulator = start("sim_node", "sim_node.main", plan.simulator, *both)
-        _wait_for_end(simulator, [controller, recorder], progress)
+        _wait_for_end(simulator, others, progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
     recorded, _ = read_figures(directory)

@@ -13,6 +13,7 @@ import numpy as np
 
 from controller_node import parameters as for_controller
 from controller_node.controller import Controller
+from controller_node.motion import make_motion
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.bullet import pybullet
@@ -266,10 +267,7 @@ def controller(name: str, **given: object) -> Controller:
     whole = character(name)
     parameters = for_controller.PARAMETERS + for_controller.character_parameters(whole)
     values = resolve(parameters, given)
-    frames = for_controller.read_frames(whole, values)
-    return for_controller.make_controller(
-        whole, for_controller.make_reference(whole, frames), values
-    )
+    return for_controller.make_controller(whole, make_motion(whole, values).reference, values)
 
 
 def run_together(

@@ -12,6 +12,7 @@ from ros import MODULES, Inbox, Process, Processes, SimulatorClient, stamp_ns
 
 from controller_node import parameters as for_controller
 from controller_node.controller import Controller
+from controller_node.motion import make_motion
 from experiment.plan import make_plan
 from msgs_config import topics
 from msgs_config.arrays import FloatArray
@@ -181,8 +182,7 @@ def end_of(parts: Sequence[Part]) -> dict[str, FloatArray]:
     file, drivers = "two_humanoids.yaml", list[Controller]()
     for part in parts:
         character, values = controller_values(file, f"/{part.name}{CONTROLLER}")
-        frames = for_controller.read_frames(character, values)
-        reference = for_controller.make_reference(character, frames)
+        reference = make_motion(character, values).reference
         drivers.append(for_controller.make_controller(character, reference, values))
     roles = [make_role(part.character, part.values, part.name) for part in parts]
     with Simulation(roles, make_settings(parts[0].values)) as simulation:

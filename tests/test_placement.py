@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from physics import DATA, character, controller, link_poses, simulation, still_world
 
-from controller_node.parameters import make_reference
+from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
 from experiment.loop import ticks_in_process
 from experiment.plan import make_plan
@@ -61,11 +61,11 @@ def rest_frames(whole: Character) -> tuple[FloatArray, FloatArray]:
 @pytest.mark.parametrize("clip", ["spin", "getup_faceup"])
 def test_a_clip_is_moved_at_all_times_with_its_velocities(clip: str) -> None:
     # Arrange
-    at_origin = make_reference(character("humanoid"), read_clip(character("humanoid"), clip))
+    at_origin = ClipReference(character("humanoid").layout, read_clip(character("humanoid"), clip))
     whole = elsewhere("humanoid")
 
     # Act
-    there = make_reference(whole, read_clip(whole, clip))
+    there = ClipReference(whole.layout, read_clip(whole, clip))
 
     # Assert
     for time in np.linspace(0.0, 12.0, 40):

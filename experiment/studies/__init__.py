@@ -1,0 +1,1 @@
+"""The lecture's figures, each worked out by runs of the real nodes in lockstep."""

@@ -1,0 +1,25 @@
+"""The studies by name, in the lecture's order; each is imported when it is asked for."""
+
+from importlib import import_module
+
+from experiment.studies.study import Study
+
+NAMES = (
+    "rigid_body",
+    "joint_torque",
+    "equation",
+    "lift",
+    "gains",
+    "feedforward",
+    "delay",
+    "assistance",
+    "forward_inverse",
+    "clips",
+    "balance",
+)
+
+
+def load_study(name: str) -> Study:
+    """The study of a name; `STUDY` of the module of that name."""
+    study: Study = import_module(f"experiment.studies.{name}").STUDY
+    return study
