@@ -5,13 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from controller_node.agreement import check_agreement
+from controller_node.balance import Balance, BalanceGains
 from controller_node.dynamics import DynamicsModel
 from controller_node.effort_series import EffortSeries
 from controller_node.laws import GainArrays, Instant, Law, Plant, make_law
 from controller_node.references.base import Reference, ReferenceState
+from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
-from msgs_config.errors import CharacterError
+from msgs_config.errors import CharacterError, ConfigurationError
 from msgs_config.probe import Probe
 from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock
@@ -24,6 +26,7 @@ class Settings:
     law: str
     gains: GainArrays
     follows_velocity: bool  # the reference's; else the desired velocity is zero
+    balance: BalanceGains | None = None  # None: nothing but the law
 
 
 class Controller:
@@ -46,16 +49,20 @@ class Controller:
         """Build the model of the dynamics; `series` is what the law `feedforward` applies.
 
         Raises:
-            CharacterError: a joint moves neither mass nor inertia.
-            ConfigurationError: the law needs a series and there is none.
+            CharacterError: a joint moves neither mass nor inertia, or a foot is none.
+            ConfigurationError: the law needs a series, or the balance feet, and there are none.
         """
         self.layout = character.layout
+        self._character = character
         self.clock = TickClock(rate_hz)
-        self._reference = reference
+        self._own_reference = self._reference = reference
+        self._episode_ns: int | None = None
         self._model = DynamicsModel(character, gravity)
         self._check_inertia(character)
         self._plant = Plant(self.layout, self._model, self.clock.period_s, series)
+        self._balance = Balance(character, character.feet) if character.feet else None
         self._law: Law = make_law(settings.law, self._plant)
+        self.check(settings)
         self._settings = settings
         self._next: tuple[int, ReferenceState] | None = None
 
@@ -74,6 +81,10 @@ class Controller:
     def check(self, settings: Settings) -> None:
         """Raise ConfigurationError if settings cannot be taken."""
         make_law(settings.law, self._plant)
+        if settings.balance is not None and self._balance is None:
+            raise ConfigurationError(
+                f"parameter 'balance' needs the key 'feet' in {self._character.file}"
+            )
 
     def _check_inertia(self, character: Character) -> None:
         """A joint that moves no inertia would make the mass matrix singular."""
@@ -89,6 +100,30 @@ class Controller:
         """Raise CharacterError if a simulator's probe is not what the model expects; says why."""
         check_agreement(self._model, self.layout, probe)
 
+    def follow(self, points: TrajectoryPoints, start_ns: int, episode_ns: int) -> None:
+        """Track a trajectory from a stamp on, instead of what is tracked, until the episode ends.
+
+        The reference goes on without a jump: first from where it is then to the first point.
+
+        Raises:
+            MotionError: the character cannot follow it.
+            LayoutError: a degree of freedom does not exist, or part of a ball joint is missing.
+        """
+        self._begin_episode(episode_ns)
+        before = self._reference
+        if not isinstance(before, TrajectoryReference):
+            before = TrajectoryReference(self._character, before)
+        start = (start_ns - episode_ns) / NANOSECONDS_PER_SECOND
+        self._reference = before.replaced(points, start)
+        self._next = None
+
+    def _begin_episode(self, episode_ns: int) -> None:
+        """Track the own reference again, if the episode is another one."""
+        if episode_ns != self._episode_ns:
+            self._episode_ns = episode_ns
+            self._reference = self._own_reference
+            self._next = None
+
     def answer(self, state: StampedState, episode_ns: int) -> tuple[FloatArray, StampedReference]:
         """The effort (n,) that answers a state, and the reference at the state's stamp.
 
@@ -97,6 +132,7 @@ class Controller:
         Raises:
             ClockError: the state's stamp is no tick at this controller's rate.
         """
+        self._begin_episode(episode_ns)
         now = self._reference_at(state.stamp_ns, episode_ns)
         next_stamp = self.clock.stamp_ns(self.clock.tick(state.stamp_ns) + 1)
         upcoming = self._reference_at(next_stamp, episode_ns)
@@ -109,7 +145,11 @@ class Controller:
             upcoming=self._desired(upcoming),
         )
         gains = self._settings.gains
-        effort = self.layout.clipped(self._law(instant, gains), gains.effort_limits)
+        effort = self._law(instant, gains)
+        if self._settings.balance is not None and self._balance is not None:
+            self._model.update(state.position, state.velocity)
+            effort = effort + self._balance.effort(self._model, self._settings.balance)
+        effort = self.layout.clipped(effort, gains.effort_limits)
         desired = instant.now
         return effort, StampedReference(
             state.stamp_ns, desired.configuration.position, desired.velocity

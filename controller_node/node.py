@@ -18,6 +18,7 @@ from controller_node.parameters import (
     make_controller,
     make_settings,
 )
+from controller_node.trajectories import Trajectories
 from msgs_config import configuration, topics
 from msgs_config.character_loading import load_character
 from msgs_config.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
@@ -88,6 +89,7 @@ class ControllerNode(Node):
         self._actuation = Actuation(len(commanded), self._layout.size)
         self.get_logger().info(f"{self._character.name}: {self._actuation}")
         self._outputs = Outputs(self, self._layout, commanded)
+        self._trajectories = Trajectories(self, self._controller, self._outputs, self._warnings)
         self._publish_configuration()
 
     def _publish_configuration(self) -> None:
@@ -189,6 +191,7 @@ class ControllerNode(Node):
         if episode_ns is None:
             return  # the simulator publishes the state again
         self._check_rate(state)
+        self._trajectories.take(state.stamp_ns, episode_ns)
         started = time.perf_counter()
         effort, reference = self._controller.answer(state, episode_ns)
         self._answer = self._outputs.answer(raw, state, effort, reference)
@@ -238,7 +241,8 @@ class ControllerNode(Node):
         self._next_report = now + DIAGNOSTICS_PERIOD
         if self._diagnostics.is_heard:
             times = self._answer_times.percentiles_us("answer", (50, 99))
-            self._diagnostics.publish({**self._counts, **times})
+            refused = {"refused_trajectories": self._trajectories.refused}
+            self._diagnostics.publish({**self._counts, **refused, **times})
 
     def _check_parameters(self, values: Values) -> None:
         self._controller.check(make_settings(self._character, values))

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from controller_node.balance import BalanceGains
 from controller_node.controller import Controller, Settings
 from controller_node.effort_series import read_effort_series
 from controller_node.laws import LAWS, GainArrays
@@ -34,6 +35,32 @@ PARAMETERS = [
         "clip",
         "velocity to track: the reference's own, or zero as in the lecture's second form",
         choices=("clip", "zero"),
+        live=True,
+    ),
+    Parameter(
+        "balance",
+        False,
+        "add the virtual force that keeps it on its two feet to the law",
+        live=True,
+    ),
+    Parameter(
+        "balance.stiffness",
+        BalanceGains.stiffness,
+        "horizontally, of the centre of mass to the middle of the feet",
+        unit="N/m",
+        live=True,
+    ),
+    Parameter(
+        "balance.damping",
+        BalanceGains.damping,
+        "of the centre of mass",
+        unit="N s/m",
+        live=True,
+    ),
+    Parameter(
+        "balance.friction",
+        BalanceGains.friction,
+        "largest horizontal force on the feet, as a share of the vertical one",
         live=True,
     ),
     Parameter("gain_scale.p", 1.0, "factor on every joint's stiffness, not the root's", live=True),
@@ -98,6 +125,15 @@ def make_settings(character: Character, values: Values) -> Settings:
         law=values.text("law"),
         gains=GainArrays(entries("p"), entries("d"), entries("i"), np.array(limits)),
         follows_velocity=values.text("reference_velocity") == "clip",
+        balance=_balance_gains(values) if values.flag("balance") else None,
+    )
+
+
+def _balance_gains(values: Values) -> BalanceGains:
+    return BalanceGains(
+        stiffness=values.number("balance.stiffness"),
+        damping=values.number("balance.damping"),
+        friction=values.number("balance.friction"),
     )
 
 

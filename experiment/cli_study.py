@@ -9,25 +9,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from experiment.studies.catalogue import NAMES, load_study
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
     from experiment.studies.study import Cell, Findings, Study
 
 _ALL = "all"
-_NAMES = (
-    "rigid_body",
-    "joint_torque",
-    "equation",
-    "lift",
-    "gains",
-    "feedforward",
-    "delay",
-    "assistance",
-    "forward_inverse",
-    "clips",
-    "balance",
-)
 
 
 def add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -43,7 +31,7 @@ def add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     )
     study.set_defaults(command=_study)
     study.add_argument(
-        "name", choices=(*_NAMES, _ALL), metavar="NAME", help=", ".join(_NAMES) + ", or all"
+        "name", choices=(*NAMES, _ALL), metavar="NAME", help=", ".join(NAMES) + ", or all"
     )
     study.add_argument(
         "--output", type=Path, default=Path("studies"), metavar="DIR", help="(%(default)s)/NAME"
@@ -54,7 +42,6 @@ def add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
 
 def _study(options: argparse.Namespace) -> None:
     from experiment.domain import own_domain
-    from experiment.studies.catalogue import NAMES, load_study
 
     names = NAMES if options.name == _ALL else (options.name,)
     directories = {name: options.output.absolute() / name for name in names}

@@ -11,8 +11,8 @@ from experiment.figures import LOGS, PARAMETERS, read_figures, write_figures, wr
 from experiment.loop import ticks_in_process
 from experiment.metrics import Measurement
 from experiment.plan import Plan
+from experiment.planned_push import PlannedPush, write_pushes
 from experiment.processes import Child, Children
-from experiment.pusher import PlannedPush, write_pushes
 from msgs_config import configuration
 from msgs_config.errors import RunError
 
@@ -120,7 +120,9 @@ def _last_tick(output: str) -> int | None:
     return whole[-1] if whole else None
 
 
-def run_in_process(plan: Plan, directory: Path, *, progress: Progress) -> None:
+def run_in_process(
+    plan: Plan, directory: Path, *, progress: Progress, pushes: Sequence[PlannedPush] = ()
+) -> None:
     """Run the same simulation and controller as one loop without ROS; figures in a directory.
 
     Raises:
@@ -131,7 +133,7 @@ def run_in_process(plan: Plan, directory: Path, *, progress: Progress) -> None:
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     measurement = Measurement(known)
     started = time.perf_counter()
-    for count, tick in enumerate(ticks_in_process(plan), start=1):
+    for count, tick in enumerate(ticks_in_process(plan, pushes), start=1):
         if count == 1:
             measurement.add_state(tick.state)
         measurement.add_state(tick.following)

@@ -170,6 +170,7 @@ class Character:
     gains: dict[str, Gains]  # by joint; the base's force and torque under `root` and `root_r`
     rest_position: tuple[float, ...]  # (n,), message form
     clips: ClipFormat
+    feet: tuple[str, ...] = ()  # the links that it stands on
     notes: tuple[str, ...] = ()  # what its author may have overlooked
     placement: Placement = Placement()
 

@@ -28,6 +28,7 @@ _KEYS = [
     "joints",
     "root_assistance",
     "clips",
+    "feet",
 ]
 _JOINT_KEYS = [
     "stiffness",
@@ -58,6 +59,7 @@ class CharacterFile:
     soft_limits: dict[str, SoftLimit]  # ball joint name -> its limit
     assistance: dict[str, Gains]
     clips: ClipFormat
+    feet: tuple[str, ...]
 
 
 def shipped_characters() -> list[str]:
@@ -121,6 +123,7 @@ def read_character_file(name_or_path: str) -> CharacterFile:
         },
         assistance={name: part.gains() for name, part in reader.parts("root_assistance").items()},
         clips=_clip_format(reader.part("clips")),
+        feet=tuple(reader.names("feet", "links", default=[])),
     )
 
 
@@ -170,9 +173,7 @@ def _clip_format(clips: "_Reader") -> ClipFormat:
     if not clips.content:
         return ClipFormat()
     clips.check_keys(["files", "joints", "up_axis"])
-    joints = clips.content.get("joints")
-    if not isinstance(joints, list) or not all(isinstance(name, str) for name in joints):
-        raise clips.wrong("joints", joints, "a list of joint names")
+    joints = clips.names("joints", "joint names", default=None)
     pattern = clips.path_of("files")
     if pattern.name.count("*") != 1:
         raise clips.wrong("files", pattern.name, "a path with one '*'")
@@ -263,6 +264,13 @@ class _Reader:
                 raise self.wrong(key, value, right)
         x, y, z = (float(item) for item in value)
         return (x, y, z)
+
+    def names(self, key: str, what: str, default: list[str] | None) -> list[str]:
+        """A list of names; without a default it must be there."""
+        value = self.content.get(key, default)
+        if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+            raise self.wrong(key, value, f"a list of {what}")
+        return value
 
     def gains(self) -> Gains:
         return Gains(

@@ -79,6 +79,7 @@ def load_character(name_or_path: str) -> Character:
         gains=_gains(file, layout),
         rest_position=_rest_position(file, layout),
         clips=file.clips,
+        feet=file.feet,
         notes=_notes(file, layout, links, links_without_inertial(robot)),
     )
 

@@ -37,6 +37,7 @@ EDGE = {  # the files that speak ROS, beside all of experiment/
     "sim_node/waiting.py",
     "controller_node/node.py",
     "controller_node/outputs.py",
+    "controller_node/trajectories.py",
 }
 FINDS_PACKAGES = "msgs_config/files.py"  # ament_index_python, to resolve package://
 ENGINES = {
@@ -74,6 +75,7 @@ KNOW_NO_ROS = [
     "sim_node.simulation",
     "controller_node.actuation",
     "controller_node.agreement",
+    "controller_node.balance",
     "controller_node.control_laws",
     "controller_node.controller",
     "controller_node.effort_series",

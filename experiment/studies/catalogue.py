@@ -1,8 +1,10 @@
 """The studies by name, in the lecture's order; each is imported when it is asked for."""
 
 from importlib import import_module
+from typing import TYPE_CHECKING
 
-from experiment.studies.study import Study
+if TYPE_CHECKING:  # it takes a second to import
+    from experiment.studies.study import Study
 
 NAMES = (
     "rigid_body",
@@ -19,7 +21,7 @@ NAMES = (
 )
 
 
-def load_study(name: str) -> Study:
+def load_study(name: str) -> "Study":
     """The study of a name; `STUDY` of the module of that name."""
     study: Study = import_module(f"experiment.studies.{name}").STUDY
     return study

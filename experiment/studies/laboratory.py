@@ -9,7 +9,7 @@ import numpy as np
 
 from experiment.figures import prepare_directory, read_figures
 from experiment.plan import make_plan
-from experiment.pusher import PlannedPush
+from experiment.planned_push import PlannedPush
 from experiment.recording import Recording, read_recording
 from experiment.run import run_over_topics
 from experiment.studies.study import Case, Findings, Outcome

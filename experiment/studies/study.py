@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-from experiment.pusher import PlannedPush
+from experiment.planned_push import PlannedPush
 from experiment.recording import Recording
 from msgs_config.arrays import FloatArray
 

@@ -1,0 +1,68 @@
+"""Pushes that are planned before a run, each with the stamp of the tick that it begins with."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from experiment.plan import Plan
+from msgs_config.errors import ConfigurationError, RecordingError, one_of
+from msgs_config.tick_clock import TickClock
+from msgs_config.wrench_messages import WrenchArrays
+
+
+@dataclass(frozen=True)
+class PlannedPush:
+    """A force and a torque on a link from a stamp on, for the simulator's `wrench_duration`."""
+
+    stamp_ns: int
+    link: str
+    wrench: tuple[float, ...]  # (6,): force N, torque N m; world axes
+    point: tuple[float, float, float] | None = None  # m, link frame; None: the centre of mass
+
+    def arrays(self) -> WrenchArrays:
+        """The push as a message's content."""
+        points = [] if self.point is None else [self.point]
+        return WrenchArrays.of_rows(self.stamp_ns, [self.link], [self.wrench], points)
+
+
+def write_pushes(file: Path, pushes: Sequence[PlannedPush]) -> None:
+    """Write pushes for the node to send."""
+    file.write_text(json.dumps([asdict(push) for push in pushes], indent=1), encoding="utf-8")
+
+
+def read_pushes(file: Path) -> list[PlannedPush]:
+    """Read what `write_pushes` wrote.
+
+    Raises:
+        RecordingError: the file does not exist or holds something else.
+    """
+    try:
+        return [PlannedPush(**push) for push in json.loads(file.read_text("utf-8"))]
+    except (OSError, ValueError, TypeError) as error:
+        raise RecordingError(f"{file} holds no pushes: {error}") from error
+
+
+def planned_push(
+    plan: Plan, link: str, force: tuple[float, float, float], time: float
+) -> PlannedPush:
+    """A force (N, world axes) on a link's centre of mass, at a time in s since the first state.
+
+    Raises:
+        ConfigurationError: the link does not exist, a number is not finite, or the time is beyond
+            the run.
+    """
+    links = [link.name for link in plan.character.links]
+    rate = plan.simulator.integer("rate")
+    if link not in links:
+        raise ConfigurationError(f"push: {one_of('link', link, links)}")
+    if not all(math.isfinite(value) for value in force):
+        raise ConfigurationError(f"push on '{link}': force is {force}; it must be finite")
+    end = plan.ticks / rate
+    if not 0.0 <= time < end:
+        raise ConfigurationError(
+            f"push on '{link}': time is {time} s; it must be 0 s to less than {end:g} s"
+        )
+    stamp_ns = TickClock(rate).stamp_ns(1 + round(time * rate))
+    return PlannedPush(stamp_ns, link, (*force, 0.0, 0.0, 0.0))
