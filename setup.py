@@ -17,7 +17,10 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),
-    package_data={"msgs_config": ["fastdds.xml", "characters/*.yaml", "characters/*.urdf"]},
+    package_data={
+        "msgs_config": ["fastdds.xml", "characters/*.yaml", "characters/*.urdf"],
+        "controller_node": ["keyframes/*.yaml"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),

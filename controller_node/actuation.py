@@ -29,10 +29,6 @@ class Actuation:
             "fully_actuated": self.is_full,
         }
 
-    def __str__(self) -> str:
-        kind = "fully actuated" if self.is_full else "underactuated"
-        return f"{self.actuators} actuators, {self.degrees_of_freedom} degrees of freedom: {kind}"
-
 
 def net_wrench(
     layout: JointLayout, configuration: Configuration, effort: FloatArray

@@ -1,8 +1,12 @@
 """Efforts over time, recorded or computed: what the law `feedforward` applies."""
 
 import csv
+import math
+from array import array
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
+from io import StringIO
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -38,32 +42,18 @@ class EffortSeries:
 def read_effort_series(layout: JointLayout, path: str) -> EffortSeries:
     """Read a CSV file whose header is `time_s` and the names of degrees of freedom.
 
-    Those that have no column get no effort. The last row acts as long as the one before it.
+    Those that have no column get no effort. The last row acts as long as the one before it, a
+    single one for ever.
 
     Raises:
         EffortSeriesError: names the file, the line and what would be right.
     """
     file = Path(path)
-    lines = read_text(file, EffortSeriesError).splitlines()
-    rows = list(csv.reader(lines))
-    if len(rows) < 2 or rows[0][:1] != [TIME_COLUMN]:
-        raise EffortSeriesError(
-            f"{file}: not a series of efforts; it must be CSV with a header '{TIME_COLUMN}' and "
-            "names of degrees of freedom, and one row or more"
-        )
+    rows = csv.reader(StringIO(read_text(file, EffortSeriesError)))
     try:
-        entries = layout.indices(tuple(rows[0][1:]))
-    except LayoutError as error:
-        raise EffortSeriesError(f"{file}: {error}") from error
-    numbers = _numbers(file, rows)
-    times = numbers[:, 0]
-    if not (np.diff(times) > 0.0).all():
-        line = int(np.argmin(np.diff(times) > 0.0)) + 3
-        raise EffortSeriesError(f"{file}, line {line}: time {times[line - 2]:g} s does not rise")
-    efforts = np.zeros((len(numbers), layout.size))
-    efforts[:, entries] = numbers[:, 1:]
-    last = times[-1] - times[-2] if len(times) > 1 else np.inf
-    return EffortSeries(np.append(times, times[-1] + last), efforts)
+        return _parse(layout, file, rows)
+    except csv.Error as error:
+        raise EffortSeriesError(f"{file}: not valid CSV: {error}") from error
 
 
 def write_effort_series(
@@ -78,16 +68,41 @@ def write_effort_series(
         )
 
 
-def _numbers(file: Path, rows: Sequence[Sequence[str]]) -> FloatArray:
-    numbers = np.empty((len(rows) - 1, len(rows[0])))
-    for index, row in enumerate(rows[1:]):
+def _parse(layout: JointLayout, file: Path, rows: Iterator[list[str]]) -> EffortSeries:
+    header, first = next(rows, []), next(rows, None)
+    if header[:1] != [TIME_COLUMN] or first is None:
+        raise EffortSeriesError(
+            f"{file}: not a series of efforts; it must be CSV with a header '{TIME_COLUMN}' and "
+            "names of degrees of freedom, and one row or more"
+        )
+    try:
+        entries = layout.indices(tuple(header[1:]))
+    except LayoutError as error:
+        raise EffortSeriesError(f"{file}: {error}") from error
+    numbers = _numbers(file, chain([first], rows), len(header))
+    times = numbers[:, 0]
+    efforts = np.zeros((len(numbers), layout.size))
+    efforts[:, entries] = numbers[:, 1:]
+    last = times[-1] - times[-2] if len(times) > 1 else np.inf
+    return EffortSeries(np.append(times, times[-1] + last), efforts)
+
+
+def _numbers(file: Path, rows: Iterable[list[str]], columns: int) -> FloatArray:
+    """The numbers (t, columns) of the rows below the header, times first."""
+    numbers = array("d")  # a file of a few MB is many rows
+    for line, row in enumerate(rows, start=2):
         try:
-            numbers[index] = [float(text) for text in row]
-        except ValueError as error:
+            values = [float(text) for text in row]
+        except ValueError:
+            values = []
+        if len(values) != columns:
+            raise EffortSeriesError(f"{file}, line {line}: it must hold {columns} numbers")
+        if not all(map(math.isfinite, values)):
+            raise EffortSeriesError(f"{file}, line {line}: a number is not finite")
+        if numbers and values[0] <= numbers[-columns]:
             raise EffortSeriesError(
-                f"{file}, line {index + 2}: it must hold {len(rows[0])} numbers"
-            ) from error
-    if not np.isfinite(numbers).all():
-        line = int(np.argmin(np.isfinite(numbers).all(axis=1))) + 2
-        raise EffortSeriesError(f"{file}, line {line}: a number is not finite")
-    return numbers
+                f"{file}, line {line}: time {values[0]:g} s does not rise; it must be later than "
+                f"the {numbers[-columns]:g} s of the line before"
+            )
+        numbers.extend(values)
+    return np.array(numbers).reshape(-1, columns)

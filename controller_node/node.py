@@ -87,7 +87,6 @@ class ControllerNode(Node):
             self._layout.mask(commanded_joints(self._character, self._values))
         )
         self._actuation = Actuation(len(commanded), self._layout.size)
-        self.get_logger().info(f"{self._character.name}: {self._actuation}")
         self._outputs = Outputs(self, self._layout, commanded)
         self._trajectories = Trajectories(self, self._controller, self._outputs, self._warnings)
         self._publish_configuration()

@@ -43,14 +43,14 @@ class Trajectories:
                 self._follow(decode(raw, JointTrajectory), state_ns, episode_ns)
             except (MotionError, MessageError, LayoutError) as error:
                 self.refused += 1
-                self._warnings.say_once(f"trajectory refused: {error}")
+                self._warnings.say_once(f"refused {error}")
 
     def _follow(self, message: JointTrajectory, state_ns: int, episode_ns: int) -> None:
         start_ns = _nanoseconds(message.header.stamp) or state_ns
         if start_ns < state_ns:
             raise MotionError(
-                f"it begins at {start_ns} ns, which is over; it must be {state_ns} ns or later, "
-                "or 0 for at once"
+                f"trajectory: it begins at {start_ns} ns, which is over; it must be {state_ns} ns "
+                "or later, or 0 for at once"
             )
         self._controller.follow(_points(message), start_ns, episode_ns)
         message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)

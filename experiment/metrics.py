@@ -104,12 +104,16 @@ class Measurement:
         columns = dict(zip(COLUMNS, self.series().T, strict=True))
         sim_time = (self._last_stamp - (self._first_stamp or 0)) / NANOSECONDS_PER_SECOND
         vectors = self._ticks * int(self._actuated.sum())
-        gravity = float(self._configuration.parameters.get("gravity", np.nan))
+        parameters = self._configuration.parameters
+        gravity = float(parameters.get("gravity", np.nan))
+        actuated = self._layout.mask(parameters.get("commanded_joints", ()))
         return {
             "ticks": self._ticks,
             "sim_time_s": sim_time,
             "wall_time_s": wall_time,
             "real_time_factor": sim_time / wall_time if wall_time > 0.0 else None,
+            "actuators": int(actuated.sum()),
+            "degrees_of_freedom": self._layout.size,
             "fell": self._fell(columns),
             "joint_error_mean_rad": _mean(columns["joint_error_mean_rad"]),
             "root_error_mean_m": _mean(columns["root_error_m"]),

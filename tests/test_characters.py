@@ -551,7 +551,7 @@ REFUSED = {
     "a key that is no text": (PREAMBLE + "3: 2", ["'3'"]),
     "an unknown key of a joint": (
         PREAMBLE + "joints: {height: {kp: 3}}",
-        ["joints.height.kp", "stiffness, damping, effort_limit"],
+        ["joints.height.kp", "stiffness, damping, integral, effort_limit"],
     ),
     "an unknown joint": (PREAMBLE + "joints: {knee: {stiffness: 1}}", ["'knee'", "height"]),
     "an unknown rest entry": (PREAMBLE + "rest_pose: {knee: 1}", ["rest_pose", "'knee'", "height"]),

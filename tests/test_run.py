@@ -39,6 +39,8 @@ FIGURES = {
     "joint_error_mean_rad",
     "root_error_mean_m",
     "root_error_max_m",
+    "actuators",
+    "degrees_of_freedom",
     "assist_force_mean_n",
     "body_weight_n",
     "saturated_fraction",
