@@ -28,6 +28,7 @@ SIMULATOR, CONTROLLER = "/sim_node", "/controller_node"
 SIDES = ("left", "right")
 NODES = {  # full names of the nodes that each file is for
     "franka_panda_realtime.yaml": [SIMULATOR, CONTROLLER],
+    "humanoid_balance.yaml": [SIMULATOR, CONTROLLER],
     "humanoid_walk.yaml": [SIMULATOR, CONTROLLER],
     "pendulum.yaml": [SIMULATOR, CONTROLLER],
     "two_humanoids.yaml": [SIMULATOR, *(f"/{side}{CONTROLLER}" for side in SIDES)],
@@ -99,8 +100,11 @@ def test_both_sides_agree_on_what_they_must_agree_on(file: str) -> None:
         assert set(part.values.texts("commanded_joints")) == set(commanded)
 
 
-@pytest.mark.parametrize("file", ["humanoid_walk.yaml", "two_humanoids.yaml"])
-def test_a_clip_begins_as_in_a_run_to_the_bit(file: str) -> None:
+BEGIN_AS_A_RUN = ["humanoid_balance.yaml", "humanoid_walk.yaml", "two_humanoids.yaml"]
+
+
+@pytest.mark.parametrize("file", BEGIN_AS_A_RUN)
+def test_a_motion_begins_as_in_a_run_to_the_bit(file: str) -> None:
     parts = make_cast(given(file, SIMULATOR)).parts
 
     for part, node in zip(parts, controllers(file), strict=True):

@@ -1,0 +1,134 @@
+"""A laboratory whose runs are made in this process, without ROS; bit-identical to the nodes'."""
+
+from pathlib import Path
+
+import numpy as np
+
+from controller_node.parameters import make_controller
+from experiment.metrics import Measurement, Tick
+from experiment.plan import Plan, make_plan
+from experiment.recording import Recording
+from experiment.studies.study import Case, Outcome
+from msgs_config import configuration
+from msgs_config.errors import SimulationError
+from msgs_config.stamped import StampedReference, StampedState
+from msgs_config.wrench_messages import WrenchArrays, select
+from sim_node.actor import Actor
+from sim_node.parameters import make_role, make_settings, push_ticks
+from sim_node.pushes import PushSchedule
+from sim_node.simulation import Simulation
+
+
+class InProcessLaboratory:
+    """Runs a study's cases one by one; files that they need go to a directory."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self.cases: list[Case] = []  # that were run
+
+    def run(self, case: Case) -> Outcome:
+        """Run a case to its end, or until it diverges."""
+        self.cases.append(case)
+        plan = make_plan(
+            case.character, case.duration, case.reference, case.simulator, case.controller
+        )
+        run = _Run(plan, case)
+        diverged = ""
+        try:
+            run.go_on()
+        except SimulationError as error:
+            diverged = str(error)
+        return Outcome(run.recording(), run.summary(), diverged)
+
+    def write(self, name: str, text: str) -> str:
+        """Write a file; returns its path."""
+        path = self._directory / name
+        path.write_text(text, encoding="utf-8")
+        return str(path)
+
+
+class _Run:
+    """One run, and what a bag would hold of it."""
+
+    def __init__(self, plan: Plan, case: Case) -> None:
+        self._plan, self._case = plan, case
+        self._states: list[StampedState] = []
+        self._references: list[StampedReference] = []
+        self._contacts: list[WrenchArrays] = []
+        self._pushes: list[WrenchArrays] = []
+
+    def go_on(self) -> None:
+        """Run to the end. Raises SimulationError if it diverges."""
+        plan = self._plan
+        controller = make_controller(plan.character, plan.reference, plan.controller)
+        role = make_role(plan.character, plan.simulator)
+        with Simulation([role], make_settings(plan.simulator)) as simulation:
+            simulation.watches_contacts = self._case.contacts
+            schedule, (actor,) = self._schedule(simulation), simulation.actors
+            episode_ns = actor.state.stamp_ns
+            self._states.append(actor.state)
+            for _ in range(plan.ticks):
+                effort, reference = controller.answer(actor.state, episode_ns)
+                self._references.append(reference)
+                pushes = schedule.take(simulation.tick)
+                simulation.step([np.where(actor.commanded, effort, 0.0)], [pushes])
+                self._add(actor)
+
+    def _schedule(self, simulation: Simulation) -> PushSchedule:
+        """The pushes as the simulator's node takes them: from the first tick not before a stamp."""
+        schedule = PushSchedule(self._plan.character)
+        for push in self._case.pushes:
+            arrays = push.arrays()
+            schedule.add(
+                arrays.links,
+                arrays.wrenches,
+                arrays.points,
+                first_tick=simulation.clock.first_tick_from(push.stamp_ns),
+                ticks=push_ticks(self._plan.simulator),
+            )
+        return schedule
+
+    def _add(self, actor: Actor) -> None:
+        state, names = actor.state, [link.name for link in actor.character.links]
+        self._states.append(state)
+        self._pushes.append(
+            WrenchArrays.of_rows(
+                state.stamp_ns,
+                [names[push.link] for push in actor.pushes],
+                [push.wrench for push in actor.pushes],
+                [push.point for push in actor.pushes],
+            )
+        )
+        if actor.contacts is not None:
+            wrenches, touching = actor.contacts.wrenches, actor.contacts.touching
+            self._contacts.append(select(state.stamp_ns, names, wrenches, touching))
+
+    def recording(self) -> Recording:
+        """What a bag would hold of it; a state without an answer has no reference."""
+        states, size = self._states, self._plan.character.layout.size
+        missing = np.full(size, np.nan)
+        references = self._references[: len(states)]
+        nothing = [missing] * (len(states) - len(references))
+        return Recording(
+            character=self._plan.character,
+            parameters=self._plan.simulator,
+            stamps_ns=np.array([state.stamp_ns for state in states], dtype=np.intp),
+            position=np.stack([state.position for state in states]),
+            velocity=np.stack([state.velocity for state in states]),
+            effort=np.array([state.effort for state in states[1:]]).reshape(-1, size),
+            reference_position=np.stack([*(r.position for r in references), *nothing]),
+            reference_velocity=np.stack([*(r.velocity for r in references), *nothing]),
+            contacts=tuple(self._contacts),
+            applied_wrench=tuple(self._pushes),
+        )
+
+    def summary(self) -> dict[str, object]:
+        """The figures of summary.json, as far as they are measured."""
+        plan = self._plan
+        known = configuration.parse(configuration.describe(plan.character, plan.simulator))
+        measurement = Measurement(known)
+        for state in self._states:
+            measurement.add_state(state)
+        for row, state in enumerate(self._states[1:]):
+            measurement.add_tick(Tick(self._states[row], state, self._references[row]))
+        return {"character": plan.character.name, **measurement.summary(wall_time=1.0)}
