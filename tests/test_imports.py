@@ -88,6 +88,8 @@ KNOW_NO_ROS = [
     "controller_node.references.signals",
     "controller_node.references.trajectory",
     "experiment.equation",
+    "experiment.studies.tracking",
+    "experiment.studies.second_order",
 ]
 KNOW_NO_ENGINE = [
     "msgs_config.joint_layout",
@@ -111,6 +113,8 @@ KNOW_NO_ENGINE = [
     "controller_node.references.limits",
     "controller_node.references.signals",
     "controller_node.references.trajectory",
+    "experiment.studies.tracking",
+    "experiment.studies.second_order",
 ]
 
 SOURCES = sorted(

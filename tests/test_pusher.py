@@ -197,7 +197,8 @@ def test_a_push_for_a_time_after_the_run_never_acts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("time", "tick"), [(0.0, 1), (0.1, 25), (0.1 + 1e-9, 25), (39 / RATE, 40), (0.2479, 60)]
+    ("time", "tick"),
+    [(0.0, 1), (0.1, 25), (0.1 + 1e-9, 25), (0.103, 26), (39 / RATE, 40), (0.2479, 60)],
 )
 def test_a_push_is_planned_for_the_tick_nearest_to_its_time(time: float, tick: int) -> None:
     push = planned_push(plan_of(), "chest", (1.0, 2.0, 3.0), time)
