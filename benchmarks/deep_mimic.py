@@ -45,6 +45,11 @@ class DeepMimicStablePd:
                 self._client, motion, 1.0 / 240.0, useFixedBase=False
             )
         self._joints = self._law._jointIndicesAll
+        names = [
+            self._client.getJointInfo(self._law._sim_model, index)[1].decode()
+            for index in self._joints
+        ]
+        self._in_their_order = [self._layout.joint(name) for name in names]
 
     def __enter__(self) -> "DeepMimicStablePd":
         return self
@@ -53,16 +58,16 @@ class DeepMimicStablePd:
         self._client.disconnect()
 
     def duration_us(self, ticks: Sequence[Tick]) -> float:
-        """Mean duration in µs of one effort, over the states and references of ticks."""
+        """Mean processor time in µs of one effort, over the states and references of ticks."""
         total = 0.0
         for tick in ticks:
             assert tick.reference is not None
             self._set_state(tick.state.position, tick.state.velocity)
             desired = [entry for part in self._parts(tick.reference.position) for entry in part]
             velocity = self._desired_velocity(tick.reference.velocity)
-            started = time.perf_counter()
+            started = time.process_time()
             self._law.computePDForces(desired, velocity, _LARGEST_EFFORTS)
-            total += time.perf_counter() - started
+            total += time.process_time() - started
         return 1e6 * total / len(ticks)
 
     def _set_state(self, position: FloatArray, velocity: FloatArray) -> None:
@@ -78,7 +83,7 @@ class DeepMimicStablePd:
         origin = rotations.rotate(_UPRIGHT_BACK, position[:3])
         turn = rotations.multiply(_UPRIGHT_BACK, rotations.exp(position[3:6]))
         parts = [origin.tolist(), turn.tolist()]
-        for joint in self._layout.joints[1:]:
+        for joint in self._in_their_order:
             values = position[joint.entries]
             is_ball = joint.type is JointType.SPHERICAL
             parts.append((rotations.exp(values) if is_ball else values).tolist())
@@ -86,7 +91,7 @@ class DeepMimicStablePd:
 
     def _velocity_parts(self, velocity: FloatArray) -> list[list[float]]:
         return [velocity[:3].tolist(), velocity[3:6].tolist()] + [
-            velocity[joint.entries].tolist() for joint in self._layout.joints[1:]
+            velocity[joint.entries].tolist() for joint in self._in_their_order
         ]
 
     def _desired_velocity(self, velocity: FloatArray) -> list[float]:

@@ -28,8 +28,9 @@ class PlannedPush:
 
 
 def write_pushes(file: Path, pushes: Sequence[PlannedPush]) -> None:
-    """Write pushes for the node to send."""
-    file.write_text(json.dumps([asdict(push) for push in pushes], indent=1), encoding="utf-8")
+    """Write pushes for the node to send, the first one first."""
+    in_order = sorted(pushes, key=lambda push: push.stamp_ns)
+    file.write_text(json.dumps([asdict(push) for push in in_order], indent=1), encoding="utf-8")
 
 
 def read_pushes(file: Path) -> list[PlannedPush]:
@@ -60,9 +61,10 @@ def planned_push(
     if not all(math.isfinite(value) for value in force):
         raise ConfigurationError(f"push on '{link}': force is {force}; it must be finite")
     end = plan.ticks / rate
-    if not 0.0 <= time < end:
+    tick = round(time * rate) if math.isfinite(time) else -1
+    if not 0 <= tick < plan.ticks:
         raise ConfigurationError(
             f"push on '{link}': time is {time} s; it must be 0 s to less than {end:g} s"
         )
-    stamp_ns = TickClock(rate).stamp_ns(1 + round(time * rate))
+    stamp_ns = TickClock(rate).stamp_ns(1 + tick)
     return PlannedPush(stamp_ns, link, (*force, 0.0, 0.0, 0.0))

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 
 from experiment.planned_push import read_pushes
@@ -18,6 +19,8 @@ PARAMETERS = [
         "wait_for_subscribers", 1, "send when this many subscribe to external_wrench", maximum=1000
     ),
 ]
+
+_PATIENCE = Duration(seconds=10)  # until the simulator has what was sent
 
 
 class PusherNode(Node):
@@ -49,6 +52,7 @@ class PusherNode(Node):
                 if self._torques is None and heard:
                     for push in self._pushes:
                         self._publisher.publish(encode_wrenches(push.arrays()))
+                    self._publisher.wait_for_all_acked(_PATIENCE)
                     self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
                 if self._torques is None or self._torques.take() is None:
                     spinner.rest()
