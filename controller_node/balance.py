@@ -87,14 +87,16 @@ class Balance:
         self._half_lengths = np.array([sole.half_lengths for sole in soles])
         self._normals = np.array([sole.normal for sole in soles])
 
-    def effort(self, model: DynamicsModel, gains: BalanceGains) -> FloatArray:
+    def effort(
+        self, model: DynamicsModel, gains: BalanceGains, *, with_bias: bool = True
+    ) -> FloatArray:
         """The effort (n,) to add to that of the tracking law; `model` has the present state.
 
-        Beside the feet's part it has the bias force: where the virtual force is the weight's
-        opposite, nothing moves. The root's entries are zero, and all are once it has fallen.
+        Beside the feet's part it has the bias force, unless the law has that already: where the
+        virtual force is the weight's opposite, nothing moves. The root's entries are zero, and all are once it has fallen.
         """
         ground = self.ground_wrenches(model, gains)
-        effort = model.bias_force()
+        effort = model.bias_force() if with_bias else np.zeros(len(model.bias_force()))
         for foot, point, force, moment in zip(
             self._feet, ground.points, ground.forces, ground.moments, strict=True
         ):

@@ -8,7 +8,7 @@ from controller_node.agreement import check_agreement
 from controller_node.balance import Balance, BalanceGains
 from controller_node.dynamics import DynamicsModel
 from controller_node.effort_series import EffortSeries
-from controller_node.laws import GainArrays, Instant, Law, Plant, make_law
+from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
 from msgs_config.arrays import FloatArray
@@ -16,7 +16,7 @@ from msgs_config.character import Character
 from msgs_config.errors import CharacterError, ConfigurationError
 from msgs_config.probe import Probe
 from msgs_config.stamped import StampedReference, StampedState
-from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock
+from msgs_config.tick_clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,8 @@ class Controller:
     """Inverse dynamics in ticks: `(q, v, desired state) -> effort`.
 
     A function of what the state's message holds and of the tick, so that the same state always
-    gets the same answer; only the law `pid` remembers the ticks before.
+    gets the same answer; only the law `pid` remembers the ticks before, and a trajectory that was
+    taken is followed until the episode ends.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class Controller:
         self._law: Law = make_law(settings.law, self._plant)
         self.check(settings)
         self._settings = settings
-        self._next: tuple[int, ReferenceState] | None = None
+        self._next: tuple[float, ReferenceState] | None = None
 
     @property
     def settings(self) -> Settings:
@@ -74,6 +75,7 @@ class Controller:
     @settings.setter
     def settings(self, settings: Settings) -> None:
         """Take others from the next state on. Raises as `check` does."""
+        self.check(settings)
         if settings.law != self._settings.law:
             self._law = make_law(settings.law, self._plant)
         self._settings = settings
@@ -100,7 +102,9 @@ class Controller:
         """Raise CharacterError if a simulator's probe is not what the model expects; says why."""
         check_agreement(self._model, self.layout, probe)
 
-    def follow(self, points: TrajectoryPoints, start_ns: int, episode_ns: int) -> None:
+    def follow(
+        self, points: TrajectoryPoints, *, start_ns: int, now_ns: int, episode_ns: int
+    ) -> None:
         """Track a trajectory from a stamp on, instead of what is tracked, until the episode ends.
 
         The reference goes on without a jump: first from where it is then to the first point.
@@ -113,8 +117,8 @@ class Controller:
         before = self._reference
         if not isinstance(before, TrajectoryReference):
             before = TrajectoryReference(self._character, before)
-        start = (start_ns - episode_ns) / NANOSECONDS_PER_SECOND
-        self._reference = before.replaced(points, start)
+        start, now = self._time(start_ns), self._time(now_ns)
+        self._reference = before.replaced(points, start, now)
         self._next = None
 
     def _begin_episode(self, episode_ns: int) -> None:
@@ -122,7 +126,18 @@ class Controller:
         if episode_ns != self._episode_ns:
             self._episode_ns = episode_ns
             self._reference = self._own_reference
+            self._law = make_law(self._settings.law, self._plant)
             self._next = None
+
+    def _time(self, stamp_ns: int) -> float:
+        """Time in s of a stamp's tick since the episode's first state.
+
+        Not the stamps' difference: rounded to whole ns, it is another one in another episode.
+        """
+        episode_tick = self.clock.first_tick_from(self._episode_ns or 0)
+        ticks = self.clock.first_tick_from(stamp_ns) - episode_tick
+        since_ns = self.clock.stamp_ns(FIRST_TICK + ticks) - self.clock.stamp_ns(FIRST_TICK)
+        return since_ns / NANOSECONDS_PER_SECOND
 
     def answer(self, state: StampedState, episode_ns: int) -> tuple[FloatArray, StampedReference]:
         """The effort (n,) that answers a state, and the reference at the state's stamp.
@@ -133,12 +148,12 @@ class Controller:
             ClockError: the state's stamp is no tick at this controller's rate.
         """
         self._begin_episode(episode_ns)
-        now = self._reference_at(state.stamp_ns, episode_ns)
         next_stamp = self.clock.stamp_ns(self.clock.tick(state.stamp_ns) + 1)
-        upcoming = self._reference_at(next_stamp, episode_ns)
-        self._next = next_stamp - episode_ns, upcoming
+        time, next_time = self._time(state.stamp_ns), self._time(next_stamp)
+        now, upcoming = self._reference_at(time), self._reference_at(next_time)
+        self._next = next_time, upcoming
         instant = Instant(
-            time=(state.stamp_ns - episode_ns) / NANOSECONDS_PER_SECOND,
+            time=time,
             position=state.position,
             velocity=state.velocity,
             now=self._desired(now),
@@ -148,19 +163,21 @@ class Controller:
         effort = self._law(instant, gains)
         if self._settings.balance is not None and self._balance is not None:
             self._model.update(state.position, state.velocity)
-            effort = effort + self._balance.effort(self._model, self._settings.balance)
+            bias = self._settings.law not in HAS_BIAS
+            effort = effort + self._balance.effort(
+                self._model, self._settings.balance, with_bias=bias
+            )
         effort = self.layout.clipped(effort, gains.effort_limits)
         desired = instant.now
         return effort, StampedReference(
             state.stamp_ns, desired.configuration.position, desired.velocity
         )
 
-    def _reference_at(self, stamp_ns: int, episode_ns: int) -> ReferenceState:
+    def _reference_at(self, time: float) -> ReferenceState:
         """The reference; the one of the next tick is this tick's when the tick has come."""
-        since_ns = stamp_ns - episode_ns
-        if self._next is not None and self._next[0] == since_ns:
+        if self._next is not None and self._next[0] == time:
             return self._next[1]
-        return self._reference.sample(since_ns / NANOSECONDS_PER_SECOND)
+        return self._reference.sample(time)
 
     def _desired(self, reference: ReferenceState) -> ReferenceState:
         """The reference as the settings have it tracked."""

@@ -49,7 +49,8 @@ def read_effort_series(layout: JointLayout, path: str) -> EffortSeries:
         EffortSeriesError: names the file, the line and what would be right.
     """
     file = Path(path)
-    rows = csv.reader(StringIO(read_text(file, EffortSeriesError)))
+    text = read_text(file, EffortSeriesError).removeprefix("\ufeff").rstrip()
+    rows = csv.reader(StringIO(text))
     try:
         return _parse(layout, file, rows)
     except csv.Error as error:

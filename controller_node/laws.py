@@ -121,7 +121,7 @@ def _implicit(
 
 
 class Pid:
-    """PID: the one law that remembers. Its integral begins at zero with each episode."""
+    """PID: the one law that remembers. One is made for each episode, its integral at zero."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
@@ -131,9 +131,7 @@ class Pid:
     def __call__(self, instant: Instant, gains: GainArrays) -> FloatArray:
         """The effort (n,), with the error up to the present in its integral."""
         error, velocity_error = _errors(self._plant, instant)
-        if self._last_time is None or instant.time < self._last_time:
-            self._integral[:] = 0.0
-        else:
+        if self._last_time is not None:
             self._grow(instant.time - self._last_time, error, velocity_error, gains)
         self._last_time = instant.time
         return self._effort(error, velocity_error, self._integral, gains)
@@ -167,3 +165,5 @@ _MEMORYLESS: dict[str, Callable[[Plant, Instant, GainArrays], FloatArray]] = {
     "zero": _zero,
 }
 LAWS = (*_MEMORYLESS, "pid")
+HAS_BIAS = ("computed_torque", "pd_gravity")
+"""Laws whose efforts hold the character against its weight."""

@@ -1,7 +1,10 @@
 """Which motion to track: the parameters that say it, and the reference that they make."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from controller_node.references.base import Reference
 from controller_node.references.clip import ClipReference
@@ -29,7 +32,7 @@ MOTION_PARAMETERS = [
     Parameter(
         "signal.dofs",
         [],
-        "degrees of freedom that step or sine moves; none named: all that have a motor",
+        "degrees of freedom that step or sine moves; none named: all that have a motor and may",
         texts=True,
     ),
     Parameter("step.size", 0.1, "how far the step goes", unit="rad or m", minimum=-1e6),
@@ -57,27 +60,41 @@ def make_motion(character: Character, values: Values) -> Motion:
     if kind == "clip":
         frames = read_clip(character, values.text("clip"))
         names = ", ".join(frames.clamped)
-        notes = (f"kept within joint limits: {names}",) if names else ()
-        return Motion(ClipReference(character.layout, frames), notes)
+        kept = (f"kept within joint limits: {names}",) if names else ()
+        return Motion(ClipReference(character.layout, frames), kept)
     if kind == "keyframes":
         keyframes = read_keyframes(character, str(_keyframes_path(values.text("keyframes"))))
         return Motion(KeyframesReference(character.layout, keyframes), keyframes.notes)
     if kind == "step":
         size, time = values.number("step.size"), values.number("step.time")
-        return Motion(StepReference(character, _signal_dofs(character, values), size, time))
+        dofs, notes = _signal_dofs(character, values, [size])
+        return Motion(StepReference(character, dofs, size, time), notes)
     if kind == "sine":
         amplitude, frequency = values.number("sine.amplitude"), values.number("sine.frequency")
-        return Motion(
-            SineReference(character, _signal_dofs(character, values), amplitude, frequency)
-        )
+        dofs, notes = _signal_dofs(character, values, [amplitude, -amplitude])
+        return Motion(SineReference(character, dofs, amplitude, frequency), notes)
     return Motion(HoldReference(character))
 
 
-def _signal_dofs(character: Character, values: Values) -> list[str]:
-    layout = character.layout
+def _signal_dofs(
+    character: Character, values: Values, offsets: Sequence[float]
+) -> tuple[list[str], tuple[str, ...]]:
+    """The degrees of freedom that a signal moves, and a note of those that it cannot move.
+
+    If none are named: all that have a motor, save those whose limits an offset would leave.
+    """
+    named = list(values.texts("signal.dofs"))
+    if named:
+        return named, ()
+    layout, rest = character.layout, np.array(character.rest_position)
+    lower, upper = character.position_bounds()
+    reached = [rest + offset for offset in offsets]
+    free = np.all([(lower <= there) & (there <= upper) for there in reached], axis=0)
     actuated = layout.mask(layout.actuated_joint_names)
-    all_of_them = [name for name, has in zip(layout.dof_names, actuated, strict=True) if has]
-    return list(values.texts("signal.dofs")) or all_of_them
+    chosen = [layout.dof_names[index] for index in np.flatnonzero(actuated & free)]
+    fixed = [layout.dof_names[index] for index in np.flatnonzero(actuated & ~free)]
+    notes = (f"kept still within their limits: {', '.join(fixed)}",) if fixed else ()
+    return chosen, notes
 
 
 def _keyframes_path(name_or_path: str) -> Path:

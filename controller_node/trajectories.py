@@ -14,6 +14,8 @@ from msgs_config.polling import DirectSubscription
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from msgs_config.warnings import Warnings
 
+_LARGEST = 2**25  # bytes of a message
+_LATEST_NS = 10**15  # after now
 _MOST_AT_ONCE = 100  # messages, lest a flood of them keep the states waiting
 
 
@@ -40,6 +42,10 @@ class Trajectories:
             if raw is None:
                 return
             try:
+                if len(raw) > _LARGEST:
+                    raise MotionError(
+                        f"trajectory: it has {len(raw)} bytes; it must have {_LARGEST} or fewer"
+                    )
                 self._follow(decode(raw, JointTrajectory), state_ns, episode_ns)
             except (MotionError, MessageError, LayoutError) as error:
                 self.refused += 1
@@ -52,7 +58,14 @@ class Trajectories:
                 f"trajectory: it begins at {start_ns} ns, which is over; it must be {state_ns} ns "
                 "or later, or 0 for at once"
             )
-        self._controller.follow(_points(message), start_ns, episode_ns)
+        if start_ns > state_ns + _LATEST_NS or message.header.stamp.nanosec >= 10**9:
+            raise MotionError(
+                f"trajectory: its stamp is {message.header.stamp.sec} s and "
+                f"{message.header.stamp.nanosec} ns; it must be a time, and within 1e6 s"
+            )
+        self._controller.follow(
+            _points(message), start_ns=start_ns, now_ns=state_ns, episode_ns=episode_ns
+        )
         message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)
         self._outputs.publish_trajectory(message)
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # it takes a second to import
     from sim_node.stage import Size
 
 _COUNT = 8
+_MOST = 10_000  # pictures
 
 
 def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -49,6 +50,8 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 
 def _render(options: argparse.Namespace) -> None:
+    if options.count > _MOST:
+        raise ConfigurationError(f"--count is {options.count}; it must be {_MOST} or less")
     times = options.count if options.times is None else _times(options.times)
     size = None if options.size is None else _size(options.size)
     from experiment.figures import STRIP
@@ -101,7 +104,7 @@ def _check_output(output: Path) -> None:
 
 def _progress_bar(description: str, count: int) -> Progress:
     bar = Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("pictures"),

@@ -18,6 +18,7 @@ from msgs_config.errors import ConfigurationError, one_of
 if TYPE_CHECKING:  # it takes a second to import
     from experiment.plan import Plan
     from experiment.planned_push import PlannedPush
+    from msgs_config.parameters import Values
 
 _NODES = ("sim_node", "controller_node")
 
@@ -88,7 +89,7 @@ def _run(options: argparse.Namespace) -> None:
     from sim_node.parameters import tick_period
 
     settings = _settings(options.set)
-    reference, motion = _reference(options)
+    reference = _reference(options)
     plan = make_plan(
         options.character,
         options.duration,
@@ -96,6 +97,7 @@ def _run(options: argparse.Namespace) -> None:
         settings["sim_node"],
         settings["controller_node"],
     )
+    motion = _name_of(plan.controller)
     pushes = [_push(text, plan) for text in options.push]
     if options.in_process and tick_period(plan.simulator):
         raise ConfigurationError(
@@ -136,14 +138,19 @@ def _run(options: argparse.Namespace) -> None:
     _report(directory)
 
 
-def _reference(options: argparse.Namespace) -> tuple[dict[str, object], str]:
-    """The controller's parameters of what is tracked, and its name."""
+def _name_of(controller: "Values") -> str:
+    """The name of the motion that a controller's parameters say."""
+    kind = controller.text("reference")
+    return controller.text(kind) if kind in ("clip", "keyframes") else kind
+
+
+def _reference(options: argparse.Namespace) -> dict[str, object]:
+    """The controller's parameters of what is tracked."""
     for kind in ("clip", "keyframes"):
         name = getattr(options, kind)
         if name is not None:
-            return {"reference": kind, kind: name}, name
-    kind = options.reference or "hold"
-    return {"reference": kind}, kind
+            return {"reference": kind, kind: name}
+    return {"reference": options.reference or "hold"}
 
 
 def _push(text: str, plan: "Plan") -> "PlannedPush":
@@ -181,7 +188,7 @@ def _settings(texts: Sequence[str]) -> dict[str, dict[str, object]]:
 
 def _progress_bar(description: str, ticks: int) -> Progress:
     bar = Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TextColumn("{task.completed:.0f}/{task.total:.0f} ticks"),

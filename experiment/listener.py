@@ -15,7 +15,11 @@ from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
-COMMAND_COUNTS = ("rejected", "duplicate")
+COUNTS = {  # what the simulator says of it, and what it is called here
+    "rejected": "rejected_commands",
+    "duplicate": "duplicate_commands",
+    "rejected_pushes": "rejected_pushes",
+}
 _MOST_EARLY = 20_000  # messages
 
 
@@ -33,7 +37,7 @@ class RunListener:
         self._configuration: RunConfiguration | None = None
         self._configuration_text = ""
         self._early: list[tuple[str, bytes, int]] = []
-        self._counts: dict[str, int | None] = dict.fromkeys(COMMAND_COUNTS)
+        self._counts: dict[str, int | None] = dict.fromkeys(COUNTS)
         self._first_command_ns: int | None = None
         self._last_state_ns = 0
 
@@ -79,7 +83,7 @@ class RunListener:
         self._assembler.finish()
         wall_ns = self._last_state_ns - (self._first_command_ns or self._last_state_ns)
         figures = self._measurement.summary(wall_ns / NANOSECONDS_PER_SECOND)
-        counts = {f"{name}_commands": count for name, count in self._counts.items()}
+        counts = {COUNTS[name]: count for name, count in self._counts.items()}
         head = {"character": self._configuration.character}
         missing = {"missing_ticks": self.missing_ticks}
         return head | figures | counts | missing, self._measurement.series()

@@ -33,13 +33,13 @@ def run_over_topics(
     contacts: bool = False,
     pushes: Sequence[PlannedPush] = (),
 ) -> None:
-    """Run recorder, controller and simulator as three processes; leaves the figures in a directory.
+    """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
-    With `contacts` the bag holds what touched what, too. The pushes are sent by a fourth process,
-    and are all there before the first tick.
+    With `contacts` the bag holds what touched what, too. The pushes are sent by one more process;
+    in lockstep all are there before the first tick.
 
     Raises:
-        RunError: one of the processes failed; with its own message.
+        RunError: one of the processes failed, with its own message, or a push came too late.
     """
     with _environment(directory) as environment, Children() as children:
 
@@ -75,6 +75,8 @@ def run_over_topics(
     recorded, _ = read_figures(directory)
     if recorded["ticks"] != plan.ticks:
         raise RunError(f"{recorded['ticks']} of {plan.ticks} ticks were recorded")
+    if pushes and recorded["rejected_pushes"]:
+        raise RunError(f"sim_node refused {recorded['rejected_pushes']} of {len(pushes)} pushes")
 
 
 @contextmanager
@@ -141,6 +143,7 @@ def run_in_process(
         if count % _IN_PROCESS_REPORT == 0:
             progress(count)
     figures = measurement.summary(wall_time=time.perf_counter() - started)
-    counts = {"rejected_commands": 0, "duplicate_commands": 0, "missing_ticks": 0}
+    counts = {"rejected_commands": 0, "duplicate_commands": 0, "rejected_pushes": 0}
+    counts["missing_ticks"] = 0
     summary = {"character": known.character} | figures | counts
     write_figures(directory, summary, measurement.series())

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from msgs_config.errors import ClockError, ConfigurationError
 
 NANOSECONDS_PER_SECOND = 10**9
+FIRST_TICK = 1
 
 
 @dataclass(frozen=True)

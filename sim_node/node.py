@@ -13,6 +13,7 @@ from msgs_config.node_parameters import LiveParameters, declare, given_parameter
 from msgs_config.parameters import Values
 from msgs_config.polling import Spinner
 from msgs_config.process import StopSignal
+from msgs_config.tick_clock import FIRST_TICK
 from sim_node.lockstep import LockstepBarrier, Verdict
 from sim_node.pace import Pace
 from sim_node.parameters import (
@@ -30,7 +31,7 @@ from sim_node.realtime import CommandHold
 from sim_node.report import report
 from sim_node.run_control import RunControl
 from sim_node.services import Services
-from sim_node.simulation import FIRST_TICK, Simulation
+from sim_node.simulation import Simulation
 from sim_node.tick_times import TickTimes
 from sim_node.waiting import (
     UNKNOWN_NODE,

@@ -6,12 +6,10 @@ from types import TracebackType
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
-from msgs_config.tick_clock import TickClock
+from msgs_config.tick_clock import FIRST_TICK, TickClock
 from sim_node.actor import Actor, Role
 from sim_node.pushes import Push
 from sim_node.world import World, WorldSettings
-
-FIRST_TICK = 1
 
 
 @dataclass(frozen=True)

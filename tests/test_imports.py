@@ -88,6 +88,7 @@ KNOW_NO_ROS = [
     "controller_node.references.signals",
     "controller_node.references.trajectory",
     "experiment.equation",
+    "experiment.studies.euler",
     "experiment.studies.tracking",
     "experiment.studies.second_order",
 ]
@@ -115,6 +116,7 @@ KNOW_NO_ENGINE = [
     "controller_node.references.trajectory",
     "experiment.studies.tracking",
     "experiment.studies.second_order",
+    "experiment.studies.euler",
 ]
 
 SOURCES = sorted(

@@ -251,10 +251,22 @@ def test_a_signal_on_an_unknown_degree_of_freedom_is_refused_by_those_that_exist
 
 
 def test_a_signal_beyond_limits_is_refused_with_what_would_be_right() -> None:
-    """As all motors of the humanoid are: its straight knees would bend the wrong way."""
-    line = error_of(HUMANOID, reference="step")
+    """As that of the humanoid's straight knees is: they would bend the wrong way."""
+    line = error_of(HUMANOID, reference="step", signal__dofs=["right_knee"])
 
     assert "knee" in line and "beyond its limits" in line and "its size must be from" in line
+
+
+@pytest.mark.parametrize("signal", ["step", "sine"])
+def test_a_signal_on_all_joints_leaves_those_that_it_would_break_and_says_so(signal: str) -> None:
+    motion = motion_of(HUMANOID, reference=signal)
+
+    (note,) = motion.notes
+    assert "right_knee" in note and "right_hip" not in note
+    names = HUMANOID.layout.dof_names
+    moved = motion.reference.sample(1.3).configuration.position - HUMANOID.rest_position
+    assert moved[names.index("right_knee")] == 0.0
+    assert moved[names.index("neck_x")] != 0.0
 
 
 WRONG_VALUES = {

@@ -19,6 +19,8 @@ from msgs_config.errors import LayoutError, MotionError
 from msgs_config.joint_layout import Configuration, JointLayout
 
 _SAME = 1e-3  # rad or m, of a first point at time 0 from where the reference is
+_MOST_WAITING = 100  # trajectories
+_MOST_POINTS = 10_000
 _STOPPED = 1e-6  # rad/s or m/s
 
 
@@ -46,6 +48,8 @@ def points_of_lists(
         MotionError: the lists are of unequal length, or some points lack what others have.
     """
     width = len(dof_names)
+    if not width:
+        raise MotionError("trajectory: it names no degree of freedom")
     rows = _rows("positions", positions, width)
     if rows is None and len(positions):
         raise MotionError("trajectory: point 1 has no positions; every point needs them")
@@ -82,6 +86,10 @@ def checked(character: Character, points: TrajectoryPoints) -> TrajectoryPoints:
         raise MotionError("trajectory: it names no degree of freedom")
     if not points.times.size:
         raise MotionError("trajectory: it has no points; it must have one or more")
+    if points.times.size > _MOST_POINTS:
+        raise MotionError(
+            f"trajectory: it has {points.times.size} points; it must have {_MOST_POINTS} or fewer"
+        )
     indices = _indices(character.layout, points)
     _check_arrays(points)
     _check_times(points.times)
@@ -165,6 +173,7 @@ class TrajectoryReference:
     character: Character
     before: Reference  # what holds until the present trajectory's start
     curve: Curve | None = None
+    waiting: int = 0  # trajectories that are yet to begin, the present one among them
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the episode's first state."""
@@ -172,7 +181,9 @@ class TrajectoryReference:
             return self.before.sample(time)
         return self.curve.sample(time)
 
-    def replaced(self, points: TrajectoryPoints, start: float) -> "TrajectoryReference":
+    def replaced(
+        self, points: TrajectoryPoints, start: float, now: float | None = None
+    ) -> "TrajectoryReference":
         """The reference that follows the points from `start` (s of the episode) on.
 
         A quintic leads from the reference as it moves at `start` to how the motion through the
@@ -181,23 +192,33 @@ class TrajectoryReference:
         it is at `start`, by the time of the first point that is to come. After the last point all
         is at rest.
 
-        What was before `start` stays; what was before the present trajectory's own start is
-        forgotten when the new one starts later. Limits are those of the points: a quintic from a
+        What was before `start` stays, but for what is over at the present time `now`, by
+        default the start. Limits are those of the points: a quintic from a
         fast motion can swing beyond them.
 
         Raises:
-            MotionError: the character cannot follow the points, or the first one, at time 0, is
-                not where the reference is.
+            MotionError: the character cannot follow the points, the first one, at time 0, is not
+                where the reference is, or too many trajectories are yet to begin.
         """
         checked(self.character, points)
-        layout, now = self.character.layout, self.sample(start)
-        knots = _knots(layout, points, start, now)
+        layout, there = self.character.layout, self.sample(start)
+        knots = _knots(layout, points, start, there)
         if points.times[0] < SHORTEST_TIME:
-            _check_first(self.character, points, knots, now)
+            _check_first(self.character, points, knots, there)
             knots = _without_first(knots)
-        curve = Curve(layout, _lead(layout, start, now, knots), knots)
-        kept = self.curve if self.curve is not None and start > self.curve.start else self.before
-        return TrajectoryReference(self.character, kept, curve)
+        curve = Curve(layout, _lead(layout, start, there, knots), knots)
+        kept, waiting = self._until(start, start if now is None else now)
+        if waiting > _MOST_WAITING:
+            raise MotionError(f"trajectory: more than {_MOST_WAITING} are yet to begin")
+        return TrajectoryReference(self.character, kept, curve, waiting)
+
+    def _until(self, start: float, now: float) -> tuple[Reference, int]:
+        """What holds until a trajectory's start, and how many are yet to begin then."""
+        if self.curve is None or start <= self.curve.start:
+            return self.before, 1
+        if now < self.curve.start:
+            return self, self.waiting + 1
+        return self.curve, 1
 
 
 def _knots(

@@ -3,6 +3,7 @@
 import csv
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,8 @@ class TopicLaboratory:
         _check_pushes(case.pushes, recording)
         if not self._keep_runs:
             shutil.rmtree(directory)
+            with suppress(OSError):  # others are kept there
+                directory.parent.rmdir()
         return Outcome(recording, summary, diverged)
 
     def write(self, name: str, text: str) -> str:
@@ -82,6 +85,7 @@ def _check_pushes(pushes: Sequence[PlannedPush], run: Recording) -> None:
 def write_findings(directory: Path, name: str, findings: Findings) -> list[Path]:
     """Write table (CSV), curves (CSV) and pictures (PNG and SVG); returns the files."""
     directory.mkdir(parents=True, exist_ok=True)
+    assert name not in findings.curves, "the table has that file's name"
     table = directory / f"{name}.csv"
     with table.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)

@@ -306,7 +306,7 @@ def _draw_spin(free: Observed, finer: Observed) -> "Figure":
     strip.set_axis_off()
     spin, momentum, drift = (figure.add_subplot(grid[1, column]) for column in range(3))
     draw_over_theory(spin, times, free.motion.angular_velocity, free.theory.angular_velocity, "xyz")
-    label(spin, "time (s)", "angular velocity, body axes (rad/s)", "it turns over, again and again")
+    label(spin, "time (s)", "angular velocity, body axes (rad/s)", "it turns over by itself")
     constant = np.broadcast_to(free.momenta.spin[0], free.momenta.spin.shape)
     draw_over_theory(momentum, times, free.momenta.spin, constant, "xyz")
     label(momentum, "time (s)", "L, world axes (kg m²/s)", "while L stays as it is")
