@@ -93,7 +93,8 @@ class Balance:
         """The effort (n,) to add to that of the tracking law; `model` has the present state.
 
         Beside the feet's part it has the bias force, unless the law has that already: where the
-        virtual force is the weight's opposite, nothing moves. The root's entries are zero, and all are once it has fallen.
+        virtual force is the weight's opposite, nothing moves. The root's entries are zero, and all
+        are once it has fallen.
         """
         ground = self.ground_wrenches(model, gains)
         effort = model.bias_force() if with_bias else np.zeros(len(model.bias_force()))

@@ -3,7 +3,7 @@
 import argparse
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,16 +37,7 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         default="humanoid",
         help="name, or path of a .yaml or .urdf file (%(default)s)",
     )
-    tracked = run.add_mutually_exclusive_group()
-    tracked.add_argument("--clip", help="track this motion clip: a name or a file")
-    tracked.add_argument(
-        "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
-    )
-    tracked.add_argument(
-        "--reference",
-        choices=["hold", "step", "sine"],
-        help="the rest pose (hold, the default), or a test signal from it",
-    )
+    _add_tracked(run)
     run.add_argument(
         "--duration",
         type=float,
@@ -82,32 +73,27 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
     )
 
 
+def _add_tracked(run: argparse.ArgumentParser) -> None:
+    """Add the options that say what is tracked."""
+    tracked = run.add_mutually_exclusive_group()
+    tracked.add_argument("--clip", help="track this motion clip: a name or a file")
+    tracked.add_argument(
+        "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
+    )
+    tracked.add_argument(
+        "--reference",
+        choices=["hold", "step", "sine"],
+        help="the rest pose (hold, the default), or a test signal from it",
+    )
+
+
 def _run(options: argparse.Namespace) -> None:
     from experiment.figures import plot_figures, prepare_directory
-    from experiment.plan import make_plan
-    from experiment.run import run_in_process, run_over_topics
-    from sim_node.parameters import tick_period
 
     settings = _settings(options.set)
-    reference = _reference(options)
-    plan = make_plan(
-        options.character,
-        options.duration,
-        reference,
-        settings["sim_node"],
-        settings["controller_node"],
-    )
-    motion = _name_of(plan.controller)
+    plan = _checked_plan(options, settings["sim_node"], settings["controller_node"])
     pushes = [_push(text, plan) for text in options.push]
-    if options.in_process and tick_period(plan.simulator):
-        raise ConfigurationError(
-            "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
-            "nor a 'real_time_factor'"
-        )
-    if options.contacts and (options.in_process or options.no_record):
-        raise ConfigurationError(
-            "--contacts is about the bag; with --in-process or --no-record there is none"
-        )
+    motion = _name_of(plan.controller)
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     prepare_directory(directory, overwrite=options.overwrite)
@@ -119,23 +105,57 @@ def _run(options: argparse.Namespace) -> None:
             bar.update(bar.task_ids[0], completed=min(ticks, plan.ticks))
 
         try:
-            if options.in_process:
-                run_in_process(plan, directory, progress=progress, pushes=pushes)
-            else:
-                run_over_topics(
-                    plan,
-                    directory,
-                    write_bag=not options.no_record,
-                    progress=progress,
-                    contacts=options.contacts,
-                    pushes=pushes,
-                )
+            _run_plan(options, plan, directory, pushes, progress)
         except KeyboardInterrupt:
             print(f"the results in {directory} are not complete", file=sys.stderr)
             raise
         progress(plan.ticks)
     plot_figures(directory)
     _report(directory)
+
+
+def _checked_plan(
+    options: argparse.Namespace, simulator: dict[str, object], controller: dict[str, object]
+) -> "Plan":
+    """What is to be run; raises ActuatedCharactersError where options contradict each other."""
+    from experiment.plan import make_plan
+    from sim_node.parameters import tick_period
+
+    plan = make_plan(
+        options.character, options.duration, _reference(options), simulator, controller
+    )
+    if options.in_process and tick_period(plan.simulator):
+        raise ConfigurationError(
+            "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
+            "nor a 'real_time_factor'"
+        )
+    if options.contacts and (options.in_process or options.no_record):
+        raise ConfigurationError(
+            "--contacts is about the bag; with --in-process or --no-record there is none"
+        )
+    return plan
+
+
+def _run_plan(
+    options: argparse.Namespace,
+    plan: "Plan",
+    directory: Path,
+    pushes: "Sequence[PlannedPush]",
+    progress: Callable[[int], None],
+) -> None:
+    from experiment.run import run_in_process, run_over_topics
+
+    if options.in_process:
+        run_in_process(plan, directory, progress=progress, pushes=pushes)
+        return
+    run_over_topics(
+        plan,
+        directory,
+        write_bag=not options.no_record,
+        progress=progress,
+        contacts=options.contacts,
+        pushes=pushes,
+    )
 
 
 def _name_of(controller: "Values") -> str:

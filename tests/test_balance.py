@@ -23,6 +23,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import CharacterError
 from msgs_config.joint_layout import JointLayout, JointType
+from msgs_config.stamped import StampedState
+from msgs_config.tick_clock import TickClock
 from sim_node.pushes import Push
 
 FEET = ("right_ankle", "left_ankle")
@@ -277,6 +279,24 @@ def test_the_effort_is_statics_by_hand(humanoid: Character, balance: Balance) ->
     assert effort[:6].tolist() == [0.0] * 6
     assert np.abs(expected).max() > 1.0
     assert effort == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize("law", ["computed_torque", "pd_gravity"])
+def test_the_weight_is_borne_once_whatever_law_it_is_added_to(
+    humanoid: Character, law: str
+) -> None:
+    """At the elbow, which bears nothing but its own arm."""
+    elbow = humanoid.layout.joint("right_elbow").start
+    position = bent_pose(humanoid)
+    position[elbow] = 1.5
+    state = StampedState(TickClock(RATE_HZ).stamp_ns(1), position, 0.0 * position, None)
+    limp = {"gain_scale.p": 0.0, "gain_scale.d": 0.0, "root_assistance": False, "balance": True}
+
+    effort, _ = controller("humanoid", law=law, **limp).answer(state, state.stamp_ns)
+
+    weight = still(humanoid, position).bias_force()[elbow]
+    assert abs(weight) > 0.1
+    assert effort[elbow] == pytest.approx(weight, rel=1e-9)
 
 
 def below(whole: Character, index: int) -> list[int]:

@@ -146,6 +146,21 @@ def test_efforts_are_clipped_to_the_controllers_limits() -> None:
     np.testing.assert_allclose(given[knee], 3.0 * np.sign(wanted[knee]))
 
 
+@pytest.mark.parametrize("first", [2, 3, 4, 100, 1001])
+def test_an_episode_is_answered_alike_whatever_tick_it_begins_at(first: int) -> None:
+    """Though the stamps' differences, whole ns, are not alike at 240 Hz."""
+    begun, later = walker(), walker()
+    for state in states(12):
+        tick = round(state.stamp_ns * RATE / 1e9) - 1
+        moved = replace(state, stamp_ns=stamp(first + tick))
+
+        effort, reference = later.answer(moved, stamp(first))
+
+        expected, desired = begun.answer(state, stamp(1))
+        assert effort.tobytes() == expected.tobytes()
+        assert reference.position.tobytes() == desired.position.tobytes()
+
+
 def test_changed_gains_count_from_the_next_state_on() -> None:
     # Arrange
     driver, doubled = walker(law="pd"), walker(law="pd", **{"gain_scale.p": 2.0})

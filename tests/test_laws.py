@@ -199,6 +199,22 @@ def test_the_integral_begins_anew_with_an_episode() -> None:
     assert second[0] == pytest.approx(10.0 * PERIOD, rel=1e-6)
 
 
+def test_the_integral_begins_anew_though_the_first_states_of_the_episode_were_not_seen() -> None:
+    """As in real time, where some are overtaken."""
+    driver = controller("pendulum", law="pid", **{"gains.hinge.i": 100.0})
+    clock, rest = driver.clock, np.array(character("pendulum").rest_position)
+
+    def answer(position: FloatArray, tick: int, episode: int) -> float:
+        state = StampedState(clock.stamp_ns(tick), position, np.zeros(1), np.zeros(1))
+        return float(driver.answer(state, clock.stamp_ns(episode))[0][0])
+
+    for tick in range(1, 13):
+        answer(rest - 0.5, tick, episode=1)
+
+    assert answer(rest, 13, episode=1) > 1.0
+    assert answer(rest, 13 + 15, episode=13) == 0.0
+
+
 def test_the_integral_of_an_episode_that_lasts_longer_than_the_one_before_begins_anew_too() -> None:
     """An episode of one tick: the next one's first time is that of the last state answered."""
     by = driver("pid", 0.0, 0.0, 10.0)

@@ -272,6 +272,41 @@ def test_what_lies_before_the_present_start_is_forgotten() -> None:
     continuous(PANDA, reference.sample, 2.9)
 
 
+def test_two_that_are_yet_to_begin_leave_the_present_as_it_is() -> None:
+    before = swinging(PANDA)
+    first = TrajectoryReference(PANDA, before).replaced(
+        one_point("panda_joint1", 1.0, 0.5), 2.5, now=0.3
+    )
+
+    second = first.replaced(one_point("panda_joint1", 1.0, -0.5), 4.0, now=0.3)
+
+    for time in (0.3, 1.7, 2.5 - 1e-6):
+        assert_same_motion(LAYOUT, second.sample(time), before.sample(time), atol=1e-15)
+    for time in (2.5, 3.1, 4.0 - 1e-6):
+        assert_same_motion(LAYOUT, second.sample(time), first.sample(time), atol=1e-15)
+    for start in (2.5, 4.0):
+        continuous(PANDA, second.sample, start)
+
+
+def test_not_any_number_of_them_may_wait() -> None:
+    reference = TrajectoryReference(PANDA, HoldReference(PANDA))
+
+    with pytest.raises(MotionError, match="more than 100 are yet to begin"):
+        for number in range(1000):
+            later = one_point("panda_joint1", 0.5, 0.1)
+            reference = reference.replaced(later, 1.0 + number, now=0.0)
+
+    assert reference.sample(2000.0).configuration.position[0] == 0.1
+
+
+def test_a_million_points_are_refused_before_they_fill_the_memory() -> None:
+    times = np.arange(1, 1_000_001) * 0.01
+    points = TrajectoryPoints(("panda_joint1",), times, np.zeros((len(times), 1)))
+
+    with pytest.raises(MotionError, match="it has 1000000 points; it must have 10000 or fewer"):
+        TrajectoryReference(PANDA, HoldReference(PANDA)).replaced(points, 0.0)
+
+
 def test_a_refused_one_leaves_the_reference_as_it_was() -> None:
     reference = TrajectoryReference(PANDA, swinging(PANDA))
     reference = reference.replaced(one_point("panda_joint1", 1.0, 0.5), START)
