@@ -5,6 +5,7 @@ import math
 import re
 import signal
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ INTERRUPTIBLE = {
 }
 MAY_IMPORT = {"numpy", "rclpy", "sensor_msgs", "geometry_msgs"} | set(sys.stdlib_module_names)
 LONG = 120.0  # s that a thousand ticks of three processes may take on a busy machine
+QUIET = 0.2  # s within which a process that waits uses no processor
 SOON = 0.05  # s, a republish period for tests that wait for repeated states
 
 
@@ -52,6 +54,19 @@ def listeners(client: SimulatorClient) -> set[str]:
     return {info.node_name for infos in found for info in infos}
 
 
+def waits(pid: int) -> bool:
+    """Whether a process has come to wait: a signal while rclpy is set up makes rclpy say things."""
+    before = cpu_ticks(pid)
+    time.sleep(QUIET)
+    return cpu_ticks(pid) - before <= 1
+
+
+def cpu_ticks(pid: int) -> int:
+    """What a process has used of the processor, in hundredths of a second."""
+    fields = Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split()
+    return int(fields[11]) + int(fields[12])
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("name", INTERRUPTIBLE)
 def test_an_example_ends_quietly_on_a_signal(
@@ -59,6 +74,7 @@ def test_an_example_ends_quietly_on_a_signal(
 ) -> None:
     started = processes.python(example(name), *INTERRUPTIBLE[name])
     client.spin_until(lambda: listeners(client) - {"test_client"}, "an example that listens")
+    client.spin_until(lambda: waits(started.pid), "an example that waits")
 
     started.send(number)
 

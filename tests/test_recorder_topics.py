@@ -32,6 +32,9 @@ def record(
         "humanoid", max_ticks=TICKS, wait_for_subscribers=2, wrench_duration=3.0 / 240.0
     )
     state = client.first_state()
+    client.spin_until(
+        lambda: client.wrenches.get_subscription_count() == 2, "simulator and recorder"
+    )
     client.wrenches.publish(
         wrench_message(
             CLOCK.stamp_ns(PUSHED_AT),
