@@ -25,11 +25,11 @@ from sensor_msgs.msg import JointState
 MASS, GRAVITY = 1.0, 9.81  # kg, m/s^2
 START, STEP = 1.0, 0.5  # m: where the mass begins, and how far the target jumps
 SETTLING = 3.0  # s before the step
-LENGTH = 3.0  # s after it
+BEFORE, LENGTH = 0.2, 3.0  # s before and after it that are kept
 
 
 class StepResponse(Node):
-    """Commands PD torques whose target steps; keeps times and heights after the step."""
+    """Commands PD torques whose target steps; keeps times and heights about the step."""
 
     def __init__(self, stiffness, damping):
         super().__init__("step_response")
@@ -53,7 +53,7 @@ class StepResponse(Node):
         torque.header.stamp = state.header.stamp  # tells the simulator how old the command is
         torque.effort = [self.stiffness * (target - height) - self.damping * speed]
         self.torques.publish(torque)
-        if since >= 0.0:
+        if since >= -BEFORE:
             self.samples.append((since, height))
         if since >= LENGTH and not self.done.done():
             self.done.set_result(None)
@@ -64,15 +64,17 @@ def theory(times, stiffness, damping):
     frequency = np.sqrt(stiffness / MASS)  # rad/s, undamped
     ratio = damping / (2.0 * np.sqrt(stiffness * MASS))
     root = np.sqrt(1.0 - ratio**2)
-    phase = frequency * root * times
-    decay = np.exp(-ratio * frequency * times)
+    since = np.maximum(times, 0.0)
+    phase = frequency * root * since
+    decay = np.exp(-ratio * frequency * since)
     remaining = decay * (np.cos(phase) + ratio / root * np.sin(phase))
     return START - MASS * GRAVITY / stiffness + STEP * (1.0 - remaining)
 
 
 def measure(times, heights):
     """Rise time s, overshoot % and steady-state error mm of a step response, (n,) each."""
-    first, final = heights[0], heights[-len(heights) // 10 :].mean()
+    # before the step, not at it: where the machine is busy the first sample after it comes late
+    first, final = heights[times < 0.0].mean(), heights[-len(heights) // 10 :].mean()
     share = (heights - first) / (final - first)
     rise = times[np.argmax(share > 0.9)] - times[np.argmax(share > 0.1)]
     return {

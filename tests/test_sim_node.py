@@ -363,7 +363,7 @@ def test_a_long_wait_names_what_is_missing_and_whose_quality_of_service_does_not
     client.node.destroy_publisher(client.torques)
     client.speak(topics.JOINT_TORQUES, unreliable)
 
-    simulator = processes.simulator("humanoid")
+    simulator = processes.simulator("humanoid", wait_for_subscribers=1)
 
     told = client.spin_until(
         lambda: [line for line in simulator.stderr.splitlines() if "waiting for" in line],
