@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiment.cli_render import add_render
-from experiment.cli_run import add_run
-from experiment.cli_study import add_study
+from experiment.commands.render import add_render
+from experiment.commands.run import add_run
+from experiment.commands.study import add_study
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.parameters import Parameter
 from msgs_config.process import EXIT_ERROR, limit_threads

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rclpy.node import Node
 
-from experiment.bag import BagWriter
+from experiment.bags.writer import BagWriter
 from experiment.figures import BAG, write_figures
 from experiment.listener import RunListener
 from msgs_config import topics

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
-from experiment.recording import Recording
+from experiment.bags.recording import Recording
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, RecordingError

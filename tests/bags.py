@@ -7,7 +7,7 @@ from pathlib import Path
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-from experiment.bag import BagWriter
+from experiment.bags.writer import BagWriter
 from experiment.loop import ticks_in_process
 from experiment.metrics import Tick
 from experiment.plan import Plan, make_plan

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from controller_node.parameters import make_controller
+from experiment.bags.recording import Recording
 from experiment.metrics import Measurement, Tick
 from experiment.plan import Plan, make_plan
-from experiment.recording import Recording
 from experiment.studies.study import Case, Outcome
 from msgs_config import configuration
 from msgs_config.errors import SimulationError

@@ -28,7 +28,9 @@ from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from experiment.bag import BagWriter, RecordedMessage, read_definition, read_messages
+from experiment.bags.definitions import read_definition
+from experiment.bags.reader import RecordedMessage, read_messages
+from experiment.bags.writer import BagWriter
 from msgs_config.errors import RecordingError
 
 QOS = QoSProfile(depth=5000)

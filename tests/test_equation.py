@@ -19,7 +19,7 @@ from physics import (
 )
 from ros import Processes
 
-from experiment.bag import read_messages
+from experiment.bags.reader import read_messages
 from experiment.equation import Balance, EquationOfMotion
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray

@@ -13,11 +13,11 @@ from physics import character
 from ros import Processes
 
 from controller_node.parameters import make_controller
+from experiment.bags.recording import Recording, read_recording
 from experiment.figures import prepare_directory, read_figures
 from experiment.loop import ticks_in_process
 from experiment.plan import Plan, make_plan
 from experiment.planned_push import PlannedPush, planned_push, read_pushes, write_pushes
-from experiment.recording import Recording, read_recording
 from experiment.run import run_in_process, run_over_topics
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiment.bag import read_messages
+from experiment.bags.reader import read_messages
 from experiment.cli import _parser
 from msgs_config import topics
 

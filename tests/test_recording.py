@@ -20,8 +20,8 @@ from bags import (
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-from experiment.bag import BagWriter
-from experiment.recording import Recording, read_recording
+from experiment.bags.recording import Recording, read_recording
+from experiment.bags.writer import BagWriter
 from msgs_config import topics
 from msgs_config.errors import ActuatedCharactersError, MessageError, RecordingError
 from msgs_config.messages import JointStateEncoder

@@ -11,8 +11,8 @@ from matplotlib.image import imread
 from physics import character
 from ros import Processes, wait_until
 
+from experiment.bags.recording import Recording, read_recording
 from experiment.cli import main
-from experiment.recording import Recording, read_recording
 from experiment.render import pose_strip, render_still, save_png, strip
 from msgs_config.arrays import BoolArray
 from msgs_config.errors import ConfigurationError, RecordingError

@@ -17,7 +17,7 @@ from physics import controller, run_together, simulation
 from rclpy.context import Context
 from ros import Client, Process, Processes, stamp_ns, tick_of, wait_until
 
-from experiment.bag import read_messages
+from experiment.bags.reader import read_messages
 from experiment.cli import main
 from experiment.metrics import StateHash
 from experiment.plan import make_plan

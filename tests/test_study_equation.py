@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from in_process import InProcessLaboratory
 
-from experiment.recording import Recording
+from experiment.bags.recording import Recording
 from experiment.studies.catalogue import load_study
 from experiment.studies.equation import TickTime, close
 from experiment.studies.study import Case, Findings

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from experiment.bags.recording import Recording
 from experiment.planned_push import PlannedPush
-from experiment.recording import Recording
 from experiment.render import pose_strip
 from experiment.studies.study import Case, Findings, Laboratory, Outcome
 from msgs_config import rotations

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller_node.parameters import make_controller
+from experiment.bags.recording import Recording
 from experiment.equation import EquationOfMotion
 from experiment.plan import make_plan
-from experiment.recording import Recording
 from experiment.studies.plots import label, make_panels
 from experiment.studies.study import Case, Cell, Findings, Laboratory, Outcome
 from msgs_config.arrays import FloatArray

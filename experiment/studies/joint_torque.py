@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller_node.effort_series import write_effort_series
+from experiment.bags.recording import Recording
 from experiment.planned_push import PlannedPush
-from experiment.recording import Recording
 from experiment.studies.bodies import (
     HINGE,
     IN_SPACE,

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from experiment.bags.recording import Recording, read_recording
 from experiment.figures import prepare_directory, read_figures
 from experiment.plan import make_plan
 from experiment.planned_push import PlannedPush
-from experiment.recording import Recording, read_recording
 from experiment.run import run_over_topics
 from experiment.studies.study import Case, Findings, Outcome
 from msgs_config.errors import RunError

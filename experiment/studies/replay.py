@@ -10,7 +10,7 @@ import numpy as np
 from controller_node.dynamics import DynamicsModel
 from controller_node.effort_series import TIME_COLUMN
 from controller_node.references.base import Reference
-from experiment.recording import Recording
+from experiment.bags.recording import Recording
 from experiment.studies.tracking import errors_by_joint
 from msgs_config.arrays import FloatArray
 from msgs_config.joint_layout import JointLayout

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from experiment.bags.recording import Recording
 from experiment.planned_push import PlannedPush
-from experiment.recording import Recording
 from experiment.studies.bodies import IN_SPACE, Box, Momenta, momenta, write_box
 from experiment.studies.euler import (
     Load,

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
+from experiment.bags.recording import Recording
 from experiment.planned_push import PlannedPush
-from experiment.recording import Recording
 from msgs_config.arrays import FloatArray
 
 if TYPE_CHECKING:  # it takes a second to import

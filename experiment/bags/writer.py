@@ -1,21 +1,15 @@
-"""Recordings: rosbag2 directories of serialised messages, written and read without ROS' rosbag2.
+"""Writes recordings: rosbag2 directories of serialised messages, without ROS' rosbag2.
 
 What is written is version 9, stored as MCAP, as ROS 2 Jazzy's `ros2 bag record -s mcap` writes it.
 """
 
-import json
-from collections.abc import Collection, Iterator
 from contextlib import suppress
-from functools import cache
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Self
 
 from rclpy.duration import Duration, Infinite
 from rclpy.qos import LivelinessPolicy, QoSProfile
-from rclpy.serialization import deserialize_message
 from rosbags.interfaces import (
     Connection,
     Qos,
@@ -25,15 +19,13 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
-from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterError
+from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
+from experiment.bags.definitions import read_definition
 from msgs_config.errors import RecordingError, one_of
 
 _LATEST_NS = 2**63 - 1  # rosbag2 holds times in int64
 _NS_PER_S = 10**9
-
-# The last three are what rosbags lets through when a file is damaged.
-_READING_ERRORS = (ReaderError, OSError, ValueError, KeyError, OverflowError)
 
 
 class BagWriter:
@@ -143,110 +135,6 @@ class BagWriter:
         raise RecordingError(
             f"recording {self._path} is incomplete, cannot write: {cause.strerror}"
         ) from cause
-
-
-class RecordedMessage(NamedTuple):
-    """A message of a recording, serialised as it was received."""
-
-    topic: str
-    log_time_ns: int
-    raw: bytes
-    type_name: str  # as "sensor_msgs/msg/JointState"
-
-    def decode(self) -> Any:
-        """The message as an object of its ROS class.
-
-        Raises:
-            RecordingError: The class is not installed, or the bytes are no such message.
-        """
-        try:
-            return deserialize_message(self.raw, _message_class(self.type_name))
-        except (ImportError, AttributeError) as error:
-            raise RecordingError(f"message type {self.type_name} is not installed") from error
-        except RuntimeError as error:
-            raise RecordingError(
-                f"message on '{self.topic}' at {self.log_time_ns} ns is no {self.type_name}"
-            ) from error
-
-
-def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
-    """Yield the messages of a rosbag2 directory, or those of `topics` only.
-
-    They come in the order of their log times, those of equal time as they were written.
-
-    Raises:
-        RecordingError: There is no complete recording at `path`, or it has none of a topic's name.
-    """
-    if not (path / "metadata.yaml").is_file():  # as a recorder leaves it that was killed
-        raise RecordingError(f"no complete recording at {path}: it has no metadata.yaml")
-    try:
-        with Reader(path) as reader:
-            connections = _select(reader.connections, topics)
-            if not connections:  # to rosbags an empty selection means everything
-                return
-            for connection, log_time_ns, raw in reader.messages(connections):
-                yield RecordedMessage(connection.topic, log_time_ns, raw, connection.msgtype)
-    except _READING_ERRORS as error:
-        raise RecordingError(f"cannot read recording {path}: {error}") from error
-
-
-def _select(connections: list[Connection], topics: Collection[str] | None) -> list[Connection]:
-    if topics is None:
-        return connections
-    recorded = {connection.topic for connection in connections}
-    for topic in topics:
-        if topic not in recorded:
-            raise RecordingError(one_of("topic", topic, sorted(recorded)))
-    return [connection for connection in connections if connection.topic in topics]
-
-
-@cache
-def _message_class(type_name: str) -> Any:
-    *module, name = type_name.split("/")
-    return getattr(import_module(".".join(module)), name)
-
-
-class MessageDefinition(NamedTuple):
-    """What a reader that knows nothing of a message type needs to decode it."""
-
-    type_name: str  # as "sensor_msgs/msg/JointState"
-    text: str  # the .msg file, then the .msg files of all types in it, each below its name
-    type_hash: str  # of REP 2016, "RIHS01_" and 64 hexadecimal digits
-
-
-def read_definition(message_type: type) -> MessageDefinition:
-    """The definition of a message type from the package that it is installed with.
-
-    Raises:
-        RecordingError: A file of the definition is not installed.
-    """
-    *namespace, _ = message_type.__module__.split(".")
-    type_name = "/".join([*namespace, message_type.__name__])
-    description = json.loads(_read_installed(type_name, ".json"))
-    hashes = {entry["type_name"]: entry["hash_string"] for entry in description["type_hashes"]}
-    texts = [_read_installed(type_name, ".msg")]
-    for nested in description["type_description_msg"]["referenced_type_descriptions"]:
-        package, _, name = nested["type_name"].split("/")
-        text = _read_installed(nested["type_name"], ".msg")
-        texts.append(f"{'=' * 80}\nMSG: {package}/{name}\n{text}")
-    return MessageDefinition(type_name, "\n".join(texts), hashes[type_name])
-
-
-def _read_installed(type_name: str, suffix: str) -> str:
-    """The text of a type's file, from the `share` folder beside the package's Python code.
-
-    The ament index would do in a full ROS install only: nothing points it to the pip wheels.
-    """
-    spec = find_spec(type_name.partition("/")[0])
-    folders = spec.submodule_search_locations if spec else None
-    for folder in folders or ():
-        for prefix in Path(folder).parents:
-            file = prefix / "share" / f"{type_name}{suffix}"
-            if file.is_file():
-                return file.read_text(encoding="utf-8")
-    raise RecordingError(
-        f"no definition of message type {type_name}: share/{type_name}{suffix} is not installed"
-    )
 
 
 def _offered(qos: QoSProfile) -> Qos:

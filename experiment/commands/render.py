@@ -54,8 +54,8 @@ def _render(options: argparse.Namespace) -> None:
         raise ConfigurationError(f"--count is {options.count}; it must be {_MOST} or less")
     times = options.count if options.times is None else _times(options.times)
     size = None if options.size is None else _size(options.size)
+    from experiment.bags.recording import read_recording
     from experiment.figures import STRIP
-    from experiment.recording import read_recording
     from experiment.render import save_png, strip
 
     output = options.output or options.run / STRIP

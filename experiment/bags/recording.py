@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from std_msgs.msg import String
 
-from experiment.bag import RecordedMessage, read_messages
+from experiment.bags.reader import RecordedMessage, read_messages
 from experiment.figures import BAG
 from msgs_config import configuration, topics
 from msgs_config.arrays import FloatArray, IntArray

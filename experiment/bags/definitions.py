@@ -1,0 +1,51 @@
+"""Message definitions as a recording holds them, from the packages that are installed."""
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+from msgs_config.errors import RecordingError
+
+
+class MessageDefinition(NamedTuple):
+    """What a reader that knows nothing of a message type needs to decode it."""
+
+    type_name: str  # as "sensor_msgs/msg/JointState"
+    text: str  # the .msg file, then the .msg files of all types in it, each below its name
+    type_hash: str  # of REP 2016, "RIHS01_" and 64 hexadecimal digits
+
+
+def read_definition(message_type: type) -> MessageDefinition:
+    """The definition of a message type from the package that it is installed with.
+
+    Raises:
+        RecordingError: A file of the definition is not installed.
+    """
+    *namespace, _ = message_type.__module__.split(".")
+    type_name = "/".join([*namespace, message_type.__name__])
+    description = json.loads(_read_installed(type_name, ".json"))
+    hashes = {entry["type_name"]: entry["hash_string"] for entry in description["type_hashes"]}
+    texts = [_read_installed(type_name, ".msg")]
+    for nested in description["type_description_msg"]["referenced_type_descriptions"]:
+        package, _, name = nested["type_name"].split("/")
+        text = _read_installed(nested["type_name"], ".msg")
+        texts.append(f"{'=' * 80}\nMSG: {package}/{name}\n{text}")
+    return MessageDefinition(type_name, "\n".join(texts), hashes[type_name])
+
+
+def _read_installed(type_name: str, suffix: str) -> str:
+    """The text of a type's file, from the `share` folder beside the package's Python code.
+
+    The ament index would do in a full ROS install only: nothing points it to the pip wheels.
+    """
+    spec = find_spec(type_name.partition("/")[0])
+    folders = spec.submodule_search_locations if spec else None
+    for folder in folders or ():
+        for prefix in Path(folder).parents:
+            file = prefix / "share" / f"{type_name}{suffix}"
+            if file.is_file():
+                return file.read_text(encoding="utf-8")
+    raise RecordingError(
+        f"no definition of message type {type_name}: share/{type_name}{suffix} is not installed"
+    )
