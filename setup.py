@@ -20,6 +20,7 @@ setup(
     package_data={
         "msgs_config": ["fastdds.xml", "characters/*.yaml", "characters/*.urdf"],
         "controller_node": ["keyframes/*.yaml"],
+        "experiment": ["samcon/*.yaml"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
@@ -34,6 +35,7 @@ setup(
     # the messages are there already (under other names), pip would put a second, different copy
     # beside them, and a requirement that is not met stops a program that imports pkg_resources.
     install_requires=[
+        "joblib>=1.4,<2",
         "matplotlib>=3.6,<4",
         "mujoco-core>=4.0,<5",
         "numpy>=1.26,<3",
@@ -49,9 +51,14 @@ setup(
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-rclpy[fastrtps]>=7.1.6,<7.2",
         ],
+        # `actuated_characters reconstruct --cluster ADDRESS`, on several machines.
+        "cluster": ["dask[distributed]>=2024.8"],
+        # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
+        "video": ["av>=14,<19"],
         # `colcon test` chooses pytest because this extra, of this name, lists it.
         # The linters are held to one minor version: a new one may have new rules.
         "test": [
+            "av>=14,<19",
             "hypothesis>=6.98,<7",
             "mcap>=1.2,<2",
             "mcap-ros2-support>=0.5.5,<0.7",

@@ -14,6 +14,9 @@ from benchmarks.control_law import measure_control_laws  # noqa: E402
 from benchmarks.cost import measure_cost  # noqa: E402
 from benchmarks.lockstep import measure_lockstep  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
+from benchmarks.recorder import measure_recorder  # noqa: E402
+from benchmarks.replay import measure_replay  # noqa: E402
+from benchmarks.samcon import measure_samcon  # noqa: E402
 from experiment.domain import own_domain  # noqa: E402
 
 _WIDTH = 100  # characters; enough for every table
@@ -22,6 +25,9 @@ _MEASUREMENTS = {
     "laws": measure_control_laws,
     "cost": measure_cost,
     "realtime": measure_realtime,
+    "samcon": measure_samcon,
+    "recorder": measure_recorder,
+    "replay": measure_replay,
 }
 
 

@@ -17,6 +17,7 @@ from experiment.processes import Child, Children
 from msgs_config import topics
 
 _PATIENCE = 120.0  # s for a whole run
+_MODULES = {topics.RECORDER_NODE: "experiment.recorder_main"}
 
 
 class Nodes:
@@ -54,14 +55,17 @@ class Nodes:
         return child
 
     def wait_until(
-        self, done: Callable[[], object], step: Callable[[], object] | None = None
+        self,
+        done: Callable[[], object],
+        step: Callable[[], object] | None = None,
+        patience: float = _PATIENCE,
     ) -> None:
         """Take reports, or what else a step takes, until it is done.
 
         Raises:
-            RuntimeError: the simulator failed, or it takes longer than two minutes.
+            RuntimeError: the simulator failed, or it takes longer than `patience`, s.
         """
-        deadline = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + patience
         while not done():
             if step is None:
                 rclpy.spin_once(self.node, timeout_sec=0.05)
@@ -86,7 +90,8 @@ def start_node(
     file = write_parameters(directory, name, parameters)
     arguments = ["--ros-args", "--params-file", str(file)]
     log = directory / f"{name}.log"
-    return children.start(lambda: Child(name, f"{name}.main", arguments, log, dict(os.environ)))
+    module = _MODULES.get(name, f"{name}.main")
+    return children.start(lambda: Child(name, module, arguments, log, dict(os.environ)))
 
 
 def private_memory(child: Child) -> float:
@@ -94,3 +99,10 @@ def private_memory(child: Child) -> float:
     lines = Path(f"/proc/{child.pid}/smaps_rollup").read_text().splitlines()
     (anonymous,) = (line.split()[1] for line in lines if line.startswith("Pss_Anon:"))
     return 1e-3 * float(anonymous)
+
+
+def processor_time(child: Child) -> float:
+    """How long a child has kept a processor busy so far, s."""
+    fields = Path(f"/proc/{child.pid}/stat").read_text().rpartition(")")[2].split()
+    user, system = (int(field) for field in fields[11:13])  # utime and stime of proc(5)
+    return (user + system) / os.sysconf("SC_CLK_TCK")

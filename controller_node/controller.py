@@ -6,11 +6,15 @@ import numpy as np
 
 from controller_node.agreement import check_agreement
 from controller_node.balance import Balance, BalanceGains
+from controller_node.behaviours.base import ModeReport, Observation, Phase
+from controller_node.behaviours.make import BehaviourChoice
 from controller_node.dynamics import DynamicsModel
 from controller_node.effort_series import EffortSeries
+from controller_node.feedback import RespondingReference
 from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
+from controller_node.strength import Strengths, StrengthSchedule, weakened
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import CharacterError, ConfigurationError
@@ -33,8 +37,8 @@ class Controller:
     """Inverse dynamics in ticks: `(q, v, desired state) -> effort`.
 
     A function of what the state's message holds and of the tick, so that the same state always
-    gets the same answer; only the law `pid` remembers the ticks before, and a trajectory that was
-    taken is followed until the episode ends.
+    gets the same answer; only the law `pid` and a behaviour that reacts remember the ticks before,
+    and a trajectory or strengths that were taken hold until the episode ends.
     """
 
     def __init__(
@@ -46,8 +50,11 @@ class Controller:
         rate_hz: int,
         gravity: float,
         series: EffortSeries | None = None,
+        behaviour: BehaviourChoice | None = None,
     ) -> None:
         """Build the model of the dynamics; `series` is what the law `feedforward` applies.
+
+        Without a behaviour it tracks the reference, whatever comes.
 
         Raises:
             CharacterError: a joint moves neither mass nor inertia, or a foot is none.
@@ -66,6 +73,16 @@ class Controller:
         self.check(settings)
         self._settings = settings
         self._next: tuple[float, ReferenceState] | None = None
+        self._choice = behaviour or BehaviourChoice()
+        self._behaviour = self._choice.make()
+        self._strengths = StrengthSchedule(self.layout)
+        self._no_contacts = np.zeros((len(character.links), 6))
+        self.mode: ModeReport | None = None  # since which state what is done; None before the first
+
+    @property
+    def needs_contacts(self) -> bool:
+        """Whether the answer to a state depends on the contacts of the tick before."""
+        return self._choice.needs_contacts
 
     @property
     def settings(self) -> Settings:
@@ -121,9 +138,21 @@ class Controller:
         self._reference = before.replaced(points, start, now)
         self._next = None
 
+    def weaken(self, strengths: Strengths, *, episode_ns: int) -> None:
+        """Take strengths that count from their stamp on, until the next ones or the episode's end.
+
+        Raises:
+            MotionError: too many wait for their stamps.
+        """
+        self._begin_episode(episode_ns)
+        self._strengths.add(strengths)
+
     def _begin_episode(self, episode_ns: int) -> None:
         """Track the own reference again, if the episode is another one."""
         if episode_ns != self._episode_ns:
+            self._behaviour = self._choice.make()
+            self._strengths.clear()
+            self.mode = None
             self._episode_ns = episode_ns
             self._reference = self._own_reference
             self._law = make_law(self._settings.law, self._plant)
@@ -139,39 +168,75 @@ class Controller:
         since_ns = self.clock.stamp_ns(FIRST_TICK + ticks) - self.clock.stamp_ns(FIRST_TICK)
         return since_ns / NANOSECONDS_PER_SECOND
 
-    def answer(self, state: StampedState, episode_ns: int) -> tuple[FloatArray, StampedReference]:
+    def answer(
+        self, state: StampedState, episode_ns: int, contacts: FloatArray | None = None
+    ) -> tuple[FloatArray, StampedReference]:
         """The effort (n,) that answers a state, and the reference at the state's stamp.
 
-        `episode_ns` is the stamp of the episode's first state, from which the reference counts.
+        `episode_ns` is the stamp of the episode's first state, from which the reference counts;
+        `contacts` (links, 6) are the net wrenches of the tick before, N and N m, world axes, which
+        a behaviour may need.
 
         Raises:
             ClockError: the state's stamp is no tick at this controller's rate.
+            ConfigurationError: the behaviour needs contacts, and there are none.
         """
         self._begin_episode(episode_ns)
         next_stamp = self.clock.stamp_ns(self.clock.tick(state.stamp_ns) + 1)
         time, next_time = self._time(state.stamp_ns), self._time(next_stamp)
         now, upcoming = self._reference_at(time), self._reference_at(next_time)
         self._next = next_time, upcoming
+        if contacts is None and self.needs_contacts:
+            raise ConfigurationError("the behaviour needs the contacts of each state's tick")
+        strengths = self._strengths.at(state.stamp_ns)
+        directive = self._behaviour.advance(
+            Observation(
+                time=time,
+                next_time=next_time,
+                position=state.position,
+                velocity=state.velocity,
+                contacts=self._no_contacts if contacts is None else contacts,
+                now=now,
+                upcoming=upcoming,
+                gains=weakened(self.layout, self._settings.gains, strengths),
+            )
+        )
+        self._report(directive.phase, state.stamp_ns)
         instant = Instant(
             time=time,
             position=state.position,
             velocity=state.velocity,
-            now=self._desired(now),
-            upcoming=self._desired(upcoming),
+            now=self._desired(directive.now),
+            upcoming=self._desired(directive.upcoming),
+            response=self._response(time, state),
         )
-        gains = self._settings.gains
-        effort = self._law(instant, gains)
-        if self._settings.balance is not None and self._balance is not None:
-            self._model.update(state.position, state.velocity)
-            bias = self._settings.law not in HAS_BIAS
-            effort = effort + self._balance.effort(
-                self._model, self._settings.balance, with_bias=bias
-            )
-        effort = self.layout.clipped(effort, gains.effort_limits)
+        effort = self._effort(instant, directive.gains)
         desired = instant.now
         return effort, StampedReference(
             state.stamp_ns, desired.configuration.position, desired.velocity
         )
+
+    def _report(self, phase: Phase, stamp_ns: int) -> None:
+        """Keep since which state a phase lasts."""
+        if self.mode is None or self.mode.phase is not phase:
+            self.mode = ModeReport(phase, stamp_ns)
+
+    def _effort(self, instant: Instant, gains: GainArrays) -> FloatArray:
+        """The effort (n,) of law and balance, within the limits."""
+        effort = self._law(instant, gains)
+        if self._settings.balance is not None and self._balance is not None:
+            self._model.update(instant.position, instant.velocity)
+            bias = self._settings.law not in HAS_BIAS
+            effort = effort + self._balance.effort(
+                self._model, self._settings.balance, with_bias=bias
+            )
+        return self.layout.clipped(effort, gains.effort_limits)
+
+    def _response(self, time: float, state: StampedState) -> FloatArray | None:
+        """What a reference with feedback adds to the tracking errors (n,); None without."""
+        if isinstance(self._reference, RespondingReference):
+            return self._reference.response(time, state.position, state.velocity)
+        return None
 
     def _reference_at(self, time: float) -> ReferenceState:
         """The reference; the one of the next tick is this tick's when the tick has come."""

@@ -45,6 +45,12 @@ class Instant:
     velocity: FloatArray  # (n,)
     now: ReferenceState
     upcoming: ReferenceState  # one tick later
+    response: FloatArray | None = None  # (n,) of feedback, added to the errors; None: nothing
+
+    def error(self, model: DynamicsModel, desired: ReferenceState) -> FloatArray:
+        """The error (n,) of the configuration against a desired state, with the response."""
+        error = model.error_of(self.position, desired.configuration.position)
+        return error if self.response is None else error + self.response
 
 
 Law: TypeAlias = Callable[[Instant, GainArrays], FloatArray]
@@ -99,7 +105,7 @@ def _computed_torque(plant: Plant, instant: Instant, gains: GainArrays) -> Float
 
 def _errors(plant: Plant, instant: Instant) -> tuple[FloatArray, FloatArray]:
     """Errors (n,) of configuration and velocity, of the reference against the state."""
-    error = plant.model.error_of(instant.position, instant.now.configuration.position)
+    error = instant.error(plant.model, instant.now)
     return error, instant.now.velocity - instant.velocity
 
 
@@ -112,7 +118,7 @@ def _implicit(
         model.bias_force(),
         gains.stiffness,
         gains.damping,
-        model.error_of(instant.position, instant.upcoming.configuration.position),
+        instant.error(model, instant.upcoming),
         instant.velocity,
         instant.upcoming.velocity,
         period,

@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from controller_node.feedback import responding
 from controller_node.references.base import Reference
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
+from controller_node.references.corrected import CorrectedReference
+from controller_node.references.corrected_file import read_corrections, read_feedback
 from controller_node.references.hold import HoldReference
 from controller_node.references.keyframe_file import read_keyframes
 from controller_node.references.keyframes import KeyframesReference
@@ -28,7 +31,7 @@ MOTION_PARAMETERS = [
         choices=("hold", "keyframes", "clip", "step", "sine"),
     ),
     Parameter("keyframes", "", "name of shipped keyframes, or path of a .yaml file"),
-    Parameter("clip", "walk", "name of a clip of the character, or path of a .txt file"),
+    Parameter("clip", "walk", "name of a clip of the character, or path of a .txt or .json file"),
     Parameter(
         "signal.dofs",
         [],
@@ -61,7 +64,13 @@ def make_motion(character: Character, values: Values) -> Motion:
         frames = read_clip(character, values.text("clip"))
         names = ", ".join(frames.clamped)
         kept = (f"kept within joint limits: {names}",) if names else ()
-        return Motion(ClipReference(character.layout, frames), kept)
+        clip = ClipReference(character.layout, frames)
+        corrections = read_corrections(character, values.text("clip"))
+        if corrections is None:
+            return Motion(clip, kept)
+        corrected = CorrectedReference(character.layout, clip, corrections)
+        gains = read_feedback(character, values.text("clip"))
+        return Motion(responding(character, corrected, clip, gains), kept)
     if kind == "keyframes":
         keyframes = read_keyframes(character, str(_keyframes_path(values.text("keyframes"))))
         return Motion(KeyframesReference(character.layout, keyframes), keyframes.notes)

@@ -9,6 +9,8 @@ from rclpy.node import Node
 from std_msgs.msg import Header, String
 
 from controller_node.actuation import Actuation
+from controller_node.behaviours.base import ModeReport
+from controller_node.contact_inbox import ContactInbox
 from controller_node.motion import make_motion
 from controller_node.outputs import Answer, Outputs
 from controller_node.parameters import (
@@ -18,6 +20,7 @@ from controller_node.parameters import (
     make_controller,
     make_settings,
 )
+from controller_node.strengths_topic import StrengthTopic
 from controller_node.trajectories import Trajectories
 from msgs_config import configuration, topics
 from msgs_config.character_loading import load_character
@@ -39,6 +42,8 @@ from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
 from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from msgs_config.warnings import Warnings
+
+_FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge the last messages
 
 
 class ControllerNode(Node):
@@ -81,6 +86,13 @@ class ControllerNode(Node):
         self._decoder = JointStateDecoder()
         self._episodes = DirectSubscription(self, topics.EPISODE)
         self._simulators = DirectSubscription(self, topics.CONFIGURATION.of(topics.SIM_NODE))
+        self._contacts = (
+            ContactInbox(self, self._character, self._warnings)
+            if self._controller.needs_contacts
+            else None
+        )
+        self._waiting: bytes | None = None  # a state, for the contacts of its tick
+        self._told_mode: ModeReport | None = None
         # after them: a simulator that has found this subscription has found the others as well
         self._states = DirectSubscription(self, topics.JOINT_STATES)
         commanded = np.flatnonzero(
@@ -89,6 +101,7 @@ class ControllerNode(Node):
         self._actuation = Actuation(len(commanded), self._layout.size)
         self._outputs = Outputs(self, self._layout, commanded)
         self._trajectories = Trajectories(self, self._controller, self._outputs, self._warnings)
+        self._strengths = StrengthTopic(self, self._controller, self._outputs, self._warnings)
         self._publish_configuration()
 
     def _publish_configuration(self) -> None:
@@ -113,14 +126,17 @@ class ControllerNode(Node):
                 self._report()
                 self._check_simulator()
                 raw = self._next_state()
-                if raw is None:
-                    spinner.rest()
-                else:
+                if raw is not None:
                     spinner.received()
                     spinner.serve()  # a flood of states must not keep services waiting
                     self._take_state(raw)
+                elif self._waiting is not None:
+                    self._take_state(self._waiting)
+                if raw is None:
+                    spinner.rest()
         finally:
             self._report(at_once=True)
+            self._outputs.flush(_FLUSH_TIME)
             spinner.close()
 
     def _next_state(self) -> bytes | None:
@@ -189,14 +205,28 @@ class ControllerNode(Node):
             return
         if episode_ns is None:
             return  # the simulator publishes the state again
+        contacts = None if self._contacts is None else self._contacts.until(state.stamp_ns)
+        if self._contacts is not None and contacts is None:
+            self._waiting = raw
+            return  # the simulator publishes the contacts again, too
+        self._waiting = None
         self._check_rate(state)
         self._trajectories.take(state.stamp_ns, episode_ns)
+        self._strengths.take(state.stamp_ns, episode_ns)
         started = time.perf_counter()
-        effort, reference = self._controller.answer(state, episode_ns)
+        effort, reference = self._controller.answer(state, episode_ns, contacts)
         self._answer = self._outputs.answer(raw, state, effort, reference)
         self._answer_times.add(time.perf_counter() - started)
         self._counts["answered"] += 1
+        self._tell_mode()
         self._outputs.publish(self._answer)
+
+    def _tell_mode(self) -> None:
+        """Publish what it does, if that is new."""
+        mode = self._controller.mode
+        if mode is not None and mode is not self._told_mode:
+            self._told_mode = mode
+            self._outputs.publish_mode(mode)
 
     def _is_heard(self) -> bool:
         """Whether all who are to hear the first answer are there; later ones wait for nobody."""
@@ -240,7 +270,10 @@ class ControllerNode(Node):
         self._next_report = now + DIAGNOSTICS_PERIOD
         if self._diagnostics.is_heard:
             times = self._answer_times.percentiles_us("answer", (50, 99))
-            refused = {"refused_trajectories": self._trajectories.refused}
+            refused = {
+                "refused_trajectories": self._trajectories.refused,
+                "refused_strengths": self._strengths.refused,
+            }
             self._diagnostics.publish({**self._counts, **refused, **times})
 
     def _check_parameters(self, values: Values) -> None:

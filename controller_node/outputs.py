@@ -1,19 +1,23 @@
 """What the controller publishes."""
 
+import json
+import time
 from dataclasses import dataclass
 
 import numpy as np
-from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
+from rclpy.duration import Duration
 from rclpy.node import Node
-from std_msgs.msg import Header, String
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 from controller_node.actuation import net_wrench
+from controller_node.behaviours.base import ModeReport
+from controller_node.strength import Strengths
 from msgs_config import topics
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.joint_layout import JointLayout
-from msgs_config.messages import JointStateEncoder, split_stamp
+from msgs_config.messages import DoublesEncoder, JointStateEncoder, split_stamp
 from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.wrench_messages import WORLD
 
@@ -38,11 +42,14 @@ class Outputs:
         self._commanded = commanded
         self._torque_encoder = JointStateEncoder([layout.dof_names[entry] for entry in commanded])
         self._reference_encoder = JointStateEncoder(layout.dof_names)
+        self._wrench_encoder = DoublesEncoder(WORLD)
         self._references = topics.create_publisher(node, topics.REFERENCE)
         self._wrenches = topics.create_publisher(node, topics.NET_WRENCH)
         self._torques = topics.create_publisher(node, topics.JOINT_TORQUES)
         self._configurations = topics.create_publisher(node, topics.CONFIGURATION)
         self._trajectories = topics.create_publisher(node, topics.ACTIVE_TRAJECTORY)
+        self._strengths = topics.create_publisher(node, topics.ACTIVE_STRENGTH)
+        self._modes = topics.create_publisher(node, topics.MODE)
 
     @property
     def torque_subscribers(self) -> int:
@@ -59,7 +66,8 @@ class Outputs:
         return Answer(raw, state, sent, torques, reference)
 
     def publish(self, answer: Answer) -> None:
-        """Publish an answer, the torques last: who has them has heard the rest."""
+        """Publish an answer, the torques first: the simulator goes on while the rest is made."""
+        self._torques.publish(answer.torques)
         if self._references.get_subscription_count():
             reference = answer.reference
             self._references.publish(
@@ -69,7 +77,13 @@ class Outputs:
             )
         if self._wrenches.get_subscription_count():
             self._wrenches.publish(self._net_wrench(answer))
-        self._torques.publish(answer.torques)
+
+    def flush(self, seconds: float) -> None:
+        """Wait until every subscriber has what was published, at the most `seconds`."""
+        deadline = time.monotonic() + seconds
+        for publisher in (self._torques, self._references, self._wrenches):
+            left = max(deadline - time.monotonic(), 0.0)
+            publisher.wait_for_all_acked(Duration(seconds=left))
 
     def publish_configuration(self, text: str) -> None:
         """Publish what the controller is and has in force, as JSON."""
@@ -79,14 +93,20 @@ class Outputs:
         """Publish a trajectory that was taken, with the stamp that it begins at."""
         self._trajectories.publish(trajectory)
 
-    def _net_wrench(self, answer: Answer) -> WrenchStamped:
+    def publish_strengths(self, strengths: Strengths) -> None:
+        """Publish strengths that were taken, of every joint, with the stamp that they begin at."""
+        message = JointState()
+        message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(strengths.start_ns)
+        values = strengths.by_joint(self._layout)
+        message.name, message.effort = list(values), list(values.values())
+        self._strengths.publish(message)
+
+    def publish_mode(self, report: ModeReport) -> None:
+        """Publish what it does, since when and why, as JSON."""
+        self._modes.publish(String(data=json.dumps(report.content(), allow_nan=False)))
+
+    def _net_wrench(self, answer: Answer) -> bytes:
+        """The serialised message."""
         configuration = self._layout.configuration(answer.state.position)
         force, torque = net_wrench(self._layout, configuration, answer.effort)
-        seconds, nanoseconds = split_stamp(answer.state.stamp_ns)
-        header = Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=WORLD)
-        wrench = Wrench(force=Vector3(**_xyz(force)), torque=Vector3(**_xyz(torque)))
-        return WrenchStamped(header=header, wrench=wrench)
-
-
-def _xyz(vector: FloatArray) -> dict[str, float]:
-    return dict(zip("xyz", vector.tolist(), strict=True))
+        return self._wrench_encoder.encode(answer.state.stamp_ns, np.concatenate((force, torque)))

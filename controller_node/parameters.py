@@ -3,11 +3,14 @@
 import numpy as np
 
 from controller_node.balance import BalanceGains
+from controller_node.behaviours.make import choose_behaviour
+from controller_node.behaviours.settings import BEHAVIOUR_PARAMETERS
 from controller_node.controller import Controller, Settings
 from controller_node.effort_series import read_effort_series
 from controller_node.laws import LAWS, GainArrays
 from controller_node.motion import MOTION_PARAMETERS
 from controller_node.references.base import Reference
+from controller_node.strength import weakened
 from msgs_config.arrays import FloatArray
 from msgs_config.character import ROOT_TORQUE, Character
 from msgs_config.joint_layout import ROOT
@@ -24,6 +27,7 @@ PARAMETERS = [
         "feedforward", "", "the law feedforward's CSV file: time_s and degrees of freedom's efforts"
     ),
     *MOTION_PARAMETERS,
+    *BEHAVIOUR_PARAMETERS,
     Parameter(
         "root_assistance", True, "drive a floating base by the lecture's root force and torque"
     ),
@@ -104,6 +108,16 @@ def character_parameters(character: Character) -> list[Parameter]:
                 live=True,
             ),
         ]
+        if name not in (ROOT, ROOT_TORQUE):
+            parameters.append(
+                Parameter(
+                    f"strength.{name}",
+                    1.0,
+                    f"share of the gains and the effort limit of '{name}' that counts",
+                    maximum=1.0,
+                    live=True,
+                )
+            )
     return parameters
 
 
@@ -116,17 +130,35 @@ def make_settings(character: Character, values: Values) -> Settings:
         gains = []
         for name in character.vector_names:
             assists = name in (ROOT, ROOT_TORQUE)
-            scale = float(values.flag("root_assistance")) if assists else scales[kind]
+            scale = float(_assists(values)) if assists else scales[kind]
             gains.append(scale * values.number(f"gains.{name}.{kind}"))
         return np.repeat(np.array(gains), lengths)
 
     limits = [values.number(f"effort_limit.{name}") for name in character.vector_names]
+    gains = GainArrays(entries("p"), entries("d"), entries("i"), np.array(limits))
+    strengths = [
+        1.0 if name in (ROOT, ROOT_TORQUE) else values.number(f"strength.{name}")
+        for name in character.vector_names
+    ]
     return Settings(
-        law=values.text("law"),
-        gains=GainArrays(entries("p"), entries("d"), entries("i"), np.array(limits)),
+        law="zero" if _is_ragdoll(values) else values.text("law"),
+        gains=weakened(character.layout, gains, np.array(strengths)),
         follows_velocity=values.text("reference_velocity") == "clip",
-        balance=_balance_gains(values) if values.flag("balance") else None,
+        balance=_balance_gains(values) if _balances(values) else None,
     )
+
+
+def _balances(values: Values) -> bool:
+    return values.flag("balance") and not _is_ragdoll(values)
+
+
+def _is_ragdoll(values: Values) -> bool:
+    return values.text("behaviour") == "ragdoll"
+
+
+def _assists(values: Values) -> bool:
+    """Whether the root is driven; a ragdoll's is not."""
+    return values.flag("root_assistance") and not _is_ragdoll(values)
 
 
 def _balance_gains(values: Values) -> BalanceGains:
@@ -141,7 +173,7 @@ def make_controller(character: Character, reference: Reference, values: Values) 
     """The controller that the parameters' values say.
 
     Raises:
-        ActuatedCharactersError: a value is wrong, or the law's file cannot be used.
+        ActuatedCharactersError: a value is wrong, or a file or clip cannot be used.
     """
     path = values.text("feedforward")
     return Controller(
@@ -151,10 +183,11 @@ def make_controller(character: Character, reference: Reference, values: Values) 
         rate_hz=values.integer("rate"),
         gravity=values.number("gravity"),
         series=read_effort_series(character.layout, path) if path else None,
+        behaviour=choose_behaviour(character, values),
     )
 
 
 def commanded_joints(character: Character, values: Values) -> list[str]:
     """The joints that the controller commands: all that have a motor, and `root` if assisted."""
-    assisted = character.layout.has_floating_base and values.flag("root_assistance")
+    assisted = character.layout.has_floating_base and _assists(values)
     return [ROOT] * assisted + character.layout.actuated_joint_names

@@ -10,7 +10,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiment.commands.compare import add_compare
+from experiment.commands.export import add_export
+from experiment.commands.info import add_info
+from experiment.commands.reconstruct import add_reconstruct
+from experiment.commands.recover import add_recover
 from experiment.commands.render import add_render
+from experiment.commands.replay import add_replay
+from experiment.commands.report import add_report
 from experiment.commands.run import add_run
 from experiment.commands.study import add_study
 from msgs_config.errors import ActuatedCharactersError
@@ -29,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(number, _interrupt)
     try:
         options = _parser().parse_args(arguments)
-        options.command(options)
+        code = options.command(options)
     except (ActuatedCharactersError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_ERROR
@@ -38,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print("interrupted", file=sys.stderr)
         return _EXIT_INTERRUPTED
-    return 0
+    return int(code or 0)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
@@ -61,7 +68,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_run(commands)
+    add_reconstruct(commands)
     add_render(commands)
+    add_replay(commands)
+    add_info(commands)
+    add_report(commands)
+    add_compare(commands)
+    add_export(commands)
+    add_recover(commands)
     add_study(commands)
     listing = commands.add_parser("list", help="list the characters and their clips")
     listing.set_defaults(command=_list)

@@ -14,8 +14,10 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import RecordingError, RunError
 
 BAG, PARAMETERS, LOGS = "bag", "parameters", "logs"
+DAMAGED = BAG + ".damaged"  # what `recover` leaves beside the bag that it makes
 SUMMARY, SERIES, PLOT = "summary.json", "measurements.csv", "plot.png"
-STRIP = "strip.png"  # what `render` makes of the bag
+STRIP, VIDEO = "strip.png", "video.mp4"  # what `render` makes of the bag
+REPORT = "report"  # what `report` does
 
 
 def prepare_directory(directory: Path, *, overwrite: bool) -> None:
@@ -24,7 +26,7 @@ def prepare_directory(directory: Path, *, overwrite: bool) -> None:
     Raises:
         RunError: there are results and `overwrite` is not set, or files that no run has made.
     """
-    names = (BAG, PARAMETERS, LOGS, SUMMARY, SERIES, PLOT, STRIP)
+    names = (BAG, DAMAGED, PARAMETERS, LOGS, SUMMARY, SERIES, PLOT, STRIP, VIDEO, REPORT)
     results = [directory / name for name in names]
     try:
         present = set(directory.iterdir()) if directory.exists() else set()

@@ -19,7 +19,14 @@ COUNTS = {  # what the simulator says of it, and what it is called here
     "rejected": "rejected_commands",
     "duplicate": "duplicate_commands",
     "rejected_pushes": "rejected_pushes",
+    "rejected_throws": "rejected_throws",
 }
+HEARD = frozenset(
+    {CONFIGURATION, REFERENCE}
+    | {topic.name for topic in (topics.JOINT_STATES, topics.JOINT_TORQUES, topics.DIAGNOSTICS)}
+)
+"""The topics that are of any use for the figures."""
+
 _MOST_EARLY = 20_000  # messages
 
 

@@ -8,14 +8,18 @@ from controller_node.parameters import make_controller
 from experiment.metrics import Tick
 from experiment.plan import Plan
 from experiment.planned_push import PlannedPush
+from experiment.planned_throw import PlannedThrow
 from msgs_config.tick_clock import TickClock
 from sim_node.parameters import make_role, make_settings, push_ticks
 from sim_node.pushes import PushSchedule
 from sim_node.simulation import Simulation
+from sim_node.throwing import ThrowSchedule
 
 
-def ticks_in_process(plan: Plan, pushes: Sequence[PlannedPush] = ()) -> Iterator[Tick]:
-    """The ticks of a plan, one by one, with pushes.
+def ticks_in_process(
+    plan: Plan, pushes: Sequence[PlannedPush] = (), throws: Sequence[PlannedThrow] = ()
+) -> Iterator[Tick]:
+    """The ticks of a plan, one by one, with pushes and throws.
 
     The states are those of a run over topics, bit for bit.
 
@@ -34,14 +38,20 @@ def ticks_in_process(plan: Plan, pushes: Sequence[PlannedPush] = ()) -> Iterator
             first_tick=clock.first_tick_from(push.stamp_ns),
             ticks=push_ticks(plan.simulator),
         )
+    balls = ThrowSchedule()
+    for throw in throws:
+        balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))
     with Simulation([role], make_settings(plan.simulator)) as simulation:
+        simulation.watches_contacts = controller.needs_contacts
         (actor,) = simulation.actors
         episode_ns = actor.state.stamp_ns
         for _ in range(plan.ticks):
             state = actor.state
-            effort, reference = controller.answer(state, episode_ns)
+            touched = None if actor.contacts is None else actor.contacts.wrenches
+            effort, reference = controller.answer(state, episode_ns, touched)
             acting = schedule.take(simulation.tick)
-            simulation.step([np.where(actor.commanded, effort, 0.0)], [acting])
+            thrown = balls.take(simulation.tick)
+            simulation.step([np.where(actor.commanded, effort, 0.0)], [acting], thrown)
             following = actor.state
             assert following.effort is not None
             yield Tick(state, following, reference)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from controller_node import parameters as controller_parameters
 from controller_node.agreement import check_agreement
+from controller_node.behaviours.make import choose_behaviour
 from controller_node.dynamics import DynamicsModel
 from controller_node.motion import make_motion
 from controller_node.references.base import Reference
@@ -77,6 +78,7 @@ def make_plan(
         controller_given,
     )
     motion = make_motion(character, controller)
+    choose_behaviour(character, controller)  # it can be had
     first = motion.reference.sample(0.0)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {

@@ -1,58 +1,78 @@
-"""`pusher`: sends pushes that were planned before a run, each stamped for its tick."""
+"""`pusher`: sends pushes and throws that were planned before a run, each for its tick."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from rclpy.duration import Duration
 from rclpy.node import Node
 
 from experiment.planned_push import read_pushes
+from experiment.planned_throw import read_throws
 from msgs_config import topics
 from msgs_config.node_parameters import declare, given_parameters
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
+from msgs_config.throw_messages import ThrowCodec
+from msgs_config.topics import Topic
 from msgs_config.wrench_messages import encode_wrenches
 
 PARAMETERS = [
     Parameter("file", "pushes.json", "the pushes, as a run writes them"),
+    Parameter("throws", "", "the throws, as a run writes them; empty: none"),
     Parameter(
         "wait_for_subscribers", 1, "send when this many subscribe to external_wrench", maximum=1000
     ),
+    Parameter("throw_subscribers", 1, "likewise to throw", maximum=1000),
 ]
 
 _PATIENCE = Duration(seconds=10)  # until the simulator has what was sent
 
 
 class PusherNode(Node):
-    """Sends its pushes, and only then subscribes to the torques.
+    """Sends what was planned, and only then subscribes to the torques.
 
-    A controller that waits for that subscription answers no state before all pushes are there.
+    A controller that waits for that subscription answers no state before all of it is there.
     """
 
     def __init__(self) -> None:
-        """Read the pushes.
+        """Read the pushes and the throws.
 
         Raises:
-            ActuatedCharactersError: a parameter is wrong, or the file cannot be read.
+            ActuatedCharactersError: a parameter is wrong, or a file cannot be read.
         """
         super().__init__("pusher")
         values = resolve(PARAMETERS, given_parameters(self))
         declare(self, PARAMETERS, values)
-        self._wanted = values.integer("wait_for_subscribers")
-        self._pushes = read_pushes(Path(values.text("file")))
-        self._publisher = topics.create_publisher(self, topics.EXTERNAL_WRENCH)
+        pushes = read_pushes(Path(values.text("file")))
+        self._outboxes = [
+            _Outbox(
+                self,
+                topics.EXTERNAL_WRENCH,
+                [encode_wrenches(push.arrays()) for push in pushes],
+                values.integer("wait_for_subscribers"),
+            )
+        ]
+        if values.text("throws"):
+            throws, codec = read_throws(Path(values.text("throws"))), ThrowCodec()
+            self._outboxes.append(
+                _Outbox(
+                    self,
+                    topics.THROW,
+                    [codec.encode(each.stamp_ns, each.throw) for each in throws],
+                    values.integer("throw_subscribers"),
+                )
+            )
         self._torques: DirectSubscription | None = None
 
     def run(self, stop: StopSignal) -> None:
-        """Send as soon as they are heard, then be there until `stop`."""
+        """Send as soon as all is heard, then be there until `stop`."""
         spinner = Spinner(self)
         try:
             while not stop:
-                heard = self._publisher.get_subscription_count() >= self._wanted
-                if self._torques is None and heard:
-                    for push in self._pushes:
-                        self._publisher.publish(encode_wrenches(push.arrays()))
-                    self._publisher.wait_for_all_acked(_PATIENCE)
+                if self._torques is None and all(outbox.is_heard for outbox in self._outboxes):
+                    for outbox in self._outboxes:
+                        outbox.send()
                     self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
                 if self._torques is None or self._torques.take() is None:
                     spinner.rest()
@@ -60,3 +80,23 @@ class PusherNode(Node):
                     spinner.received()
         finally:
             spinner.close()
+
+
+class _Outbox:
+    """Serialised messages for one topic, and how many are to hear them."""
+
+    def __init__(self, node: Node, topic: Topic, messages: Sequence[bytes], wanted: int) -> None:
+        self._publisher = topics.create_publisher(node, topic)
+        self._messages = messages
+        self._wanted = wanted
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether all are there, or there is nothing to be heard."""
+        return not self._messages or self._publisher.get_subscription_count() >= self._wanted
+
+    def send(self) -> None:
+        """Send all; they have arrived when this returns."""
+        for message in self._messages:
+            self._publisher.publish(message)
+        self._publisher.wait_for_all_acked(_PATIENCE)

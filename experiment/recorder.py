@@ -2,77 +2,89 @@
 
 import time
 from pathlib import Path
+from typing import Any
 
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
+from experiment.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
 from experiment.bags.writer import BagWriter
 from experiment.figures import BAG, write_figures
-from experiment.listener import RunListener
+from experiment.listener import HEARD, RunListener
+from experiment.recorder_inbox import Inbox
+from experiment.recorder_topics import NamedTopics, RecordedTopic, contract_topics, simulator_name
 from msgs_config import topics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.node_parameters import declare, given_parameters
-from msgs_config.parameters import Parameter, resolve
-from msgs_config.polling import DirectSubscription, Spinner
+from msgs_config.parameters import Parameter, Values, resolve
+from msgs_config.polling import Spinner
 from msgs_config.process import StopSignal
 
 PARAMETERS = [
-    Parameter("directory", "recording", "where bag, summary.json and measurements.csv go"),
-    Parameter("write_bag", True, "write the bag; without it the recorder only measures"),
-    Parameter("contacts", False, "record what touched what at each tick, and with which wrenches"),
     Parameter(
-        "applied_wrench",
-        True,
-        "record what pushed at each tick, empty or not, which a run with pushes is repeated by",
+        "directory",
+        "recording",
+        "where bag, summary.json and measurements.csv go; the figures of each of the parameter "
+        "characters go to a folder of its name in there",
     ),
+    Parameter(
+        "characters",
+        [],
+        "characters that are recorded, each in a namespace of its own below the recorder's; none: "
+        "the one in the recorder's own namespace",
+        texts=True,
+    ),
+    Parameter("write_bag", True, "write the bag; without it the recorder only measures"),
+    Parameter("storage", MCAP, "how the bag is stored", choices=STORAGES),
+    Parameter("compression", NONE, "how the bag is compressed", choices=COMPRESSIONS),
+    Parameter("topics", [], "names of topics to record beside those of the contract", texts=True),
+    Parameter("exclude", [], "names of topics of the contract not to record", texts=True),
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
 _DRAIN_PERIOD = 0.004  # s between looks at the topics: one waking up for many messages
-
-# Each has a parameter of its name: the simulator works them out for who listens, at each tick.
-_COSTLY = [topics.CONTACTS, topics.APPLIED_WRENCH]
-
-# The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
-_TOPICS = [
-    topics.CLOCK,
-    topics.EPISODE,
-    topics.DIAGNOSTICS,
-    topics.CONFIGURATION.of(topics.SIM_NODE),
-    topics.CONFIGURATION.of(topics.CONTROLLER_NODE),
-    topics.EXTERNAL_WRENCH,
-    topics.REFERENCE.of(topics.CONTROLLER_NODE),
-    topics.JOINT_TORQUES,
-    topics.JOINT_STATES,
-]
+_FLUSH_PERIOD = 0.5  # s: what was published longer ago outlives even a kill of the recorder
+_SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
 
 
 class RecorderNode(Node):
     """Listens to everything and says nothing, so that it is never in the way of the loop."""
 
-    def __init__(self) -> None:
-        """Open the bag and the subscriptions.
+    def __init__(self, **options: Any) -> None:
+        """Open the bag and the subscriptions; `options` are rclpy's own of every node.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or the directory cannot be written to.
         """
-        super().__init__(topics.RECORDER_NODE)
+        super().__init__(topics.RECORDER_NODE, **options)
         values = resolve(PARAMETERS, given_parameters(self))
         declare(self, PARAMETERS, values)
         self._directory = Path(values.text("directory"))
         self._progress_period = values.number("progress_period")
-        self._bag = BagWriter(self._directory / BAG) if values.flag("write_bag") else None
-        self._listener = RunListener(self.resolve_topic_name(topics.SIM_NODE).lstrip("/"))
         self._failure: str | None = None
-        self._recorded_names: dict[str, str] = {}
-        self._published: dict[str, int] = {}  # ns of wall time, of each topic's last message
-        self._inboxes: list[tuple[str, DirectSubscription]] = []
-        wanted = [topic for topic in _COSTLY if values.flag(topic.name)]
-        for topic in wanted + _TOPICS:
-            resolved = self._recorded_names[topic.name] = self.resolve_topic_name(topic.name)
-            if self._bag is not None:
-                self._bag.add_topic(resolved, topic.message_type, topic.qos)
-            self._inboxes.append((topic.name, DirectSubscription(self, topic)))
-
+        self._inboxes: list[Inbox] = []
+        characters = values.texts("characters") or ("",)
+        wanted = contract_topics(
+            self, characters, values.texts("exclude"), measured_only=not values.flag("write_bag")
+        )
+        names = values.texts("topics")
+        self._named = NamedTopics(self, names, {recorded.name for recorded in wanted})
+        self._listeners = {name: RunListener(simulator_name(self, name)) for name in characters}
+        self._bag = self._open_bag(values)
+        for recorded in wanted:
+            self._add(recorded, recorded.topic.qos)
         self.get_logger().info(f"recording to {self._directory}")
+
+    def _open_bag(self, values: Values) -> BagWriter | None:
+        if not values.flag("write_bag"):
+            return None
+        storage, compression = values.text("storage"), values.text("compression")
+        return BagWriter(self._directory / BAG, storage=storage, compression=compression)
+
+    def _add(self, recorded: RecordedTopic, offered: QoSProfile) -> None:
+        """Record a topic from now on, whose publishers offer this."""
+        if self._bag is not None:
+            self._bag.add_topic(recorded.name, recorded.topic.message_type, offered)
+        self._inboxes.append(Inbox(self, recorded))
 
     def run(self, stop: StopSignal) -> None:
         """Record until `stop`, then take what is still on its way and write the figures.
@@ -81,50 +93,85 @@ class RecorderNode(Node):
             RecordingError: ticks were missing, or the bag could not be written.
         """
         spinner = Spinner(self)
-        next_progress = 0.0
+        due = {self._search: 0.0, self._flush: 0.0, self._tell_progress: 0.0}
         try:
             while not stop:
                 self._drain()
                 spinner.serve()
-                if self._progress_period > 0.0 and next_progress <= time.monotonic():
-                    next_progress = time.monotonic() + self._progress_period
-                    print(f"tick {self._listener.last_tick}", flush=True)
+                now = time.monotonic()
+                for act, at in due.items():
+                    if at <= now:
+                        due[act] = now + act()
                 time.sleep(_DRAIN_PERIOD)
             while self._drain():
                 pass
         finally:
             spinner.close()
             self._close_bag()
-        write_figures(self._directory, *self._listener.results())
-        if self._listener.missing_ticks:
-            raise RecordingError(f"{self._listener.missing_ticks} ticks were missed")
-        if self._failure is not None:
-            raise RecordingError(self._failure)
+        self._conclude()
+
+    def _search(self) -> float:
+        """Record topics whose first publisher has come; returns when to look again, s."""
+        for recorded, offered in self._named.look():
+            try:
+                self._add(recorded, offered)
+            except RecordingError as error:
+                self._fail(str(error))
+        return _SEARCH_PERIOD if self._named.missing else float("inf")
+
+    def _flush(self) -> float:
+        if self._bag is not None:
+            try:
+                self._bag.flush()
+            except RecordingError as error:
+                self._lose_bag(error)
+            else:
+                if self._progress_period > 0.0:
+                    print(f"flushed {self._last_tick}", flush=True)
+        return _FLUSH_PERIOD
+
+    def _tell_progress(self) -> float:
+        if self._progress_period == 0.0:
+            return float("inf")
+        print(f"tick {self._last_tick}", flush=True)
+        return self._progress_period
+
+    @property
+    def _last_tick(self) -> int:
+        """The last tick of which every character's state has come."""
+        return min(listener.last_tick for listener in self._listeners.values())
 
     def _drain(self) -> int:
         """Take all messages that are there, in the order in which they were published."""
-        batch = []
-        for name, inbox in self._inboxes:
-            while (received := inbox.take_stamped()) is not None:
-                # the wall clock may be set back; a topic's own order stays
-                self._published[name] = max(received[1], self._published.get(name, 0))
-                batch.append((self._published[name], name, received[0]))
+        batch = [
+            (published_ns, inbox.recorded, raw)
+            for inbox in self._inboxes
+            for published_ns, raw in inbox.take_all()
+        ]
         batch.sort(key=lambda message: message[0])
-        for published_ns, name, raw in batch:
-            self._keep(name, raw, published_ns)
+        for published_ns, recorded, raw in batch:
+            self._keep(recorded, raw, published_ns)
         return len(batch)
 
-    def _keep(self, name: str, raw: bytes, published_ns: int) -> None:
+    def _keep(self, recorded: RecordedTopic, raw: bytes, published_ns: int) -> None:
         try:
             if self._bag is not None:
-                self._bag.write(self._recorded_names[name], raw, published_ns)
+                self._bag.write(recorded.name, raw, published_ns)
         except RecordingError as error:  # the run goes on, and is measured, without its bag
-            self._fail(str(error))
-            self._bag = None
-        try:
-            self._listener.take(name, raw, published_ns)
-        except ActuatedCharactersError as error:
-            self._fail(f"cannot measure '{name}': {error}")
+            self._lose_bag(error)
+        if recorded.own_name not in HEARD:
+            return
+        for name, listener in self._listeners.items():
+            if recorded.character not in (None, name):
+                continue
+            try:
+                listener.take(recorded.own_name, raw, published_ns)
+            except ActuatedCharactersError as error:
+                self._fail(f"cannot measure '{recorded.name}': {error}")
+
+    def _lose_bag(self, error: RecordingError) -> None:
+        self._fail(str(error))
+        self._bag = None
 
     def _close_bag(self) -> None:
         try:
@@ -132,6 +179,38 @@ class RecorderNode(Node):
                 self._bag.close()
         except RecordingError as error:
             self._fail(str(error))
+
+    def _conclude(self) -> None:
+        """Write the figures and say what was lost.
+
+        Raises:
+            RecordingError: something failed, or states are missing.
+        """
+        for inbox in self._inboxes:
+            if inbox.lost:
+                self.get_logger().warning(f"'{inbox.recorded.name}': {inbox.lost} messages lost")
+        for name in sorted(self._named.missing):
+            self.get_logger().warning(f"nobody published on '{name}'")
+        for name, listener in self._listeners.items():
+            of_it = f" of '{name}'" if name else ""
+            try:
+                figures, series = listener.results()
+                lost = {"lost_messages": self._lost_messages(name)}
+                write_figures(self._directory / name, figures | lost, series)
+            except RecordingError as error:
+                self._fail(f"{error}{of_it}")
+            if listener.missing_ticks:
+                self._fail(f"{listener.missing_ticks} ticks{of_it} were missed")
+        if self._failure is not None:
+            raise RecordingError(self._failure)
+
+    def _lost_messages(self, character: str) -> dict[str, int]:
+        """By topic of a character, how many messages were lost; those of which none was are not."""
+        return {
+            inbox.recorded.name: inbox.lost
+            for inbox in self._inboxes
+            if inbox.lost and inbox.recorded.character in (None, character)
+        }
 
     def _fail(self, sentence: str) -> None:
         if self._failure is None:

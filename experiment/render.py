@@ -1,22 +1,19 @@
 """Pictures of a recorded run, or of any poses: single ones and strips of several."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
 from experiment.bags.recording import Recording
+from experiment.captions import captioned
+from experiment.scene import make_scene, nearest_rows
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, RecordingError
-from msgs_config.parameters import resolve
 from sim_node.camera import DEFAULT_SIZE, Camera, Picture
-from sim_node.parameters import WORLD_PARAMETERS, make_settings
 from sim_node.stage import Size
 from sim_node.world import WorldSettings
 
@@ -28,21 +25,22 @@ _NARROWEST, _WIDEST = 0.5, 1.6  # width over height, where nothing else is said
 _COLUMNS = 8  # at the most, where nothing else is said
 _GAP = 3  # pixels between pictures
 _WHITE = 255
-_CAPTION_SHARE = 15  # a caption's height is one part in so many of its picture's ...
-_LEAST_CAPTION = 16  # ... but not less than so many pixels
-_DPI = 72  # so that a point is a pixel
 
 Progress = Callable[[int], None]
 """Is told the number of pictures so far."""
 
 
 def render_still(
-    recording: Recording, time: float, *, size: Size = DEFAULT_SIZE, ghost: bool = False
+    recording: Recording | Sequence[Recording],
+    time: float,
+    *,
+    size: Size = DEFAULT_SIZE,
+    ghost: bool = False,
 ) -> Picture:
     """A picture (h, w, 3) of the state that is nearest to a time in s since the first state.
 
     Args:
-        recording: The run.
+        recording: The run, or those of several characters of one world.
         time: When.
         size: Width and height in pixels.
         ghost: Draw the reference, too, transparent.
@@ -55,7 +53,7 @@ def render_still(
 
 
 def strip(
-    recording: Recording,
+    recording: Recording | Sequence[Recording],
     times: Sequence[float] | int = 8,
     *,
     columns: int | None = None,
@@ -67,7 +65,7 @@ def strip(
     """Pictures of a run side by side, all of one scale; each follows the root along the ground.
 
     Args:
-        recording: The run.
+        recording: The run, or those of several characters of one world.
         times: When, s since the first state; or how many pictures, evenly from first to last.
         columns: Pictures in a row.
         ghost: Draw the reference, too, transparent, wherever there is one.
@@ -77,31 +75,33 @@ def strip(
 
     Raises:
         ConfigurationError: the recording does not reach to a time, or a size is not sensible.
-        RecordingError: a ghost is asked for, and there is no reference.
+        RecordingError: a ghost is asked for, and there is no reference; or the recordings are of
+            several worlds.
     """
-    rows = _rows(recording.times, times)
-    references = recording.reference_position
-    if ghost and np.isnan(references).any(axis=1).all():
+    scene = make_scene([recording] if isinstance(recording, Recording) else recording)
+    rows = _rows(scene.times, times)
+    if ghost and not scene.has_reference:
         raise RecordingError("the recording has no reference to draw")
-    world = _world(recording.parameters)
     return pose_strip(
-        recording.character,
-        recording.position[rows],
-        [f"{time:.2f} s" for time in recording.times[rows]] if labels else None,
-        ghosts=references[rows] if ghost else None,
+        scene.characters,
+        scene.position[rows],
+        [f"{time:.2f} s" for time in scene.times[rows]] if labels else None,
+        ghosts=scene.reference[rows] if ghost else None,
+        balls=[scene.balls(row) for row in rows.tolist()],
         columns=columns,
         size=size,
-        world=world,
+        world=WorldSettings(ground=scene.ground, terrain=scene.terrain),
         progress=progress,
     )
 
 
 def pose_strip(
-    character: Character,
+    character: Character | Sequence[Character],
     positions: FloatArray,
     captions: Sequence[str] | None = None,
     *,
     ghosts: FloatArray | None = None,
+    balls: Sequence[FloatArray] | None = None,
     columns: int | None = None,
     size: Size | None = None,
     world: WorldSettings | None = None,
@@ -110,10 +110,11 @@ def pose_strip(
     """Pictures (h, w, 3) of a character side by side, all of one scale.
 
     Args:
-        character: The character.
+        character: The character, or several; then positions are theirs one after the other.
         positions: Where it is in each picture (p, n), message form.
         captions: What stands above each picture (p,).
         ghosts: Where its transparent copy is in each picture (p, n); NaN draws none.
+        balls: Centres and radii (m, 4) of the balls in each picture (p,), m in the world.
         columns: Pictures in a row; by default all, up to 8.
         size: Width and height of each picture in pixels; by default as suits the poses.
         world: Says what there is besides; by default the plane z = 0.
@@ -133,20 +134,22 @@ def pose_strip(
     with Camera(character, ground=world.ground, terrain=world.terrain) as camera:
         no_ghosts = np.full_like(positions, np.nan)
         ghosts = no_ghosts if ghosts is None else np.atleast_2d(ghosts)
-        has_ghost: BoolArray = np.logical_and.reduce(np.isfinite(ghosts), axis=1)
-        seen = np.concatenate((positions, ghosts[has_ghost]))
+        is_known = np.isfinite(ghosts)
+        has_ghost: BoolArray = np.logical_or.reduce(is_known, axis=1)
+        seen = np.concatenate((positions, ghosts[np.logical_and.reduce(is_known, axis=1)]))
         size = _natural_size(camera, seen) if size is None else size
-        _check_size(size, count)
+        check_size(size, count)
         view = camera.view(seen, size=size)
         tiles = []
         for row, position in enumerate(positions):
             picture = camera.picture(
                 position,
                 ghost=ghosts[row] if has_ghost[row] else None,
+                balls=np.zeros((0, 4)) if balls is None else balls[row],
                 view=camera.followed(view, positions[0], position),
                 size=size,
             )
-            tiles.append(picture if captions is None else _captioned(picture, captions[row]))
+            tiles.append(picture if captions is None else captioned(picture, captions[row]))
             if progress is not None:
                 progress(row + 1)
     return _side_by_side(tiles, columns or min(count, _COLUMNS))
@@ -178,15 +181,7 @@ def _rows(known: FloatArray, times: Sequence[float] | int) -> IntArray:
     for time in wanted.tolist():
         if not 0.0 <= time <= end:
             raise ConfigurationError(f"time {time:g} s is not in the recording: 0 to {end:g} s")
-    rows: IntArray = np.abs(known[:, np.newaxis] - wanted).argmin(axis=0)
-    return rows
-
-
-def _world(parameters: Mapping[str, Any]) -> WorldSettings:
-    """What lay there in a run; of the simulator's parameters those that are unbounded are null."""
-    names = {parameter.name for parameter in WORLD_PARAMETERS}
-    given = {k: v for k, v in parameters.items() if k in names and v is not None}
-    return make_settings(resolve(WORLD_PARAMETERS, given)).world
+    return nearest_rows(known, wanted)
 
 
 def _natural_size(camera: Camera, positions: FloatArray) -> Size:
@@ -194,7 +189,8 @@ def _natural_size(camera: Camera, positions: FloatArray) -> Size:
     return round(aspect * _TILE_HEIGHT), _TILE_HEIGHT
 
 
-def _check_size(size: Size, count: int) -> None:
+def check_size(size: Size, count: int) -> None:
+    """Check the size of so many pictures; raises ConfigurationError if it is not sensible."""
     width, height = size
     if not all(SMALLEST <= edge <= LARGEST for edge in size):
         raise ConfigurationError(
@@ -206,18 +202,6 @@ def _check_size(size: Size, count: int) -> None:
             f"{count} pictures of {width}x{height} have more than {_MOST_PIXELS >> 20} million "
             "pixels in all; take fewer or smaller ones"
         )
-
-
-def _captioned(picture: Picture, caption: str) -> Picture:
-    """A picture with a line of text above it."""
-    height, width, _ = picture.shape
-    line = max(_LEAST_CAPTION, height // _CAPTION_SHARE)
-    figure = Figure(figsize=((width + 0.5) / _DPI, (line + 0.5) / _DPI), dpi=_DPI)
-    canvas = FigureCanvasAgg(figure)
-    figure.text(0.5, 0.5, caption, ha="center", va="center", fontsize=0.7 * line)
-    canvas.draw()
-    text = np.asarray(canvas.buffer_rgba())[:, :, :3]
-    return np.concatenate((text, picture))
 
 
 def _side_by_side(tiles: Sequence[Picture], columns: int) -> Picture:

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from experiment.loop import ticks_in_process
 from experiment.metrics import Measurement
 from experiment.plan import Plan
 from experiment.planned_push import PlannedPush, write_pushes
+from experiment.planned_throw import PlannedThrow, write_throws
 from experiment.processes import Child, Children
 from msgs_config import configuration
 from msgs_config.errors import RunError
@@ -19,6 +20,7 @@ from msgs_config.errors import RunError
 _START_PATIENCE = 120.0  # s until the first answer, on a machine that may be busy with other things
 _POLL_PERIOD = 0.05  # s
 _IN_PROCESS_REPORT = 100  # ticks between reports of progress
+_NOTHING_GIVEN: Mapping[str, object] = {}
 
 Progress = Callable[[int], None]
 """Is told the number of ticks so far."""
@@ -30,16 +32,18 @@ def run_over_topics(
     *,
     write_bag: bool,
     progress: Progress,
-    contacts: bool = False,
+    recording: Mapping[str, object] = _NOTHING_GIVEN,
     pushes: Sequence[PlannedPush] = (),
+    throws: Sequence[PlannedThrow] = (),
 ) -> None:
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
-    With `contacts` the bag holds what touched what, too. The pushes are sent by one more process;
-    in lockstep all are there before the first tick.
+    `recording` has parameters of the recorder: how the bag is stored, topics more or fewer. Pushes
+    and throws are sent by one more process; in lockstep all are there before the first tick.
 
     Raises:
-        RunError: one of the processes failed, with its own message, or a push came too late.
+        RunError: one of the processes failed, with its own message, or what was planned came too
+            late.
     """
     with _environment(directory) as environment, Children() as children:
 
@@ -50,21 +54,22 @@ def run_over_topics(
             return children.start(lambda: Child(name, module, arguments, log, environment))
 
         listening = {
+            **recording,
             "directory": str(directory),
             "write_bag": write_bag,
-            "contacts": contacts,
             "progress_period": 0.1,
         }
         recorder = start("recorder", "experiment.recorder_main", listening)
         # both must be there before the first answer, lest a tick go unrecorded
         both = ("-p", "wait_for_subscribers:=2")
-        all_three = ("-p", f"wait_for_subscribers:={3 if pushes else 2}")
+        all_three = ("-p", f"wait_for_subscribers:={3 if pushes or throws else 2}")
         others = [recorder]
-        if pushes:
-            file = directory / PARAMETERS / "pushes.json"
-            write_pushes(file, pushes)
-            sending = {"file": str(file)}
-            others.insert(0, start("pusher", "experiment.pusher_main", sending, *both))
+        if pushes or throws:
+            sending = _planned_files(directory, pushes, throws)
+            excluded = recording.get("exclude", ())
+            assert isinstance(excluded, Collection)
+            sending |= _planned_listeners(write_bag, excluded)
+            others.insert(0, start("pusher", "experiment.pusher_main", sending))
         others.insert(
             0, start("controller_node", "controller_node.main", plan.controller, *all_three)
         )
@@ -75,8 +80,32 @@ def run_over_topics(
     recorded, _ = read_figures(directory)
     if recorded["ticks"] != plan.ticks:
         raise RunError(f"{recorded['ticks']} of {plan.ticks} ticks were recorded")
-    if pushes and recorded["rejected_pushes"]:
-        raise RunError(f"sim_node refused {recorded['rejected_pushes']} of {len(pushes)} pushes")
+    for what, planned in (("pushes", pushes), ("throws", throws)):
+        refused = recorded[f"rejected_{what}"]
+        if planned and refused:
+            raise RunError(f"sim_node refused {refused} of {len(planned)} {what}")
+
+
+def _planned_files(
+    directory: Path, pushes: Sequence[PlannedPush], throws: Sequence[PlannedThrow]
+) -> dict[str, object]:
+    """Write what was planned; the sender's parameters that say where it is."""
+    folder = directory / PARAMETERS
+    write_pushes(folder / "pushes.json", pushes)
+    write_throws(folder / "throws.json", throws)
+    return {"file": str(folder / "pushes.json"), "throws": str(folder / "throws.json")}
+
+
+def _planned_listeners(write_bag: bool, excluded: Collection[str]) -> dict[str, object]:
+    """How many listen to what is sent: the simulator, and a recorder that keeps it in a bag."""
+    left_out = {str(name).removeprefix("/") for name in excluded} if write_bag else None
+    return {
+        parameter: 1 + int(left_out is not None and topic not in left_out)
+        for parameter, topic in (
+            ("wait_for_subscribers", "external_wrench"),
+            ("throw_subscribers", "throw"),
+        )
+    }
 
 
 @contextmanager
@@ -123,7 +152,12 @@ def _last_tick(output: str) -> int | None:
 
 
 def run_in_process(
-    plan: Plan, directory: Path, *, progress: Progress, pushes: Sequence[PlannedPush] = ()
+    plan: Plan,
+    directory: Path,
+    *,
+    progress: Progress,
+    pushes: Sequence[PlannedPush] = (),
+    throws: Sequence[PlannedThrow] = (),
 ) -> None:
     """Run the same simulation and controller as one loop without ROS; figures in a directory.
 
@@ -135,7 +169,7 @@ def run_in_process(
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     measurement = Measurement(known)
     started = time.perf_counter()
-    for count, tick in enumerate(ticks_in_process(plan, pushes), start=1):
+    for count, tick in enumerate(ticks_in_process(plan, pushes, throws), start=1):
         if count == 1:
             measurement.add_state(tick.state)
         measurement.add_state(tick.following)
@@ -143,7 +177,8 @@ def run_in_process(
         if count % _IN_PROCESS_REPORT == 0:
             progress(count)
     figures = measurement.summary(wall_time=time.perf_counter() - started)
-    counts = {"rejected_commands": 0, "duplicate_commands": 0, "rejected_pushes": 0}
-    counts["missing_ticks"] = 0
-    summary = {"character": known.character} | figures | counts
+    counts = {"rejected_commands": 0, "duplicate_commands": 0}
+    counts |= {"rejected_pushes": 0, "rejected_throws": 0}
+    losses: dict[str, object] = {"missing_ticks": 0, "lost_messages": {}}
+    summary = {"character": known.character} | figures | counts | losses
     write_figures(directory, summary, measurement.series())

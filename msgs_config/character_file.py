@@ -92,10 +92,25 @@ def read_character_file(name_or_path: str) -> CharacterFile:
         CharacterError: names the file, the key and what would be right.
     """
     path = character_path(name_or_path)
-    if path.suffix == ".urdf":
-        text, content = "", {"urdf": path.name}
-    else:
-        text = files.read_text(path, CharacterError)
+    alone = path.suffix == ".urdf"
+    return _parse(path, "" if alone else files.read_text(path, CharacterError), None)
+
+
+def read_character_texts(path: Path, text: str, urdf: Path, urdf_text: str) -> CharacterFile:
+    """A character's file from the texts that it once had; `text` is empty for a URDF alone.
+
+    `urdf_text` is that of a `Loading`, with the bounds of the character's file in it. `path` and
+    `urdf` are where the two lay; of what lies there now, only the meshes are read.
+
+    Raises:
+        CharacterError: names the file, the key and what would be right.
+    """
+    return _parse(path, text, (urdf, urdf_text))
+
+
+def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFile:
+    content: dict[str, Any] = {"urdf": path.name}
+    if text or path.suffix != ".urdf":
         content = files.parse_yaml_mapping(path, text, CharacterError)
     reader = _Reader(path, content)
     reader.check_keys(_KEYS)
@@ -109,7 +124,7 @@ def read_character_file(name_or_path: str) -> CharacterFile:
         name=path.stem,
         path=path,
         text=text,
-        loading=_loading(reader, joints),
+        loading=_loading(reader, joints, urdf),
         up_axis=reader.choice("up_axis", ["z", "y"]),
         rest_pose={name: rest_pose.number(name) for name in rest_pose.content},
         gains={name: joint.gains() for name, joint in joints.items()},
@@ -127,9 +142,15 @@ def read_character_file(name_or_path: str) -> CharacterFile:
     )
 
 
-def _loading(reader: "_Reader", joints: dict[str, "_Reader"]) -> Loading:
-    urdf = reader.path_of("urdf")
-    text = files.read_text(urdf, CharacterError)
+def _loading(
+    reader: "_Reader", joints: dict[str, "_Reader"], known: tuple[Path, str] | None
+) -> Loading:
+    """How the URDF is to be read; `known` are its path and its text, bounds and all."""
+    if known is None:
+        urdf = reader.path_of("urdf")
+        text = files.read_text(urdf, CharacterError)
+    else:
+        urdf, text = known
     robot = check_urdf(urdf, text)
     scale = reader.number("scale", default=1.0, minimum=1e-6)
     bounds = {
@@ -139,7 +160,7 @@ def _loading(reader: "_Reader", joints: dict[str, "_Reader"]) -> Loading:
     }
     return Loading(
         urdf_path=urdf,
-        urdf_text=with_bounds(robot, bounds, scale, reader.file) if bounds else text,
+        urdf_text=text if known or not bounds else with_bounds(robot, bounds, scale, reader.file),
         scale=scale,
         fixed_base=reader.flag("fixed_base", default=has_world_base(robot)),
         inertia_from_file=reader.choice("inertia", ["file", "shapes"]) == "file",

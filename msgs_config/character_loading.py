@@ -46,7 +46,15 @@ def load_character(name_or_path: str) -> Character:
     Raises:
         CharacterError: no such character, or its file or URDF cannot be used; says why.
     """
-    file = read_character_file(name_or_path)
+    return make_character(read_character_file(name_or_path))
+
+
+def make_character(file: CharacterFile) -> Character:
+    """The character that a file and its URDF describe.
+
+    Raises:
+        CharacterError: the two do not fit each other, or a mesh cannot be used; says why.
+    """
     urdf = file.loading.urdf_path
     robot = files.parse_xml(urdf, file.loading.urdf_text, CharacterError)
     resolve_meshes(robot, urdf)

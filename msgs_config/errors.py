@@ -47,6 +47,10 @@ class RecordingError(ActuatedCharactersError):
     """A recording cannot be written or read."""
 
 
+class ReplayError(ActuatedCharactersError):
+    """What was recorded did not come again; says where it differs first."""
+
+
 class RunError(ActuatedCharactersError):
     """A run could not be started, or one of its processes failed."""
 

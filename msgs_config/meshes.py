@@ -1,12 +1,15 @@
 """The mesh files of a URDF: found by their names, which are made absolute."""
 
-from collections.abc import Iterator
+import hashlib
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 
 from msgs_config import files
+from msgs_config.character import Loading
 from msgs_config.errors import CharacterError
 
 MAX_MESH_BYTES = 64 * 1024 * 1024
@@ -24,6 +27,44 @@ def resolve_meshes(robot: ElementTree.Element, urdf: Path) -> None:
                 mesh.set("filename", str(_find(mesh.get("filename", ""), urdf)))
             except CharacterError as error:
                 raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
+
+
+def collision_meshes(loading: Loading) -> dict[str, str]:
+    """SHA-256 of each mesh that is collided with, hexadecimal, by the name that the URDF gives it.
+
+    Raises:
+        CharacterError: a mesh does not exist or cannot be read.
+    """
+    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
+    names = {mesh.get("filename", "") for mesh in robot.iterfind("link/collision//mesh")}
+    return {name: _hash_of(_find(name, loading.urdf_path)) for name in sorted(names)}
+
+
+def check_collision_meshes(loading: Loading, known: Mapping[str, str]) -> None:
+    """Check that the meshes are those whose hashes are known; see `collision_meshes`.
+
+    Raises:
+        CharacterError: one is missing or another one; names its path.
+    """
+    for name, digest in collision_meshes(loading).items():
+        if known.get(name, digest) != digest:
+            path = _find(name, loading.urdf_path)
+            raise CharacterError(f"mesh {path} is not the one that it was: its content differs")
+
+
+def _hash_of(path: Path) -> str:
+    try:
+        status = path.stat()
+        return _hash_of_version(path, status.st_mtime_ns, status.st_size)
+    except OSError as error:
+        raise CharacterError(f"mesh {path}: {error.strerror}") from error
+
+
+@cache
+def _hash_of_version(path: Path, modified_ns: int, size: int) -> str:
+    """Once for each version of a file: a node says it anew when its parameters change."""
+    del modified_ns, size
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _find(name: str, urdf: Path) -> Path:

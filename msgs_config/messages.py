@@ -130,6 +130,24 @@ class JointStateEncoder:
         return bytes(content)
 
 
+class DoublesEncoder:
+    """Serialises messages of a stamp, texts that never change and, after all else, doubles.
+
+    So are `nav_msgs/Odometry` and `geometry_msgs/WrenchStamped`.
+    """
+
+    def __init__(self, *texts: str) -> None:
+        """The texts in the message's order, its `frame_id` first."""
+        head = CDR_LITTLE_ENDIAN + bytes(8) + b"".join(_cdr_text(text) for text in texts)
+        self._head = head + bytes(padding(len(head) - 4, 8))
+
+    def encode(self, stamp_ns: int, values: FloatArray) -> bytes:
+        """The serialised message with all its doubles (m,), in the message's order."""
+        content = bytearray(self._head)
+        struct.pack_into("<iI", content, 4, *split_stamp(stamp_ns))
+        return bytes(content + values.tobytes())
+
+
 def encode_clock(stamp_ns: int) -> bytes:
     """A serialised rosgraph_msgs/Clock."""
     return CDR_LITTLE_ENDIAN + struct.pack("<iI", *split_stamp(stamp_ns))

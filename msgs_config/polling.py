@@ -9,6 +9,7 @@ while the loop blocks in the executor, and an idle node costs nothing.
 import os
 import time
 from collections import deque
+from typing import NamedTuple
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
@@ -23,12 +24,23 @@ _MOST_TURNS = 50  # of the executor in a row, which has one callback a turn
 _PATIENCE = 0.003  # s of taking turns with other processes before the loop blocks
 
 
+class Received(NamedTuple):
+    """A serialised message as it came."""
+
+    raw: bytes
+    published_ns: int  # wall time
+    number: int | None  # that its publisher gave it, from 1 on; None where the middleware has none
+
+
 class DirectSubscription:
     """A subscription whose serialised messages a loop takes one by one, oldest first."""
 
-    def __init__(self, node: Node, topic: Topic) -> None:
+    def __init__(
+        self, node: Node, topic: Topic, events: SubscriptionEventCallbacks | None = None
+    ) -> None:
+        """Subscribe; with `events` also to what the middleware says of the subscription."""
         # as many as the middleware keeps, and like it the newest, lest a flood fill the memory
-        self._pending: deque[tuple[bytes, int]] = deque(maxlen=topic.qos.depth)
+        self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
         # When the loop blocks in the executor, it is the executor that takes the message. It
         # hands a callback of two arguments the message's info too, which rclpy's types leave out.
         self._subscription = node.create_subscription(
@@ -38,25 +50,29 @@ class DirectSubscription:
             topic.qos,
             raw=True,
             # not one thing more for the executor to look at in each turn; `waiting.py` says it
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            event_callbacks=events or SubscriptionEventCallbacks(use_default_callbacks=False),
         )
 
     def _keep(self, raw: bytes, info: dict[str, int]) -> None:
-        self._pending.append((raw, info["source_timestamp"]))
+        self._pending.append(_received(raw, info))
 
     def take(self) -> bytes | None:
         """The next serialised message; None if there is none now."""
-        received = self.take_stamped()
-        return None if received is None else received[0]
+        received = self.take_received()
+        return None if received is None else received.raw
 
-    def take_stamped(self) -> tuple[bytes, int] | None:
-        """The next serialised message and when it was published, ns of wall time; or None."""
+    def take_received(self) -> Received | None:
+        """The next message with when it was published, and its number; None if there is none."""
         if self._pending:
             return self._pending.popleft()
         handle = self._subscription.handle
         with handle:
             taken = handle.take_message(self._subscription.msg_type, True)
-        return None if taken is None else (taken[0], taken[1]["source_timestamp"])
+        return None if taken is None else _received(*taken)
+
+
+def _received(raw: bytes, info: dict[str, int]) -> Received:
+    return Received(raw, info["source_timestamp"], info.get("publication_sequence_number"))
 
 
 class Spinner:

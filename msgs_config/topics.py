@@ -24,6 +24,11 @@ STREAM_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
+_LISTENING_DEPTH = 50_000
+"""What a reader keeps for a process that is busy otherwise, with a disk for instance, for long.
+
+It costs nothing until it is needed, unlike a publisher's."""
+
 LATCHED_QOS = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=1,
@@ -31,9 +36,9 @@ LATCHED_QOS = QoSProfile(
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 
-DISPLAY_QOS = QoSProfile(
+DISPLAY_QOS = QoSProfile(  # a viewer's own depth may be 1; a recorder's is not
     history=HistoryPolicy.KEEP_LAST,
-    depth=1,
+    depth=1000,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
@@ -55,6 +60,16 @@ class Topic:
         """The topic below a namespace; with an empty one it is the topic itself."""
         return replace(self, name=f"{namespace}/{self.name}") if namespace else self
 
+    def for_listener(self) -> "Topic":
+        """The topic for who must not miss anything, however seldom it takes what has come."""
+        qos = QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=_LISTENING_DEPTH,
+            reliability=self.qos.reliability,
+            durability=self.qos.durability,
+        )
+        return replace(self, qos=qos)
+
 
 def create_publisher(node: Node, topic: Topic) -> Publisher:
     """A node's publisher on a topic of the contract."""
@@ -72,6 +87,9 @@ JOINT_TORQUES = Topic("joint_torques", JointState, STREAM_QOS)
 EXTERNAL_WRENCH = Topic("external_wrench", MultiDOFJointState, STREAM_QOS)
 APPLIED_WRENCH = Topic("applied_wrench", MultiDOFJointState, STREAM_QOS)
 CONTACTS = Topic("contacts", MultiDOFJointState, STREAM_QOS)
+THROW = Topic("throw", JointState, STREAM_QOS)
+APPLIED_THROW = Topic("applied_throw", JointState, STREAM_QOS)
+THROWN = Topic("thrown", MultiDOFJointState, STREAM_QOS)
 ODOM = Topic("odom", Odometry, STREAM_QOS)
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED_QOS)
 VISUALIZATION = Topic("visualization", MarkerArray, DISPLAY_QOS)
@@ -79,6 +97,9 @@ REFERENCE = Topic("~/reference", JointState, STREAM_QOS)
 NET_WRENCH = Topic("~/net_wrench", WrenchStamped, STREAM_QOS)
 JOINT_TRAJECTORY = Topic("~/joint_trajectory", JointTrajectory, STREAM_QOS)
 ACTIVE_TRAJECTORY = Topic("~/active_trajectory", JointTrajectory, LATCHED_QOS)
+STRENGTH = Topic("~/strength", JointState, STREAM_QOS)
+ACTIVE_STRENGTH = Topic("~/active_strength", JointState, LATCHED_QOS)
+MODE = Topic("~/mode", String, LATCHED_QOS)
 CLOCK = Topic("/clock", Clock, STREAM_QOS)
 EPISODE = Topic("episode", Header, LATCHED_QOS)
 CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS)

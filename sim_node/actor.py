@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, SimulationError
 from msgs_config.stamped import StampedState
@@ -42,6 +42,17 @@ class Contacts:
     touching: BoolArray  # (links,)
 
 
+@dataclass(frozen=True)
+class ActorMemory:
+    """What an actor knows between two ticks, beside the engine."""
+
+    state: StampedState
+    contacts: Contacts | None
+    pushes: tuple[Push, ...]
+    delayed: tuple[FloatArray, ...]  # (n,) each, commands on their way
+    saturated_ticks: IntArray  # (b,)
+
+
 class Actor:
     """A character in a world."""
 
@@ -61,7 +72,7 @@ class Actor:
         self.layout = role.character.layout
         self.commanded: BoolArray = self.layout.mask(role.commanded_joints)
         self._limits = role.character.effort_limits()
-        self.saturated_ticks = np.zeros(len(self._limits), dtype=int)  # (b,) of each vector
+        self.saturated_ticks: IntArray = np.zeros(len(self._limits), dtype=np.intp)  # (b,)
         self._position = self._initial("initial_position", role.initial_position)
         self._velocity = self._initial("initial_velocity", role.initial_velocity)
         self._passive = make_passive_forces(role.character, step_s)
@@ -119,9 +130,29 @@ class Actor:
         """Read the state that the tick has led to."""
         self._read(stamp_ns, self._applied)
 
+    def memory(self) -> ActorMemory:
+        """What `recall` needs, to be taken between two ticks."""
+        return ActorMemory(
+            self.state,
+            self.contacts,
+            self.pushes,
+            tuple(self._delayed),
+            self.saturated_ticks.copy(),
+        )
+
+    def recall(self, memory: ActorMemory) -> None:
+        """Know again what was known then; the engine is restored by who owns it."""
+        self.state, self.contacts, self.pushes = memory.state, memory.contacts, memory.pushes
+        self._delayed = deque(memory.delayed)
+        self.saturated_ticks = memory.saturated_ticks.copy()
+
     def link_frames(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""
         return self._body.links.frames()
+
+    def base_frame(self) -> tuple[FloatArray, FloatArray]:
+        """Origin (3,) in m and orientation xyzw (4,) of the base link in the world."""
+        return self._body.links.base_frame()
 
     def check_divergence(self, tick: int, speed_limit: float) -> None:
         """Raise SimulationError if the state is not finite or faster than a limit."""

@@ -16,6 +16,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.bullet import load_urdf, pybullet
 from msgs_config.character import Character
 from msgs_config.joint_layout import JointType
+from sim_node import frames
 from sim_node.links import Links
 
 _UNLIMITED_SPEED = 1e9  # Bullet clamps at 100 otherwise, and a divergence would stay unseen
@@ -30,9 +31,9 @@ class Body:
         self._body = load_urdf(client, character.loading)
         self._floating = self._layout.has_floating_base
         base = character.links[0]
-        self._base_offset = np.array(base.inertial_pose.position)
+        self._base_offset = base.inertial_pose.position
         self._base_turn = np.array(base.inertial_pose.orientation_xyzw)
-        self._base_turn_back = rotations.conjugate(self._base_turn)
+        self._base_turn_back: list[float] = rotations.conjugate(self._base_turn).tolist()
         self._find_joints(character)
         self._remove_motors_and_damping(friction)
         if not self._floating:
@@ -103,8 +104,6 @@ class Body:
     def read(self) -> tuple[FloatArray, FloatArray]:
         """Position and velocity (n,), message form."""
         position, velocity = np.empty(self._layout.size), np.empty(self._layout.size)
-        if self._floating:
-            position[:6], velocity[:6] = self._read_base()
         states: tuple[Any, ...] = ()
         if self._joints:
             states = pybullet.getJointStatesMultiDof(
@@ -115,12 +114,17 @@ class Body:
         )
         position[self._scalar_entries] = joint_positions[self._scalar_columns]
         velocity[self._joint_start :] = list(chain.from_iterable(state[1] for state in states))
+        turns = joint_positions[self._ball_columns]
+        if self._floating:  # its rotation and the ball joints' are worked out together
+            position[:3], velocity[:6], base_turn = self._read_base()
+            turned = rotations.log(np.array((base_turn, *turns.tolist())))
+            position[3:6], turned = turned[0], turned[1:]
+        elif self._balls:
+            turned = rotations.log(turns)
         if self._balls:
-            turned = rotations.log(joint_positions[self._ball_columns])
-            position[self._ball_entries] = rotations.apply(self._ball_turns, turned)
-            velocity[self._ball_entries] = rotations.apply(
-                self._ball_turns, velocity[self._ball_entries]
-            )
+            motion = np.array((turned, velocity[self._ball_entries]))
+            motion = rotations.apply(self._ball_turns, motion)
+            position[self._ball_entries], velocity[self._ball_entries] = motion
         return position, velocity
 
     def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
@@ -173,49 +177,43 @@ class Body:
         pybullet.applyExternalForce(
             self._body, -1, force, origin, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
-        torque = rotations.apply(axes, torque_in_base)
+        torque = frames.to_parent(axes, torque_in_base.tolist())
         pybullet.applyExternalTorque(
             self._body, -1, torque, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
 
-    def _base_frame(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Origin (3,) in m, orientation xyzw (4,) and axes (3, 3) of the base link in the world."""
+    def _base_frame(self) -> tuple[frames.Triple, frames.Quaternion, frames.Axes]:
+        """Origin in m, orientation xyzw and axes of the base link in the world."""
         com, inertial_turn = pybullet.getBasePositionAndOrientation(
             self._body, physicsClientId=self._client
         )
-        turn = rotations.multiply(np.array(inertial_turn), self._base_turn_back)
-        axes = rotations.matrix(turn)
-        return com - rotations.apply(axes, self._base_offset), turn, axes
+        turn = frames.product(inertial_turn, self._base_turn_back)
+        axes = frames.axes(turn)
+        x, y, z = frames.to_parent(axes, self._base_offset)
+        return (com[0] - x, com[1] - y, com[2] - z), turn, axes
 
-    def _read_base(self) -> tuple[FloatArray, FloatArray]:
-        """Position and velocity (6,) of the floating base, message form."""
+    def _read_base(self) -> tuple[frames.Triple, tuple[float, ...], frames.Quaternion]:
+        """Origin, velocity (6,) and orientation xyzw of the floating base, message form."""
         origin, turn, axes = self._base_frame()
-        linear, angular = pybullet.getBaseVelocity(self._body, physicsClientId=self._client)
-        angular_in_base = rotations.apply(axes.T, np.array(angular))
-        position = np.concatenate((origin, rotations.log(turn)))
-        arm_velocity = rotations.apply(axes, _cross(angular_in_base, self._base_offset))
-        return position, np.concatenate((linear - arm_velocity, angular_in_base))
+        (vx, vy, vz), angular = pybullet.getBaseVelocity(self._body, physicsClientId=self._client)
+        angular_in_base = frames.to_child(axes, angular)
+        x, y, z = frames.to_parent(axes, frames.cross(angular_in_base, self._base_offset))
+        return origin, (vx - x, vy - y, vz - z, *angular_in_base), turn
 
     def _place_base(self, origin: FloatArray, turn_xyzw: FloatArray) -> None:
         pybullet.resetBasePositionAndOrientation(
             self._body,
-            origin + rotations.rotate(turn_xyzw, self._base_offset),
+            origin + rotations.rotate(turn_xyzw, np.array(self._base_offset)),
             rotations.multiply(turn_xyzw, self._base_turn),
             physicsClientId=self._client,
         )
 
     def _set_base_velocity(self, linear: FloatArray, angular_in_base: FloatArray) -> None:
         _, _, axes = self._base_frame()
+        angular = angular_in_base.tolist()
         pybullet.resetBaseVelocity(
             self._body,
-            linear + rotations.apply(axes, _cross(angular_in_base, self._base_offset)),
-            rotations.apply(axes, angular_in_base),
+            linear + frames.to_parent(axes, frames.cross(angular, self._base_offset)),
+            frames.to_parent(axes, angular),
             physicsClientId=self._client,
         )
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross product (3,); on three numbers each a fraction of the time of `numpy.cross`."""
-    ax, ay, az = a.tolist()
-    bx, by, bz = b.tolist()
-    return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))

@@ -30,13 +30,12 @@ def read_contacts(client: int) -> TouchedLinks:
     # of all bodies: asked for those of one, the engine lets it come first in each, and then
     # turns the normal round but not the friction
     for point in pybullet.getContactPoints(physicsClientId=client):
-        distance, along, one, other = point[8], point[9], point[10], point[12]
+        _, body, body_b, link, link_b, at, at_b, normal, distance, along, one, a, other, b = point
         if distance > 0.0 and along == 0.0:
             continue  # near enough to be watched by the engine, but apart
-        force = [
-            along * n + one * a + other * b
-            for n, a, b in zip(point[7], point[11], point[13], strict=True)
-        ]
-        touched[point[1]].append(Touch(point[3], force, point[5]))
-        touched[point[2]].append(Touch(point[4], [-f for f in force], point[6]))
+        x = along * normal[0] + one * a[0] + other * b[0]  # written out: at each tick, of each
+        y = along * normal[1] + one * a[1] + other * b[1]
+        z = along * normal[2] + one * a[2] + other * b[2]
+        touched[body].append(Touch(link, (x, y, z), at))
+        touched[body_b].append(Touch(link_b, (-x, -y, -z), at_b))
     return touched

@@ -14,6 +14,8 @@ from msgs_config.character import Character
 from sim_node.contacts import TouchedLinks
 from sim_node.pushes import Push
 
+_FAR = 1e3  # m, beyond which the engine need not look for what is near
+
 
 class Links:
     """Reads and pushes the links of a body."""
@@ -36,6 +38,14 @@ class Links:
         centres, inertial_turns = self._inertial_frames()
         turns = rotations.multiply(inertial_turns, self._turns_back)
         return centres - rotations.rotate(turns, self._offsets), turns
+
+    def base_frame(self) -> tuple[FloatArray, FloatArray]:
+        """Origin (3,) in m and orientation xyzw (4,) of the base link in the world."""
+        centre, inertial_turn = pybullet.getBasePositionAndOrientation(
+            self._body, physicsClientId=self._client
+        )
+        turn = rotations.multiply(np.array(inertial_turn), self._turns_back[0])
+        return centre - rotations.rotate(turn, self._offsets[0]), turn
 
     def kinetic_energy(self) -> float:
         """Kinetic energy of all links, J, by the engine's own masses, inertia and velocities."""
@@ -89,7 +99,7 @@ class Links:
 
     def centres(self) -> FloatArray:
         """Centres of mass (links, 3) in the world, m."""
-        return self._inertial_frames()[0]
+        return np.array([state[0] for state in self._states()])
 
     def contact_wrenches(
         self, touched: TouchedLinks, centres: FloatArray
@@ -107,17 +117,41 @@ class Links:
             row = self._row[number]
             cx, cy, cz = origins[row]
             x, y, z = px - cx, py - cy, pz - cz
-            moment = (y * fz - z * fy, z * fx - x * fz, x * fy - y * fx)
-            sums[row] = [a + b for a, b in zip(sums[row], (fx, fy, fz, *moment), strict=True)]
+            total = sums[row]
+            total[0] += fx
+            total[1] += fy
+            total[2] += fz
+            total[3] += y * fz - z * fy
+            total[4] += z * fx - x * fz
+            total[5] += x * fy - y * fx
             touching[row] = True
         return np.array(sums), touching
 
+    def gaps(self, body: int) -> FloatArray:
+        """How far (links,) its surfaces are from another body's, m; inf where there is none."""
+        gaps = np.full(len(self._numbers), np.inf)
+        for point in pybullet.getClosestPoints(
+            self._body, body, distance=_FAR, physicsClientId=self._client
+        ):
+            row, distance = self._row[point[3]], point[8]
+            gaps[row] = min(gaps[row], distance)
+        return gaps
+
     def _inertial_frames(self) -> tuple[FloatArray, FloatArray]:
         """Centres of mass (links, 3) and orientations xyzw of the inertial frames."""
-        moving = self._numbers[1:]
-        states = [pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)]
-        if moving:
-            states += pybullet.getLinkStates(
-                self._body, moving, computeForwardKinematics=1, physicsClientId=self._client
-            )
+        states = self._states()
         return np.array([state[0] for state in states]), np.array([state[1] for state in states])
+
+    def _states(self) -> Sequence[tuple[Sequence[float], ...]]:
+        """What the engine says of each link: first of all where its inertial frame is."""
+        body, client = self._body, self._client
+        base = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
+        moving = self._numbers[1:]
+        if not moving:
+            return (base,)
+        return (
+            base,
+            *pybullet.getLinkStates(
+                body, moving, computeForwardKinematics=1, physicsClientId=client
+            ),
+        )

@@ -14,6 +14,8 @@ from msgs_config.parameters import Values
 from msgs_config.polling import Spinner
 from msgs_config.process import StopSignal
 from msgs_config.tick_clock import FIRST_TICK
+from msgs_config.warnings import Warnings
+from sim_node.back_pressure import BackPressure
 from sim_node.lockstep import LockstepBarrier, Verdict
 from sim_node.pace import Pace
 from sim_node.parameters import (
@@ -39,6 +41,7 @@ from sim_node.waiting import (
     describe_waiting,
     publisher_names,
 )
+from sim_node.world_port import WorldPort
 
 _EXPLAIN_AFTER = 2.0  # s without a complete command before the node says what is missing
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
@@ -63,6 +66,8 @@ class SimNode(Node):
         self._simulation = Simulation(roles, make_settings(values))
         declare(self, cast.declared, values)
         self._ports = open_ports(self, cast, self._simulation)
+        self._warnings = Warnings(self)
+        self._world_port = WorldPort(self, self._simulation, self._warnings)
         self._clock_topic = topics.create_publisher(self, topics.CLOCK)
         self._max_ticks = values.integer("max_ticks")
         self._patience = Patience(
@@ -71,6 +76,7 @@ class SimNode(Node):
             timeout=values.number("lockstep_timeout"),
         )
         self._pace = Pace(tick_period(values))
+        self._back_pressure = BackPressure(self._is_acknowledged)
         self._diagnostics = DiagnosticsPublisher(self)
         self._next_diagnostics = 0.0
         self._timeouts = 0
@@ -132,9 +138,24 @@ class SimNode(Node):
                 spinner.rest()
         elif wait := self._pace.wait(time.monotonic()):
             spinner.rest_for(wait)
+        elif self._is_held_back():
+            spinner.serve()
         else:
             self._advance()  # before the clock: a command that came in time is no timeout
         self._look_at_the_clock()
+
+    def _is_held_back(self) -> bool:
+        """Whether a subscriber is so far behind that it would lose messages; never in real time."""
+        if self._realtime:
+            return False
+        if self._back_pressure.holds(self._simulation.tick, time.monotonic()):
+            return True
+        if self._back_pressure.complaint is not None:
+            self._warnings.say_once(self._back_pressure.complaint)
+        return False
+
+    def _is_acknowledged(self, seconds: float) -> bool:
+        return all(port.outputs.flush(seconds) for port in self._ports)
 
     def _receive(self) -> bool:
         """Take one command a character, or all in real time; whether there was one."""
@@ -153,7 +174,8 @@ class SimNode(Node):
         """Publish the last report, and wait until every subscriber has all that was published."""
         self._publish_diagnostics()
         deadline = time.monotonic() + seconds
-        flushes = [port.outputs.flush for port in self._ports] + [self._diagnostics.flush]
+        flushes = [port.outputs.flush for port in self._ports]
+        flushes += [self._world_port.flush, self._diagnostics.flush]
         flushed = [flush(max(deadline - time.monotonic(), 0.0)) for flush in flushes]
         if not all(flushed):
             self.get_logger().warning("a subscriber has not acknowledged the last messages")
@@ -170,10 +192,13 @@ class SimNode(Node):
             port.open()
         self._patience.restart(time.monotonic())
         self._clock_topic.publish(encode_clock(self._simulation.stamp_ns))
+        self._world_port.publish()
         for port in self._ports:
-            port.outputs.publish_around(self._simulation.tick)
+            port.outputs.publish_before()
         for port in self._ports:
             port.outputs.publish_state()
+        for port in self._ports:
+            port.outputs.publish_display(self._simulation.tick)
 
     def _advance(self) -> None:
         simulation = self._simulation
@@ -182,11 +207,12 @@ class SimNode(Node):
         pushes = [
             port.take_pushes(simulation.clock, simulation.tick, ticks) for port in self._ports
         ]
+        throws = self._world_port.take_throws()
         for port in self._ports:
             port.last_effort = port.collector.effort
         simulation.watches_contacts = any(port.outputs.wants_contacts for port in self._ports)
         try:
-            simulation.step([port.last_effort for port in self._ports], pushes)
+            simulation.step([port.last_effort for port in self._ports], pushes, throws)
         except SimulationError as error:
             self._raise_fault(str(error), stuck=True)
             return
@@ -272,6 +298,7 @@ class SimNode(Node):
     def _reset(self) -> None:
         """Begin a new episode, now or when all who are waited for are there."""
         self._simulation.reset()
+        self._world_port.forget()
         for port in self._ports:
             port.forget()
         self._tick_times.resume()
@@ -296,7 +323,7 @@ class SimNode(Node):
             "paused": self._control.paused,
             "timeouts": self._timeouts,
         }
-        values |= self._tick_times.summary() | self._pace.summary()
+        values |= self._tick_times.summary() | self._pace.summary() | self._world_port.counts
         for port in self._ports:
             self._diagnostics.publish(
                 values | report(port), self._control.fault, below=port.actor.role.name

@@ -1,5 +1,7 @@
 """What the simulator publishes of one character, tick by tick."""
 
+import time
+
 from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -61,18 +63,13 @@ class Outputs:
         stamp = Time(sec=seconds, nanosec=nanoseconds)
         self._episode.publish(Header(stamp=stamp, frame_id=str(number)))
 
-    def publish_around(self, tick: int) -> None:
-        """Publish all of a tick but its state, which comes last."""
+    def publish_before(self) -> None:
+        """Publish what a controller may wait for beside a tick's state, which comes after it."""
         actor, stamp_ns = self._actor, self._actor.state.stamp_ns
-        if actor.contacts is not None and self.wants_contacts:
-            contacts = actor.contacts
-            touching = select(stamp_ns, self._links, contacts.wrenches, contacts.touching)
-            self._contacts.publish(encode_wrenches(touching))
+        if actor.contacts is not None:
+            self._publish_contacts()
         if self._wrenches.get_subscription_count():
             self._wrenches.publish(encode_wrenches(self._applied(stamp_ns)))
-        self._display.publish_base()
-        if tick % self._display_ticks == 0 or actor.state.effort is None:
-            self._display.publish_markers()
 
     def publish_state(self) -> None:
         """Publish the state of a tick."""
@@ -83,15 +80,40 @@ class Outputs:
         )
         self._states.publish(self._last_state)
 
+    def publish_display(self, tick: int) -> None:
+        """Publish what shows a tick's state; made while the controller works on that."""
+        self._display.publish_base()
+        if tick % self._display_ticks == 0 or self._actor.state.effort is None:
+            self._display.publish_markers()
+
     def republish(self, *, with_state: bool) -> None:
-        """Publish the markers again, and the last state, the same bytes, for who joined late."""
+        """Publish the markers again, and the last state, the same bytes, for who joined late.
+
+        Who needs the contacts waits for those as well.
+        """
         self._display.publish_markers()
         if with_state:
+            self._publish_contacts()
             self._states.publish(self._last_state)
+
+    def _publish_contacts(self) -> None:
+        """Publish what touched, if anybody listens; nothing if nobody did while it happened."""
+        if self.wants_contacts:
+            contacts, stamp_ns = self._actor.contacts, self._actor.state.stamp_ns
+            touching = WrenchArrays.of_rows(stamp_ns, [], [], [])
+            if contacts is not None:
+                touching = select(stamp_ns, self._links, contacts.wrenches, contacts.touching)
+            self._contacts.publish(encode_wrenches(touching))
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has the last tick, at the most `seconds`; whether it has."""
-        return bool(self._states.wait_for_all_acked(Duration(seconds=seconds)))
+        deadline = time.monotonic() + seconds
+        publishers = (self._states, self._contacts, self._wrenches, *self._display.publishers)
+        waits = (max(deadline - time.monotonic(), 0.0) for _ in publishers)
+        return all(
+            publisher.wait_for_all_acked(Duration(seconds=wait))
+            for publisher, wait in zip(publishers, waits, strict=True)
+        )
 
     def _applied(self, stamp_ns: int) -> WrenchArrays:
         return WrenchArrays.of_rows(

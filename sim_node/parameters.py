@@ -18,7 +18,7 @@ from sim_node.simulation import SimulationSettings
 from sim_node.world import WorldSettings
 
 _LARGEST_COUNT = 2**62
-_PLANE, _NOTHING = "plane", "none"
+PLANE, _NOTHING = "plane", "none"
 _BEFORE = (CHARACTER.name, PLACEMENT.name)  # what the other parameters depend on
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
@@ -33,7 +33,7 @@ WORLD_PARAMETERS = [
         maximum=100.0,
     ),
     Parameter("link_friction", 0.5, "friction of every link", maximum=100.0),
-    Parameter("terrain", _PLANE, "the ground: plane, none, or the path of a URDF"),
+    Parameter("terrain", PLANE, "the ground: plane, none, or the path of a URDF"),
     Parameter("solver_iterations", 10, "contact solver iterations a step", minimum=1, maximum=1000),
     Parameter("speed_limit", 500.0, "a speed beyond it is a divergence", unit="rad/s or m/s"),
     Parameter(
@@ -158,6 +158,11 @@ class Cast:
     declared: tuple[Parameter, ...]
     values: Values
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the characters; empty for one alone, which has none."""
+        return tuple(part.name for part in self.parts if part.name)
+
 
 def make_cast(given: Mapping[str, object]) -> Cast:
     """Load the characters that the parameters name, and resolve all parameters.
@@ -280,8 +285,8 @@ def make_settings(values: Values) -> SimulationSettings:
             friction=values.number("friction"),
             link_friction=values.number("link_friction"),
             solver_iterations=values.integer("solver_iterations"),
-            ground=terrain == _PLANE,
-            terrain=None if terrain in (_PLANE, _NOTHING) else _read_terrain(terrain),
+            ground=terrain == PLANE,
+            terrain=None if terrain in (PLANE, _NOTHING) else _read_terrain(terrain),
         ),
     )
 

@@ -7,12 +7,12 @@ from rclpy.node import Node
 from msgs_config import configuration, topics
 from msgs_config.errors import CommandError, LayoutError, MessageError
 from msgs_config.messages import JointStateDecoder
-from msgs_config.parameters import Values
 from msgs_config.polling import DirectSubscription
 from msgs_config.tick_clock import TickClock
 from msgs_config.warnings import Warnings
-from msgs_config.wrench_messages import WrenchArrays, decode_wrenches
+from msgs_config.wrench_messages import decode_wrenches
 from sim_node.actor import Actor
+from sim_node.inbox import FirstTick, StampedInbox, forget
 from sim_node.lockstep import LockstepBarrier, Verdict
 from sim_node.outputs import Outputs
 from sim_node.parameters import Cast, Part, command_timeout_ns, display_ticks, is_realtime
@@ -23,14 +23,6 @@ from sim_node.simulation import Simulation
 from sim_node.world import WorldSettings
 
 Collector = LockstepBarrier | CommandHold
-
-_MOST_PUSHES_A_TICK = 100  # messages, lest a flood of them stop the world
-_PAST_PUSH = "a push of the past"
-_MOST_FORGOTTEN = 20_000  # messages, more than can wait
-
-
-class _PastPushError(CommandError):
-    """A push is for a tick that is over, which is told once, whatever its stamp."""
 
 
 class Port:
@@ -44,13 +36,18 @@ class Port:
         self.outputs = outputs
         self.torques = topics.JOINT_TORQUES.under(namespace)
         self.last_effort = collector.effort
-        self.push_counts = Counter[str]()
         self._pushes = PushSchedule(actor.character)
         self._decoder = JointStateDecoder()
         self._commands = DirectSubscription(node, self.torques)
-        self._wrenches = DirectSubscription(node, topics.EXTERNAL_WRENCH.under(namespace))
         self.warnings = Warnings(node)
         self._of = f" for '{namespace}'" if namespace else ""
+        wrench = topics.EXTERNAL_WRENCH.under(namespace)
+        self._wrenches = StampedInbox(node, wrench, "push", self._of, self.warnings)
+
+    @property
+    def push_counts(self) -> Counter[str]:
+        """How many pushes were taken and refused."""
+        return self._wrenches.counts
 
     @property
     def missing(self) -> list[str]:
@@ -66,10 +63,8 @@ class Port:
         self.collector.clear()
         self.last_effort = self.collector.effort
         self._pushes.clear()
-        for unread in (self._commands, self._wrenches):
-            for _ in range(_MOST_FORGOTTEN):
-                if unread.take() is None:
-                    break
+        self._wrenches.forget()
+        forget(self._commands)
 
     def take_command(self) -> Verdict | None:
         """Take a command if one is there; what was made of it."""
@@ -94,35 +89,19 @@ class Port:
 
     def take_pushes(self, clock: TickClock, tick: int, duration_ticks: int) -> list[Push]:
         """The pushes that act during the step that begins at a tick, with those just sent."""
-        for _ in range(_MOST_PUSHES_A_TICK):
-            raw = self._wrenches.take()
-            if raw is None:
-                break
-            try:
-                self._schedule(decode_wrenches(raw), clock, tick, duration_ticks)
-                self.push_counts["accepted"] += 1
-            except (MessageError, CommandError) as error:
-                self.push_counts["rejected"] += 1
-                kind = _PAST_PUSH if isinstance(error, _PastPushError) else ""
-                self.warnings.say_once(f"push{self._of} refused: {error}", kind)
-        return self._pushes.take(tick)
 
-    def _schedule(
-        self, wrenches: WrenchArrays, clock: TickClock, tick: int, duration_ticks: int
-    ) -> None:
-        first_tick = clock.first_tick_from(wrenches.stamp_ns) if wrenches.stamp_ns else tick
-        if first_tick < tick:
-            raise _PastPushError(
-                f"its stamp, {wrenches.stamp_ns} ns, is over; the state is of "
-                f"{clock.stamp_ns(tick)} ns; 0 means the next tick"
+        def schedule(raw: bytes, first_tick: FirstTick) -> None:
+            wrenches = decode_wrenches(raw)
+            self._pushes.add(
+                wrenches.links,
+                wrenches.wrenches,
+                wrenches.points,
+                first_tick=first_tick(wrenches.stamp_ns),
+                ticks=duration_ticks,
             )
-        self._pushes.add(
-            wrenches.links,
-            wrenches.wrenches,
-            wrenches.points,
-            first_tick=first_tick,
-            ticks=duration_ticks,
-        )
+
+        self._wrenches.take(clock, tick, schedule)
+        return self._pushes.take(tick)
 
 
 def open_ports(node: Node, cast: Cast, simulation: Simulation) -> list[Port]:
@@ -132,13 +111,13 @@ def open_ports(node: Node, cast: Cast, simulation: Simulation) -> list[Port]:
         CharacterError: the engine makes nothing sound of a character.
     """
     return [
-        _open_port(node, part, actor, cast.values, simulation.settings.world)
+        _open_port(node, part, actor, cast, simulation.settings.world)
         for part, actor in zip(cast.parts, simulation.actors, strict=True)
     ]
 
 
-def _open_port(node: Node, part: Part, actor: Actor, values: Values, world: WorldSettings) -> Port:
-    names, commanded = actor.layout.dof_names, actor.commanded
+def _open_port(node: Node, part: Part, actor: Actor, cast: Cast, world: WorldSettings) -> Port:
+    names, commanded, values = actor.layout.dof_names, actor.commanded, cast.values
     collector: Collector = LockstepBarrier(names, commanded)
     if is_realtime(values):
         collector = CommandHold(names, commanded, command_timeout_ns(values))
@@ -147,6 +126,13 @@ def _open_port(node: Node, part: Part, actor: Actor, values: Values, world: Worl
     outputs = Outputs(node, actor, display_ticks(values))
     probe = measure_probe(part.character, world.gravity)
     outputs.publish_configuration(
-        configuration.describe(part.character, part.values, probe=probe, terrain=world.terrain)
+        configuration.describe(
+            part.character,
+            part.values,
+            probe=probe,
+            terrain=world.terrain,
+            name=part.name,
+            characters=cast.names,
+        )
     )
     return Port(node, actor, collector, outputs)

@@ -6,8 +6,9 @@ from types import TracebackType
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
+from msgs_config.throw import Throw
 from msgs_config.tick_clock import FIRST_TICK, TickClock
-from sim_node.actor import Actor, Role
+from sim_node.actor import Actor, ActorMemory, Role
 from sim_node.pushes import Push
 from sim_node.world import World, WorldSettings
 
@@ -23,6 +24,29 @@ class SimulationSettings:
     world: WorldSettings
 
 
+@dataclass(frozen=True)
+class Saved:
+    """A state between two ticks, which the simulation that saved it can return to."""
+
+    tick: int
+    episode: int
+    actors: tuple[ActorMemory, ...]
+    throws: tuple[Throw, ...]  # of the last tick
+    world: int  # its number in the engine
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A state between two ticks, for any simulation of equal roles and settings."""
+
+    tick: int
+    episode: int
+    actors: tuple[ActorMemory, ...]
+    throws: tuple[Throw, ...]  # of the last tick
+    balls: tuple[Throw, ...]  # that are in the world
+    world: bytes
+
+
 class Simulation:
     """Forward dynamics in ticks: `(q, v, effort) -> next (q, v)` of every actor.
 
@@ -30,8 +54,10 @@ class Simulation:
     stays so, a torque in a body's frame turns with the body.
     """
 
-    def __init__(self, roles: Sequence[Role], settings: SimulationSettings) -> None:
-        """Build the world and put the characters into their initial states.
+    def __init__(
+        self, roles: Sequence[Role], settings: SimulationSettings, first_tick: int = FIRST_TICK
+    ) -> None:
+        """Build the world and put the characters into their initial states, which are `first_tick`.
 
         Raises:
             ConfigurationError: an array or a name in a role does not fit its character.
@@ -44,9 +70,10 @@ class Simulation:
             Actor(role, delay_ticks=settings.command_delay_ticks, step_s=settings.world.step_s)
             for role in roles
         )
-        self.tick = FIRST_TICK
+        self.tick = first_tick
         self.episode = 1
         self.watches_contacts = False  # whether to find out what touches, which takes time
+        self.throws: tuple[Throw, ...] = ()  # what was thrown at the beginning of the last tick
         self._world = self._fresh_world()
 
     def __enter__(self) -> "Simulation":
@@ -69,10 +96,24 @@ class Simulation:
         """The stamp of the present states."""
         return self.clock.stamp_ns(self.tick)
 
+    @property
+    def balls(self) -> tuple[Throw, ...]:
+        """What was thrown in this episode, and is still in the world."""
+        return self._world.balls.throws
+
+    def ball_motion(self) -> FloatArray:
+        """Centre m, orientation xyzw, velocity m/s and rad/s of each ball, world: (m, 13)."""
+        return self._world.balls.motion()
+
     def step(
-        self, efforts: Sequence[FloatArray], pushes: Sequence[Sequence[Push]] | None = None
+        self,
+        efforts: Sequence[FloatArray],
+        pushes: Sequence[Sequence[Push]] | None = None,
+        throws: Sequence[Throw] = (),
     ) -> None:
         """Advance one tick: for each actor an effort (n,), clipped to its limits, and its pushes.
+
+        What is thrown is let go first.
 
         Raises:
             SimulationError: a next state is not finite or faster than the speed limit; it names
@@ -81,6 +122,9 @@ class Simulation:
         nothing: list[tuple[Push, ...]] = [()] * len(self.actors)
         for actor, effort, its in zip(self.actors, efforts, pushes or nothing, strict=True):
             actor.begin_tick(effort, its, self.watches_contacts)
+        self.throws = tuple(throws)
+        for throw in throws:
+            self._world.balls.add(throw)
         substeps = self.settings.substeps
         for substep in range(substeps):
             for actor in self.actors:
@@ -107,8 +151,50 @@ class Simulation:
         """
         self.tick += 1
         self.episode += 1
-        before, self._world = self._world, self._fresh_world()
-        before.close()
+        self.throws = ()
+        self._world.close()  # first: two engines at a time would take twice the memory
+        self._world = self._fresh_world()
+
+    def save(self) -> Saved:
+        """Keep the present state in memory, until it is forgotten."""
+        return Saved(self.tick, self.episode, self._memories(), self.throws, self._world.save())
+
+    def restore(self, saved: Saved) -> None:
+        """Return to a saved state: what follows is what followed it, to the bit.
+
+        That holds of states that a step has led to; in a world without a step yet, the engine has
+        not found out what touches. After a reset no state saved before can be restored.
+        """
+        self._world.restore(saved.world)
+        self._recall(saved)
+
+    def forget(self, saved: Saved) -> None:
+        """Give back the memory of a saved state."""
+        self._world.forget(saved.world)
+
+    def snapshot(self) -> Snapshot:
+        """The present state, to be taken over by a simulation in another process."""
+        return Snapshot(
+            self.tick,
+            self.episode,
+            self._memories(),
+            self.throws,
+            self.balls,
+            self._world.to_bytes(),
+        )
+
+    def take_over(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot, as its own simulation would, to the bit."""
+        self._world.from_bytes(snapshot.world, snapshot.balls)
+        self._recall(snapshot)
+
+    def _memories(self) -> tuple[ActorMemory, ...]:
+        return tuple(actor.memory() for actor in self.actors)
+
+    def _recall(self, state: Saved | Snapshot) -> None:
+        self.tick, self.episode, self.throws = state.tick, state.episode, state.throws
+        for actor, memory in zip(self.actors, state.actors, strict=True):
+            actor.recall(memory)
 
     def _fresh_world(self) -> World:
         world = World(self.settings.world)

@@ -7,6 +7,8 @@ import numpy as np
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Shape, ShapeType
 
+HEAD_WIDTH = 3.0  # of an arrow, in diameters of its shaft
+
 _AROUND = 24  # faces around the axis
 _ALONG_ARC = 7  # points of a quarter of a circle
 
@@ -30,6 +32,18 @@ def round_surface(shape: Shape) -> Surface:
     points = radius * normals
     points[:, 1] += 0.5 * length * np.repeat((-1.0, 1.0), _ALONG_ARC)
     return _revolved(points, normals)
+
+
+def arrow_surface(length: float, radius: float) -> Surface:
+    """The surface of an arrow from the origin along z; the radius is that of its shaft, in m."""
+    tip = min(2.0 * HEAD_WIDTH * radius, 0.6 * length)  # length of its head
+    neck, wide = length - tip, HEAD_WIDTH * radius
+    points = [(0.0, 0.0), (radius, 0.0), (radius, 0.0), (radius, neck), (radius, neck)]
+    points += [(wide, neck), (wide, neck), (0.0, length)]
+    slope = np.array((tip, wide)) / np.hypot(tip, wide)
+    down, out = (0.0, -1.0), (1.0, 0.0)
+    normals = np.array([down, down, out, out, down, down, slope, slope])
+    return _revolved(np.array(points), normals)
 
 
 def _cylinder_profile(radius: float, length: float) -> tuple[FloatArray, FloatArray]:

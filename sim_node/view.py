@@ -1,7 +1,8 @@
 """Where a camera stands and what it sees: a pinhole camera, and how to place it. No engine."""
 
 from dataclasses import dataclass, replace
-from math import atan, cos, sin, tan
+from math import atan, ceil, cos, floor, sin, tan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,6 +10,44 @@ from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Vector
 
 _MARGIN = 0.05  # of the outline's extent, that stays free around it
+
+
+class Box(NamedTuple):
+    """A part of a picture, in pixels from its upper left corner; empty where an end is a begin."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.right - self.left, self.bottom - self.top
+
+    @property
+    def rows(self) -> slice:
+        """The picture's rows."""
+        return slice(self.top, self.bottom)
+
+    @property
+    def columns(self) -> slice:
+        """The picture's columns."""
+        return slice(self.left, self.right)
+
+    def within(self, whole: "Box") -> tuple[slice, slice]:
+        """Its rows and columns in an array that has those of a part that contains it."""
+        return (
+            slice(self.top - whole.top, self.bottom - whole.top),
+            slice(self.left - whole.left, self.right - whole.left),
+        )
+
+    def times(self, factor: int) -> "Box":
+        """The same part of a picture with so many times as many pixels along each edge."""
+        return Box(*(factor * edge for edge in self))
+
+    def __bool__(self) -> bool:
+        return self.right > self.left and self.bottom > self.top
 
 
 @dataclass(frozen=True)
@@ -36,6 +75,10 @@ class View:
         position: FloatArray = np.array(self.target) + self.distance * self.axes()[2]
         return position
 
+    def seen_height(self) -> float:
+        """From the picture's lower edge to its upper one, m at the target."""
+        return 2.0 * self.distance * tan(0.5 * self.field_of_view)
+
     def points(self, pixels: IntArray, depth: FloatArray, size: tuple[int, int]) -> FloatArray:
         """What is seen at pixels (2, m): (3, m) in m, world.
 
@@ -57,6 +100,33 @@ class View:
         scale = -0.5 * height / tan(0.5 * self.field_of_view) / back
         rows, columns = 0.5 * height - scale * upwards, 0.5 * width + scale * across
         return np.floor((rows, columns)).astype(np.intp)
+
+    def box(self, points: FloatArray, radii: FloatArray, size: tuple[int, int]) -> Box:
+        """The part of a picture in which spheres are seen, with half a pixel around them.
+
+        It is all of it where one is at the camera.
+
+        Args:
+            points: Centres (m, 3) in m, world.
+            radii: Radii (m,) in m.
+            size: Width and height of the picture.
+        """
+        width, height = size
+        across, upwards, back = self.axes() @ (points - self.eye()).T
+        nearest, farthest = -back - radii, -back + radii
+        if not len(points):
+            return Box(0, 0, 0, 0)
+        if nearest.min() <= 0.0:
+            return Box(0, height, 0, width)
+        scale = 0.5 * height / tan(0.5 * self.field_of_view)
+        left, right = _reach(across, radii, nearest, farthest)
+        low, high = _reach(upwards, radii, nearest, farthest)
+        return Box(
+            min(max(floor(0.5 * height - scale * high - 0.5), 0), height),
+            min(max(ceil(0.5 * height - scale * low + 0.5), 0), height),
+            min(max(floor(0.5 * width + scale * left - 0.5), 0), width),
+            min(max(ceil(0.5 * width + scale * right + 0.5), 0), width),
+        )
 
     def moved(self, x: float, y: float) -> "View":
         """The same view of a place that is so many m further on in the world."""
@@ -92,12 +162,29 @@ def framing(points: FloatArray, radii: FloatArray, aspect: float, like: View) ->
     return replace(like, target=(x, y, z), distance=float(np.max(needed)))
 
 
+def extents(points: FloatArray, radii: FloatArray, like: View) -> FloatArray:
+    """How much (3,) of a view's axes spheres take up, m: across, upwards, towards the camera."""
+    lowest, highest = _box(points @ like.axes().T, radii)
+    extent: FloatArray = highest - lowest
+    return extent
+
+
 def natural_aspect(points: FloatArray, radii: FloatArray, like: View) -> float:
     """Width over height of what spheres fill of a picture, with its margin, seen from far away."""
-    lowest, highest = _box(points @ like.axes().T, radii)
-    extent = highest - lowest
+    extent = extents(points, radii, like)
     width, height = (extent[:2] + 2.0 * _MARGIN * extent.max()).tolist()
     return float(width / height)
+
+
+def _reach(
+    middle: FloatArray, radii: FloatArray, nearest: FloatArray, farthest: FloatArray
+) -> tuple[float, float]:
+    """Between which slopes spheres lie that reach from one depth to another."""
+    low, high = middle - radii, middle + radii
+    return (
+        float(np.minimum(low / nearest, low / farthest).min()),
+        float(np.maximum(high / nearest, high / farthest).max()),
+    )
 
 
 def _box(points: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,12 +1,19 @@
 """The physics world: PyBullet behind one class; the only place that steps the engine."""
 
+import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 
 from msgs_config.bullet import connect, load_urdf, pybullet
 from msgs_config.character import Character, Loading
+from msgs_config.throw import Throw
+from sim_node.balls import Balls
 from sim_node.body import Body
 from sim_node.contacts import TouchedLinks, read_contacts
+
+_STATE_FILE = "state.bullet"  # the engine writes to files alone
 
 
 @dataclass(frozen=True)
@@ -23,7 +30,7 @@ class WorldSettings:
 
 
 class World:
-    """The ground and the characters on it, in a private engine.
+    """The ground and the characters on it, and what is thrown at them, in a private engine.
 
     `save` and `restore` keep the engine's contact caches, so that what follows a restored state
     is what followed the saved one, to the bit; setting positions and velocities alone is not.
@@ -53,6 +60,8 @@ class World:
             self._set_friction(ground, settings.friction)
         if settings.terrain is not None:
             self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
+        self.balls = Balls(self._client, settings.link_friction)
+        self._saved: dict[int, tuple[Throw, ...]] = {}  # the balls of each saved state
 
     def __enter__(self) -> "World":
         return self
@@ -83,11 +92,34 @@ class World:
 
     def save(self) -> int:
         """Keep the whole state in memory; returns its number for `restore`."""
-        return int(pybullet.saveState(physicsClientId=self._client))
+        number = int(pybullet.saveState(physicsClientId=self._client))
+        self._saved[number] = self.balls.throws
+        return number
 
     def restore(self, saved: int) -> None:
         """Return to a saved state, exactly."""
+        self.balls.have(self._saved.get(saved, self.balls.throws))
         pybullet.restoreState(stateId=saved, physicsClientId=self._client)
+
+    def forget(self, saved: int) -> None:
+        """Give back the memory of a saved state; it cannot be restored any more."""
+        pybullet.removeState(saved, physicsClientId=self._client)
+        del self._saved[saved]
+
+    def to_bytes(self) -> bytes:
+        """The whole state for a world of the same making with the same balls, anywhere."""
+        with tempfile.TemporaryDirectory() as directory:
+            file = Path(directory) / _STATE_FILE
+            pybullet.saveBullet(str(file), physicsClientId=self._client)
+            return file.read_bytes()
+
+    def from_bytes(self, state: bytes, throws: Sequence[Throw] = ()) -> None:
+        """Take over a state from `to_bytes`, exactly, in which these balls were."""
+        self.balls.have(throws)
+        with tempfile.TemporaryDirectory() as directory:
+            file = Path(directory) / _STATE_FILE
+            file.write_bytes(state)
+            pybullet.restoreState(fileName=str(file), physicsClientId=self._client)
 
     def _set_friction(self, body: int, friction: float) -> None:
         for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):

@@ -57,8 +57,8 @@ def make_run(
     return Made(plan, list(ticks_in_process(plan)))
 
 
-def said_configuration(plan: Plan) -> Said:
-    text = configuration.describe(plan.character, plan.simulator)
+def said_configuration(plan: Plan, name: str = "", characters: Sequence[str] = ()) -> Said:
+    text = configuration.describe(plan.character, plan.simulator, name=name, characters=characters)
     return CONFIGURATION, serialize_message(String(data=text))
 
 

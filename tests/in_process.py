@@ -4,19 +4,24 @@ from pathlib import Path
 
 import numpy as np
 
+from controller_node.behaviours.base import ModeReport
 from controller_node.parameters import make_controller
-from experiment.bags.recording import Recording
+from experiment.bags.recording import ModeChange, Recording
 from experiment.metrics import Measurement, Tick
 from experiment.plan import Plan, make_plan
+from experiment.planned_throw import plan_throws
 from experiment.studies.study import Case, Outcome
 from msgs_config import configuration
 from msgs_config.errors import SimulationError
 from msgs_config.stamped import StampedReference, StampedState
+from msgs_config.throw import Throw
+from msgs_config.throw_messages import BallStates, ball_names
 from msgs_config.wrench_messages import WrenchArrays, select
 from sim_node.actor import Actor
 from sim_node.parameters import make_role, make_settings, push_ticks
 from sim_node.pushes import PushSchedule
 from sim_node.simulation import Simulation
+from sim_node.throwing import ThrowSchedule
 
 
 class InProcessLaboratory:
@@ -56,6 +61,9 @@ class _Run:
         self._references: list[StampedReference] = []
         self._contacts: list[WrenchArrays] = []
         self._pushes: list[WrenchArrays] = []
+        self._modes: list[ModeReport] = []
+        self._throws: list[tuple[Throw, ...]] = []
+        self._balls: list[BallStates | None] = [None]
 
     def go_on(self) -> None:
         """Run to the end. Raises SimulationError if it diverges."""
@@ -63,16 +71,33 @@ class _Run:
         controller = make_controller(plan.character, plan.reference, plan.controller)
         role = make_role(plan.character, plan.simulator)
         with Simulation([role], make_settings(plan.simulator)) as simulation:
-            simulation.watches_contacts = self._case.contacts
+            simulation.watches_contacts = self._case.contacts or controller.needs_contacts
+            balls = self._throw_schedule(simulation)
             schedule, (actor,) = self._schedule(simulation), simulation.actors
             episode_ns = actor.state.stamp_ns
             self._states.append(actor.state)
             for _ in range(plan.ticks):
-                effort, reference = controller.answer(actor.state, episode_ns)
+                touched = None if actor.contacts is None else actor.contacts.wrenches
+                effort, reference = controller.answer(actor.state, episode_ns, touched)
                 self._references.append(reference)
-                pushes = schedule.take(simulation.tick)
-                simulation.step([np.where(actor.commanded, effort, 0.0)], [pushes])
+                if controller.mode is not None and controller.mode not in self._modes[-1:]:
+                    self._modes.append(controller.mode)
+                pushes, throws = schedule.take(simulation.tick), balls.take(simulation.tick)
+                simulation.step([np.where(actor.commanded, effort, 0.0)], [pushes], throws)
                 self._add(actor)
+                self._add_balls(simulation)
+
+    def _throw_schedule(self, simulation: Simulation) -> ThrowSchedule:
+        schedule = ThrowSchedule()
+        for each in plan_throws(self._plan, self._case.throws)[0]:
+            schedule.add(each.throw, simulation.clock.first_tick_from(each.stamp_ns))
+        return schedule
+
+    def _add_balls(self, simulation: Simulation) -> None:
+        self._throws.append(simulation.throws)
+        names = ball_names(len(simulation.balls))
+        there = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
+        self._balls.append(there if names else None)
 
     def _schedule(self, simulation: Simulation) -> PushSchedule:
         """The pushes as the simulator's node takes them: from the first tick not before a stamp."""
@@ -113,6 +138,7 @@ class _Run:
             character=self._plan.character,
             parameters=self._plan.simulator,
             stamps_ns=np.array([state.stamp_ns for state in states], dtype=np.intp),
+            published_ns=np.arange(len(states), dtype=np.intp),
             position=np.stack([state.position for state in states]),
             velocity=np.stack([state.velocity for state in states]),
             effort=np.array([state.effort for state in states[1:]]).reshape(-1, size),
@@ -120,6 +146,13 @@ class _Run:
             reference_velocity=np.stack([*(r.velocity for r in references), *nothing]),
             contacts=tuple(self._contacts),
             applied_wrench=tuple(self._pushes),
+            commands=((),) * len(states),
+            modes=tuple(
+                ModeChange(each.stamp_ns, each.phase.mode.value, dict(each.phase.facts))
+                for each in self._modes
+            ),
+            throws=tuple(self._throws),
+            balls=tuple(self._balls),
         )
 
     def summary(self) -> dict[str, object]:

@@ -1,11 +1,7 @@
 """Recordings are read back by independent readers, with every field that rosbag2 reads."""
 
 import json
-import os
-import resource
 from array import array
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -32,6 +28,7 @@ from experiment.bags.definitions import read_definition
 from experiment.bags.reader import RecordedMessage, read_messages
 from experiment.bags.writer import BagWriter
 from msgs_config.errors import RecordingError
+from tests.limits import file_size_limit, unprivileged
 
 QOS = QoSProfile(depth=5000)
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -339,18 +336,6 @@ def test_a_directory_without_permission_is_one_clear_error(tmp_path: Path) -> No
         BagWriter(tmp_path / "bag")
 
 
-@contextmanager
-def unprivileged() -> Iterator[None]:
-    """Permissions do not stop root, as which tests run in many containers."""
-    user = os.geteuid()
-    if user == 0:
-        os.seteuid(65534)
-    try:
-        yield
-    finally:
-        os.seteuid(user)
-
-
 def test_a_full_disk_is_a_clear_error_and_ends_the_recording(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "bag")
     writer.add_topic("/text", String, QOS)
@@ -371,17 +356,6 @@ def test_a_disk_that_is_full_at_the_end_is_a_clear_error(tmp_path: Path) -> None
         pytest.raises(RecordingError, match=r"bag is incomplete, cannot write: File too large"),
     ):
         writer.close()
-
-
-@contextmanager
-def file_size_limit(size: int) -> Iterator[None]:
-    """A stand-in for a full disk: no file of this process may grow over `size` bytes."""
-    _, hard = before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_nothing_is_written_after_the_end_and_closing_again_does_nothing(tmp_path: Path) -> None:

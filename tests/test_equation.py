@@ -294,7 +294,7 @@ def test_what_spinning_friction_does_is_left_over_as_a_torque_about_the_normal(
 def test_it_holds_for_what_a_bag_says_of_a_walk(processes: Processes, tmp_path: Path) -> None:
     # Arrange
     run = processes.command(
-        *("run", "--clip", "walk", "--duration", "0.5", "--contacts"),
+        *("run", "--clip", "walk", "--duration", "0.5"),
         *("--output", str(tmp_path / "walk")),
     )
     assert run.wait(60.0) == 0

@@ -4,6 +4,7 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from bags import Made, make_run, said_configuration, said_states, write_bag
@@ -13,6 +14,7 @@ from ros import Processes, wait_until
 
 from experiment.bags.recording import Recording, read_recording
 from experiment.cli import main
+from experiment.movie import Movie, MovieSettings
 from experiment.render import pose_strip, render_still, save_png, strip
 from msgs_config.arrays import BoolArray
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -227,6 +229,44 @@ def test_a_real_run_is_drawn_and_can_be_run_again(processes: Processes, tmp_path
     assert not (tmp_path / "run" / "strip.png").exists()
 
 
+def test_render_writes_a_film_into_the_runs_directory(
+    run: Path, own_handlers: None, capsys: pytest.CaptureFixture[str], recording: Recording
+) -> None:
+    film = ["--video", "--size", "96x64", "--fps", "20", "--from", "0.1", "--workers", "1"]
+
+    assert main(["render", str(run), *film]) == 0
+
+    assert capsys.readouterr().out.strip() == str(run / "video.mp4")
+    movie = Movie([recording], MovieSettings(fps=20, start=0.1, size=(96, 64), workers=1))
+    with av.open(str(run / "video.mp4")) as video:
+        frames = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
+    assert len(frames) == 4
+    for frame, picture in zip(frames, movie.pictures(), strict=True):
+        assert np.abs(frame.astype(int) - picture).mean() < 5.0
+    assert green(frames[0]).sum() > 10
+    (run / "video.mp4").unlink()
+
+
+def test_a_film_that_is_interrupted_leaves_nothing(
+    run: Path, processes: Processes, tmp_path: Path
+) -> None:
+    folder = tmp_path / "film"
+    folder.mkdir()
+    slow = ("--speed", "0.001", "--size", "96x64", "--workers", "2")
+    process = processes.command("render", str(run), "--output", str(folder / "film.mp4"), *slow)
+    wait_until(lambda: any(folder.iterdir()), "a film that is being written")
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+
+    process.send(signal.SIGINT)
+
+    assert process.wait(20.0) == 130
+    assert process.stderr.splitlines()[-1] == "interrupted"
+    assert "Traceback" not in process.stderr
+    assert not list(folder.iterdir())
+    assert len(children) >= 2
+    wait_until(lambda: not any(Path(f"/proc/{child}").exists() for child in children), "their end")
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -253,6 +293,40 @@ def test_a_mistake_is_one_line(
     error = capsys.readouterr().err
     (line,) = [line for line in error.splitlines() if "pictures" not in line or "error" in line]
     assert line.startswith("error: ") and says in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--video", "--count", "3"], "--count is a strip's, and this is a film"),
+        (["--output", "x.mp4", "--times", "0"], "--times is a strip's"),
+        (["--fps", "10"], "--fps is a film's; add --video"),
+        (["--from", "0.1"], "--from is a film's"),
+        (["--contacts"], "--contacts is a film's"),
+        (["--ghost", "beside"], "a strip has it over, or none"),
+        (["--times", "0", "--count", "1"], "give one of the two"),
+        (["--reference", "--ghost", "none"], "--reference is --ghost over; --ghost is none"),
+        (["--video", "--output", "x.png"], "must be a .mp4 file"),
+        (["--video", "--from", "0.3"], "from 0.3 s to 0.25 s is not in the recording"),
+        (["--video", "--size", "61x80"], "both must be even, such as 62x80"),
+        (["--video", "--fps", "0"], "0 frames a second"),
+        (["--video", "--workers", "0"], "0 processes; it must be 1 or more"),
+        (["--video", "--contacts"], "no contacts to mark"),
+        (["--character", "left"], "unknown character 'left'"),
+    ],
+)
+def test_what_does_not_go_together_is_one_line(
+    run: Path,
+    own_handlers: None,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    says: str,
+) -> None:
+    assert main(["render", str(run), *arguments]) == 1
+
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "error" in line)
+    assert line.startswith("error: ") and says in line
+    assert not (run / "video.mp4").exists()
 
 
 def test_a_run_that_is_not_there_is_one_line(

@@ -47,6 +47,7 @@ FIGURES = {
     "rejected_commands",
     "duplicate_commands",
     "state_hash",
+    "lost_messages",
 }
 ONE_CHUNK = 500_000  # bytes; a bag goes to the disk in pieces of about 1 MB
 SECONDS = 10.0  # that a run may take to end when it must
@@ -439,11 +440,13 @@ WRONG: dict[str, tuple[tuple[str, ...], list[str]]] = {
         (*SHORT, "--set", "sim_node.real_time_factor:=1.0"),
         ["--in-process", "'real_time_factor'"],
     ),
-    "contacts without a bag": ((*SHORT, "--contacts"), ["--contacts", "--in-process"]),
-    "contacts that are not to be recorded": (
-        (*ENDLESS, "--contacts", "--no-record"),
-        ["--contacts", "--no-record"],
+    "topic without a bag": ((*SHORT, "--topic", "/mine"), ["--topic", "--in-process"]),
+    "storage of no bag": (
+        (*ENDLESS, "--storage", "sqlite3", "--no-record"),
+        ["--storage", "--no-record"],
     ),
+    "topic to exclude": ((*ENDLESS, "--exclude", "contcts"), ["'contcts'", "mean 'contacts'"]),
+    "topic that is needed": ((*ENDLESS, "--exclude", "joint_states"), ["'joint_states'"]),
     "unfinished setting": (setting("sim_node.rate=240"), ["sim_node.rate=240", ":="]),
 }
 

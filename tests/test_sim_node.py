@@ -366,7 +366,7 @@ def test_a_long_wait_names_what_is_missing_and_whose_quality_of_service_does_not
     simulator = processes.simulator("humanoid", wait_for_subscribers=1)
 
     told = client.spin_until(
-        lambda: [line for line in simulator.stderr.splitlines() if "waiting for" in line],
+        lambda: [line for line in simulator.stderr.splitlines() if "waiting for commands" in line],
         "what it waits for",
     )
     assert "waiting for commands of chest_x, chest_y, chest_z, " in told[0]

@@ -1,6 +1,6 @@
 """The pinhole camera's maths, and how it is placed."""
 
-from math import pi, sin, tan
+from math import atan, pi, sin, tan
 
 import numpy as np
 import pytest
@@ -90,3 +90,41 @@ def test_the_natural_aspect_is_that_of_the_extents() -> None:
 
     # 5 m is the largest extent, of which a twentieth is left free on either side
     assert natural_aspect(corners, np.zeros(2), upright) == pytest.approx(1.5 / 2.5)
+
+
+@given(
+    st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=1, max_size=6),
+    st.floats(0.0, 1.0),
+    views,
+)
+def test_a_box_has_all_that_is_seen_of_spheres(
+    centres: list[tuple[float, float, float]], radius: float, view: View
+) -> None:
+    size = (50, 40)
+    directions = np.random.default_rng(2).normal(size=(30, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    surface = np.concatenate([np.array(centre) + radius * directions for centre in centres])
+
+    box = view.box(np.array(centres), np.full(len(centres), radius), size)
+
+    before = (surface - view.eye()) @ view.axes()[2] < -1e-3
+    rows, columns = view.pixels(surface[before].T, size)
+    seen = (rows >= 0) & (rows < size[1]) & (columns >= 0) & (columns < size[0])
+    assert ((rows >= box.top) & (rows < box.bottom))[seen].all()
+    assert ((columns >= box.left) & (columns < box.right))[seen].all()
+
+
+def test_a_box_is_no_larger_than_what_it_is_of() -> None:
+    view = View((0.0, 0.0, 0.0), distance=10.0, yaw=0.0, pitch=0.0, field_of_view=2.0 * atan(0.1))
+
+    box = view.box(np.array([(0.5, 0.0, 0.25)]), np.zeros(1), (200, 100))  # 50 pixels a metre
+
+    assert box == (37, 38, 124, 126)  # with half a pixel around it
+    assert not view.box(np.array([(9.0, 0.0, 0.0)]), np.ones(1), (200, 100))
+    assert not view.box(np.empty((0, 3)), np.empty(0), (200, 100))
+
+
+def test_where_a_sphere_is_at_the_camera_the_box_is_the_whole_picture() -> None:
+    view = View(distance=2.0)
+
+    assert view.box(view.eye()[np.newaxis], np.ones(1), (200, 100)) == (0, 100, 0, 200)

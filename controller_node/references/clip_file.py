@@ -50,12 +50,13 @@ def read_clip(character: Character, name_or_path: str) -> ClipFrames:
     Raises:
         ClipError: there is no such clip, it is malformed, or it does not fit the character.
     """
-    path = _clip_path(character, name_or_path)
+    path = clip_path(character, name_or_path)
     loop, frames = _parse(path, read_text(path, ClipError))
     return _in_layout(character, path, loop, frames)
 
 
-def _clip_path(character: Character, name_or_path: str) -> Path:
+def clip_path(character: Character, name_or_path: str) -> Path:
+    """The file of a clip given by name or path. Raises ClipError if there is no such clip."""
     if not character.clips.pattern:
         raise ClipError(f"character '{character.name}' has no clips: its file has no key 'clips'")
     if name_or_path.endswith((".txt", ".json")):

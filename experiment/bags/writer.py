@@ -1,9 +1,8 @@
 """Writes recordings: rosbag2 directories of serialised messages, without ROS' rosbag2.
 
-What is written is version 9, stored as MCAP, as ROS 2 Jazzy's `ros2 bag record -s mcap` writes it.
+What is written is version 9, as ROS 2 Jazzy's `ros2 bag record` writes it.
 """
 
-from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -19,12 +18,12 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
-from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
 from experiment.bags.definitions import read_definition
+from experiment.bags.storage import MCAP, NONE, BagFiles
 from msgs_config.errors import RecordingError, one_of
 
-_LATEST_NS = 2**63 - 1  # rosbag2 holds times in int64
+LATEST_NS = 2**63 - 1  # rosbag2 holds times in int64
 _NS_PER_S = 10**9
 
 
@@ -36,24 +35,21 @@ class BagWriter:
     raise into `write` or `close`, which would leave half a record behind: let it set a flag.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, storage: str = MCAP, compression: str = NONE) -> None:
         """Create the directory `path`, and its parents.
 
+        Args:
+            path: Where the recording goes.
+            storage: `mcap`, or `sqlite3` as ROS 2 Humble has it by default.
+            compression: `none` or `zstd`: about half the size.
+
         Raises:
+            ConfigurationError: There is no such storage or compression.
             RecordingError: `path` exists already or cannot be created.
         """
         self._path = path
         self._connections: dict[str, Connection] = {}
-        try:
-            self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-            self._writer.open()
-        except WriterError as error:
-            raise RecordingError(
-                f"recording {path} exists already; remove it or choose another directory"
-            ) from error
-        except OSError as error:
-            raise RecordingError(f"cannot create recording {path}: {error.strerror}") from error
-        self._is_open = True
+        self._files = BagFiles(path, storage, compression)
 
     def __enter__(self) -> Self:
         return self
@@ -69,26 +65,20 @@ class BagWriter:
     @property
     def message_counts(self) -> dict[str, int]:
         """How many messages each topic has got so far; right after `close` as well."""
-        return {name: self._writer.counts[to.id] for name, to in self._connections.items()}
+        return {name: self._files.counts[to.id] for name, to in self._connections.items()}
 
     def add_topic(self, topic: str, message_type: type, qos: QoSProfile) -> None:
         """Announce a topic, with the quality of service that its publisher offers.
 
         Raises:
-            RecordingError: The recording is closed or has the topic already, or the definition of
-                the message type is not installed.
+            RecordingError: The recording is closed or has the topic already, the definition of
+                the message type is not installed, or the disk refuses the data.
         """
-        self._check_open()
+        self._files.check_open()
         if topic in self._connections:
             raise RecordingError(f"recording {self._path} has topic '{topic}' already")
         definition = read_definition(message_type)
-        self._connections[topic] = self._writer.add_connection(
-            topic,
-            definition.type_name,
-            msgdef=definition.text,
-            rihs01=definition.type_hash,
-            offered_qos_profiles=[_offered(qos)],
-        )
+        self._connections[topic] = self._files.add(topic, definition, [_offered(qos)])
 
     def write(self, topic: str, raw: bytes, log_time_ns: int) -> None:
         """Append a message, serialised as CDR; `log_time_ns` is when it was published, ns.
@@ -97,15 +87,24 @@ class BagWriter:
             RecordingError: The recording is closed, the topic was never added, the time is out of
                 range, or the disk refuses the data, which closes the recording.
         """
-        self._check_open()
+        self._files.check_open()
         if topic not in self._connections:
             raise RecordingError(one_of("topic", topic, list(self._connections)))
-        if not 0 <= log_time_ns <= _LATEST_NS:
-            raise RecordingError(f"log time {log_time_ns} ns is not within 0 to {_LATEST_NS} ns")
-        try:
-            self._writer.write(self._connections[topic], log_time_ns, raw)
-        except OSError as error:
-            self._abandon(error)
+        if not 0 <= log_time_ns <= LATEST_NS:
+            raise RecordingError(f"log time {log_time_ns} ns is not within 0 to {LATEST_NS} ns")
+        self._files.write(self._connections[topic], raw, log_time_ns)
+
+    def flush(self) -> None:
+        """Hand all that was written to the operating system.
+
+        What was flushed outlives this process, however that ends: `actuated_characters recover`
+        makes a recording of it. Without it a killed recorder loses up to the last MiB of MCAP, and
+        all of SQLite.
+
+        Raises:
+            RecordingError: The recording is closed, or the disk refuses the data, which closes it.
+        """
+        self._files.flush()
 
     def close(self) -> None:
         """Complete the recording: the rest of the messages, the index and the metadata.
@@ -115,26 +114,7 @@ class BagWriter:
         Raises:
             RecordingError: The disk refuses the data.
         """
-        if not self._is_open:
-            return
-        self._is_open = False
-        try:
-            self._writer.close()
-        except OSError as error:
-            self._abandon(error)
-
-    def _check_open(self) -> None:
-        if not self._is_open:
-            raise RecordingError(f"recording {self._path} is closed")
-
-    def _abandon(self, cause: OSError) -> None:
-        """Give up the file, whose end is undefined now; it has no index and no metadata."""
-        self._is_open = False
-        with suppress(OSError):  # it flushes once more, to the same full disk
-            self._writer.abort()
-        raise RecordingError(
-            f"recording {self._path} is incomplete, cannot write: {cause.strerror}"
-        ) from cause
+        self._files.close()
 
 
 def _offered(qos: QoSProfile) -> Qos:

@@ -18,9 +18,16 @@ from msgs_config.errors import ConfigurationError, one_of
 if TYPE_CHECKING:  # it takes a second to import
     from experiment.plan import Plan
     from experiment.planned_push import PlannedPush
+    from experiment.planned_throw import PlannedThrow
     from msgs_config.parameters import Values
 
 _NODES = ("sim_node", "controller_node")
+_RECORDING = {  # options, and the recorder's parameters
+    "storage": "storage",
+    "compression": "compression",
+    "topic": "topics",
+    "exclude": "exclude",
+}
 
 
 def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -39,6 +46,12 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
     )
     _add_tracked(run)
     run.add_argument(
+        "--behaviour",
+        choices=["tracking", "ragdoll", "active_ragdoll", "reactive"],
+        help="track whatever comes (tracking, the default); be limp; go limp on a hard hit, and "
+        "get up; or react to hits",
+    )
+    run.add_argument(
         "--duration",
         type=float,
         default=10.0,
@@ -49,10 +62,7 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         "--output", type=Path, metavar="DIR", help="where the results go (runs/CHARACTER-MOTION)"
     )
     run.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
-    run.add_argument("--no-record", action="store_true", help="write no bag")
-    run.add_argument(
-        "--contacts", action="store_true", help="have the bag hold what touched what, too"
-    )
+    _add_recorded(run)
     run.add_argument(
         "--push",
         action="append",
@@ -60,6 +70,15 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         metavar="LINK:FX,FY,FZ@S",
         help="a force in N, world axes, on a link at a time in s, for sim_node.wrench_duration; "
         "may be repeated",
+    )
+    run.add_argument(
+        "--throw",
+        action="append",
+        default=[],
+        metavar="'mass=KG speed=M/S at=S target=LINK'",
+        help="a ball that hits a link, where the reference has it, at a time in s (it is let go "
+        "before); from=front, left, right, back, above or degrees (front), distance=M (2), "
+        "radius=M; may be repeated",
     )
     run.add_argument(
         "--in-process", action="store_true", help="one process without ROS: the same states, no bag"
@@ -87,17 +106,41 @@ def _add_tracked(run: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_recorded(run: argparse.ArgumentParser) -> None:
+    """Add the options that say what is recorded, and how."""
+    run.add_argument("--no-record", action="store_true", help="write no bag")
+    run.add_argument("--storage", choices=["mcap", "sqlite3"], help="how the bag is stored (mcap)")
+    run.add_argument(
+        "--compression", choices=["none", "zstd"], help="how the bag is compressed (none)"
+    )
+    run.add_argument(
+        "--topic",
+        action="append",
+        metavar="NAME",
+        help="record this topic beside those of the simulation; may be repeated",
+    )
+    run.add_argument(
+        "--exclude",
+        action="append",
+        metavar="NAME",
+        help="do not record this topic of the simulation, such as contacts; may be repeated",
+    )
+
+
 def _run(options: argparse.Namespace) -> None:
     from experiment.figures import plot_figures, prepare_directory
+    from experiment.planned_throw import plan_throws
 
     settings = _settings(options.set)
+    _set_behaviour(options.behaviour, settings["controller_node"])
     plan = _checked_plan(options, settings["sim_node"], settings["controller_node"])
     pushes = [_push(text, plan) for text in options.push]
+    throws, in_the_way = plan_throws(plan, options.throw)
     motion = _name_of(plan.controller)
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     prepare_directory(directory, overwrite=options.overwrite)
-    for note in plan.notes:
+    for note in (*plan.notes, *in_the_way):
         print(note)
     with _progress_bar(f"{plan.character.name}: {motion}", plan.ticks) as bar:
 
@@ -105,7 +148,7 @@ def _run(options: argparse.Namespace) -> None:
             bar.update(bar.task_ids[0], completed=min(ticks, plan.ticks))
 
         try:
-            _run_plan(options, plan, directory, pushes, progress)
+            _run_plan(options, plan, directory, progress, pushes=pushes, throws=throws)
         except KeyboardInterrupt:
             print(f"the results in {directory} are not complete", file=sys.stderr)
             raise
@@ -129,33 +172,53 @@ def _checked_plan(
             "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
             "nor a 'real_time_factor'"
         )
-    if options.contacts and (options.in_process or options.no_record):
+    about_bag = [f"--{name}" for name in _RECORDING if getattr(options, name) is not None]
+    if about_bag and (options.in_process or options.no_record):
         raise ConfigurationError(
-            "--contacts is about the bag; with --in-process or --no-record there is none"
+            f"{about_bag[0]} is about the bag; with --in-process or --no-record there is none"
         )
+    for name in options.exclude or ():
+        _check_excludable(name)
     return plan
+
+
+def _check_excludable(name: str) -> None:
+    """Raise ConfigurationError unless the recorder may do without a topic."""
+    from experiment.recorder_topics import EXCLUDABLE
+
+    if name not in EXCLUDABLE and name.removeprefix("/") not in EXCLUDABLE:
+        raise ConfigurationError(one_of("topic to --exclude:", name, EXCLUDABLE))
 
 
 def _run_plan(
     options: argparse.Namespace,
     plan: "Plan",
     directory: Path,
-    pushes: "Sequence[PlannedPush]",
     progress: Callable[[int], None],
+    *,
+    pushes: "Sequence[PlannedPush]",
+    throws: "Sequence[PlannedThrow]",
 ) -> None:
     from experiment.run import run_in_process, run_over_topics
 
     if options.in_process:
-        run_in_process(plan, directory, progress=progress, pushes=pushes)
+        run_in_process(plan, directory, progress=progress, pushes=pushes, throws=throws)
         return
     run_over_topics(
         plan,
         directory,
         write_bag=not options.no_record,
         progress=progress,
-        contacts=options.contacts,
+        recording=_recording(options),
         pushes=pushes,
+        throws=throws,
     )
+
+
+def _recording(options: argparse.Namespace) -> dict[str, object]:
+    """The recorder's parameters that the options say."""
+    given = {parameter: getattr(options, name) for name, parameter in _RECORDING.items()}
+    return {parameter: value for parameter, value in given.items() if value is not None}
 
 
 def _name_of(controller: "Values") -> str:
@@ -206,6 +269,17 @@ def _settings(texts: Sequence[str]) -> dict[str, dict[str, object]]:
     return settings
 
 
+def _set_behaviour(behaviour: str | None, controller: dict[str, object]) -> None:
+    """Set what `--behaviour` says. Raises ConfigurationError if `--set` says another one."""
+    if behaviour is None:
+        return
+    if controller.setdefault("behaviour", behaviour) != behaviour:
+        raise ConfigurationError(
+            f"--behaviour is {behaviour}, and --set controller_node.behaviour is "
+            f"{controller['behaviour']}; give one of them"
+        )
+
+
 def _progress_bar(description: str, ticks: int) -> Progress:
     bar = Progress(
         TextColumn("{task.description}", markup=False),
@@ -227,6 +301,14 @@ def _report(directory: Path) -> None:
     table.add_column("figure")
     table.add_column("value", justify="right", overflow="fold")
     for name, value in summary.items():
-        shown = f"{value:.4g}" if isinstance(value, float) else str(value)
-        table.add_row(name, "-" if value is None else shown)
+        table.add_row(name, _shown(value))
     Console().print(table)
+
+
+def _shown(value: object) -> str:
+    """A figure as the table has it."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {part}" for name, part in value.items()) or "none"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return "-" if value is None else str(value)

@@ -18,6 +18,7 @@ NAMES = (
     "forward_inverse",
     "clips",
     "balance",
+    "reactions",
 )
 
 

@@ -12,6 +12,7 @@ from experiment.bags.recording import Recording, read_recording
 from experiment.figures import prepare_directory, read_figures
 from experiment.plan import make_plan
 from experiment.planned_push import PlannedPush
+from experiment.planned_throw import plan_throws
 from experiment.run import run_over_topics
 from experiment.studies.study import Case, Findings, Outcome
 from msgs_config.errors import RunError
@@ -20,6 +21,7 @@ Report = Callable[[str, float], None]
 """Is told a run's label, and which share of it is done."""
 
 _DIVERGED = "diverged at tick"
+_UNREAD = ["odom", "visualization", "controller_node/net_wrench"]  # topics, at a cost each tick
 _DPI = 110
 
 
@@ -37,6 +39,7 @@ class TopicLaboratory:
         plan = make_plan(
             case.character, case.duration, case.reference, case.simulator, case.controller
         )
+        throws, _ = plan_throws(plan, case.throws)
         directory = self._directory / "runs" / case.label
         prepare_directory(directory, overwrite=True)
         diverged = ""
@@ -47,8 +50,9 @@ class TopicLaboratory:
                 directory,
                 write_bag=True,
                 progress=lambda ticks: self._report(case.label, min(ticks / plan.ticks, 1.0)),
-                contacts=case.contacts,
+                recording={"exclude": _UNREAD if case.contacts else [*_UNREAD, "contacts"]},
                 pushes=case.pushes,
+                throws=throws,
             )
         except RunError as error:
             if _DIVERGED not in str(error):

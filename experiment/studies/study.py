@@ -17,7 +17,7 @@ Cell = str | int | float | bool | None
 
 @dataclass(frozen=True)
 class Case:
-    """One run of a study: what `actuated_characters run` takes, and pushes."""
+    """One run of a study: what `actuated_characters run` takes."""
 
     label: str  # unique in its study; also the name of its directory
     character: str  # a shipped one, or a file's path
@@ -26,6 +26,7 @@ class Case:
     simulator: Mapping[str, object] = field(default_factory=dict)  # parameters of sim_node
     controller: Mapping[str, object] = field(default_factory=dict)  # of controller_node
     pushes: Sequence[PlannedPush] = ()  # each for the simulator's `wrench_duration`
+    throws: Sequence[str] = ()  # as `--throw` has them
     contacts: bool = False  # whether to record them
 
 

@@ -1,0 +1,53 @@
+"""Sampling-based motion control: samples a second on one process and on two, for a walk."""
+
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from experiment.samcon.problem import Problem
+from experiment.samcon.reconstruction import Job, reconstruct
+from experiment.samcon.settings import preset
+
+_DURATION = 0.4  # s of the motion
+_SAMPLES = 400  # a window
+
+
+@dataclass(frozen=True)
+class Speed:
+    """How fast a search went."""
+
+    workers: int
+    samples_a_second: float
+
+
+def measure_samcon(console: Console) -> None:
+    """Measure and print the table."""
+    console.print("sampling-based motion control: humanoid, walk ...")
+    counts = sorted({1, min(2, os.cpu_count() or 1), os.cpu_count() or 1})
+    speeds = [_speed(workers) for workers in counts]
+    title = f"reconstruct --clip walk --samples {_SAMPLES} (windows of 0.1 s at 240 Hz)"
+    table = Table(title=title, title_justify="left")
+    for column in ("processes", "samples / s", "times real time", "parallel efficiency"):
+        table.add_column(column, justify="right")
+    for speed in speeds:
+        efficiency = speed.samples_a_second / (speed.workers * speeds[0].samples_a_second)
+        table.add_row(
+            str(speed.workers),
+            f"{speed.samples_a_second:.0f}",
+            f"{0.1 * speed.samples_a_second:.0f}",
+            f"{efficiency:.2f}",
+        )
+    console.print(table)
+
+
+def _speed(workers: int) -> Speed:
+    settings = preset("humanoid", "walk", samples=_SAMPLES)
+    problem = Problem("humanoid", "walk", _DURATION, settings.window, feedback=settings.feedback)
+    with tempfile.TemporaryDirectory() as directory:
+        output = Path(directory) / "walk.json"
+        found = reconstruct(Job(problem, 1, settings, output, workers))
+    return Speed(workers, found.samples_a_second)

@@ -1,0 +1,109 @@
+"""Which clips are reconstructed with joint torques alone: `python -m benchmarks.samcon_clips`.
+
+A row a clip: of how many seeds it was done to its end, and how well. It takes hours.
+"""
+
+import argparse
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgs_config.process import limit_threads
+
+limit_threads()
+
+import numpy as np  # noqa: E402 - after the limit on threads
+from rich.console import Console  # noqa: E402
+from rich.table import Table  # noqa: E402
+
+from controller_node.references.corrected_file import read_reconstruction  # noqa: E402
+from experiment.samcon.problem import Problem  # noqa: E402
+from experiment.samcon.reconstruction import Job, duration_of, reconstruct  # noqa: E402
+from experiment.samcon.settings import preset  # noqa: E402
+from experiment.samcon.verification import Figures  # noqa: E402
+from msgs_config.errors import RunError  # noqa: E402
+
+CYCLES = {  # of each clip
+    "walk": 4,
+    "run": 4,
+    "jump": 1,
+    "kick": 1,
+    "cartwheel": 1,
+    "roll": 1,
+    "spin": 1,
+    "spinkick": 1,
+    "dance_a": 1,
+}
+CENTRE_ERROR, JOINT_ERROR = 0.15, 0.30  # m, rad; what counts as done is not farther away
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What has become of a clip with one seed."""
+
+    figures: Figures | None  # None: it failed
+    reached: float  # share of the windows
+
+    @property
+    def done(self) -> bool:
+        """Whether it is what was wanted."""
+        return (
+            self.figures is not None
+            and not self.figures.fell
+            and self.figures.centre_error_mean_m <= CENTRE_ERROR
+            and self.figures.joint_error_mean_rad <= JOINT_ERROR
+        )
+
+
+def main() -> int:
+    """Reconstruct clips with some seeds, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("clips", nargs="*", default=list(CYCLES), help="(all)")
+    parser.add_argument("--seeds", type=int, default=5, help="(%(default)s)")
+    parser.add_argument("--samples", type=int, default=1000, help="a window (%(default)s)")
+    parser.add_argument("--workers", type=int, default=1, help="processes (%(default)s)")
+    options = parser.parse_args()
+    console = Console(width=100)
+    table = Table(title=f"{options.samples} samples a window", title_justify="left")
+    for column in ("clip", "done", "to its end", "reached", "centre, m", "joints, rad"):
+        table.add_column(column, justify="right" if column != "clip" else "left")
+    for clip in options.clips:
+        attempts = []
+        for seed in range(1, options.seeds + 1):
+            attempts.append(_attempt(clip, seed, options.samples, options.workers))
+            console.print(f"{clip}, seed {seed}: {attempts[-1]}")
+        table.add_row(clip, *_row(attempts))
+    console.print(table)
+    return 0
+
+
+def _attempt(clip: str, seed: int, samples: int, workers: int) -> Attempt:
+    settings = preset("humanoid", clip, samples=samples, seed=seed)
+    duration = duration_of("humanoid", clip, CYCLES.get(clip, 1))
+    problem = Problem("humanoid", clip, duration, settings.window, feedback=settings.feedback)
+    with tempfile.TemporaryDirectory() as directory:
+        output = Path(directory) / "motion.json"
+        try:
+            found = reconstruct(Job(problem, CYCLES.get(clip, 1), settings, output, workers))
+        except RunError:
+            costs = read_reconstruction(output)["costs"]
+            return Attempt(None, len(costs) * settings.window / duration)
+    return Attempt(found.figures, 1.0)
+
+
+def _row(attempts: list[Attempt]) -> list[str]:
+    figures = [attempt.figures for attempt in attempts if attempt.figures is not None]
+    centre = [figure.centre_error_mean_m for figure in figures]
+    joints = [figure.joint_error_mean_rad for figure in figures]
+    return [
+        f"{sum(attempt.done for attempt in attempts)} of {len(attempts)}",
+        f"{len(figures)} of {len(attempts)}",
+        f"{100.0 * np.mean([attempt.reached for attempt in attempts]):.0f} %",
+        f"{np.mean(centre):.3f}" if centre else "-",
+        f"{np.mean(joints):.3f}" if joints else "-",
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""What a character does when it is hit: ragdoll, active ragdoll, reaction. Pure numpy, no ROS."""

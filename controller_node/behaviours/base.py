@@ -1,0 +1,98 @@
+"""What a behaviour sees in a tick, and what it has the controller do."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol, TypeAlias
+
+from controller_node.laws import GainArrays
+from controller_node.references.base import ReferenceState
+from msgs_config.arrays import FloatArray
+
+
+class Mode(Enum):
+    """What a character is doing, as `~/mode` says it."""
+
+    TRACK = "TRACK"  # follows its own reference
+    REACT = "REACT"  # was hit, and gives way
+    SEARCH = "SEARCH"  # looks for a motion to go on with
+    BLEND = "BLEND"  # goes over to a motion that was found, or back to its own
+    LIMP = "LIMP"  # nothing drives it
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A tick as a behaviour sees it; times in s since the episode's first state."""
+
+    time: float
+    next_time: float
+    position: FloatArray  # (n,)
+    velocity: FloatArray  # (n,)
+    contacts: FloatArray  # (links, 6) net wrenches of the tick before, world axes, N and N m
+    now: ReferenceState  # of the own reference
+    upcoming: ReferenceState  # of the own reference, one tick later
+    gains: GainArrays  # in force
+
+
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """A time in one mode, and what led to it: facts for JSON."""
+
+    mode: Mode
+    facts: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Directive:
+    """What to track in a tick, and how firmly."""
+
+    phase: Phase  # the same object as long as it lasts
+    now: ReferenceState
+    upcoming: ReferenceState
+    gains: GainArrays
+
+
+class Behaviour(Protocol):
+    """A state machine, made anew for each episode."""
+
+    def advance(self, seen: Observation) -> Directive:
+        """What to do in a tick; called once a tick, in order."""
+        ...
+
+
+BehaviourMaker: TypeAlias = Callable[[], Behaviour]
+
+
+@dataclass(frozen=True)
+class ModeReport:
+    """Since which state a mode holds, and why."""
+
+    phase: Phase
+    stamp_ns: int
+
+    def content(self) -> dict[str, object]:
+        """What JSON says of it."""
+        mode = self.phase.mode.value
+        return {"mode": mode, "stamp_ns": self.stamp_ns, **self.phase.facts}
+
+
+class Tracking:
+    """Follows the own reference, whatever comes."""
+
+    def __init__(self) -> None:
+        self._phase = Phase(Mode.TRACK)
+
+    def advance(self, seen: Observation) -> Directive:
+        """The reference and the gains as they are."""
+        return Directive(self._phase, seen.now, seen.upcoming, seen.gains)
+
+
+class Ragdoll:
+    """Follows nothing; its law is to be `zero`."""
+
+    def __init__(self) -> None:
+        self._phase = Phase(Mode.LIMP, {"assistance": "none"})
+
+    def advance(self, seen: Observation) -> Directive:
+        """The reference as it is, which nobody follows."""
+        return Directive(self._phase, seen.now, seen.upcoming, seen.gains)

@@ -1,0 +1,45 @@
+"""Where a floating base stands, which way it faces, and on which side it lies."""
+
+import numpy as np
+
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+from msgs_config.errors import ConfigurationError
+
+_UP = np.array((0.0, 0.0, 1.0))
+_FORWARD = np.array((1.0, 0.0, 0.0))
+
+
+class Posture:
+    """What turns of the base mean, measured from the rest pose: upright, and facing along x."""
+
+    def __init__(self, character: Character) -> None:
+        """From a character's rest pose. Raises ConfigurationError if its base is fixed."""
+        if not character.layout.has_floating_base:
+            raise ConfigurationError(
+                f"character '{character.name}' has a fixed base; a behaviour other than tracking "
+                "and ragdoll needs one that floats"
+            )
+        rest = rotations.exp(np.array(character.rest_position[3:6]))
+        # in the character's own world, which its placement may have turned
+        self._upright = rotations.multiply(rotations.about_z(-character.placement.yaw), rest)
+
+    def _from_upright(self, root_xyzw: FloatArray) -> FloatArray:
+        return rotations.multiply(root_xyzw, rotations.conjugate(self._upright))
+
+    def heading(self, root_xyzw: FloatArray) -> FloatArray:
+        """Angle (...) in rad about z of the way that it faces; arbitrary where upside down."""
+        return rotations.yaw(self._from_upright(root_xyzw))
+
+    def tilt(self, root_xyzw: FloatArray, reference_xyzw: FloatArray) -> float:
+        """Angle in rad between its upward axis and that of a reference."""
+        up, wanted = (
+            rotations.rotate(self._from_upright(q), _UP) for q in (root_xyzw, reference_xyzw)
+        )
+        return float(np.arccos(np.clip(np.einsum("i,i->", up, wanted), -1.0, 1.0)))
+
+    def faces_up(self, root_xyzw: FloatArray) -> bool:
+        """Whether its front points up rather than down."""
+        front = rotations.rotate(self._from_upright(root_xyzw), _FORWARD)
+        return bool(front[2] > 0.0)

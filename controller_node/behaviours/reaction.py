@@ -1,0 +1,340 @@
+"""Physics and captured motion in turn: tracks, gives way to a hit, and comes back.
+
+    TRACK -> REACT -> SEARCH -> BLEND (to the motion found) -> BLEND (back) -> TRACK
+    REACT, or TRACK -> LIMP -> SEARCH -> BLEND (getting up) -> TRACK
+
+Source: Zordan, Majkowska, Chiu and Fast 2005, "Dynamic Response for Motion Capture Animation".
+What the control law tracks is continuous throughout: at each change it goes on as it moves.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.behaviours.base import Directive, Mode, Observation, Phase
+from controller_node.behaviours.give_way import GiveWay, softened
+from controller_node.behaviours.hits import Hit, HitDetector
+from controller_node.behaviours.library import Match, MotionLibrary
+from controller_node.behaviours.posture import Posture
+from controller_node.behaviours.settings import ReactionSettings
+from controller_node.behaviours.ways import BodyWay, ClipWay, OwnWay, Way
+from controller_node.dynamics import DynamicsModel
+from controller_node.laws import GainArrays
+from controller_node.references.base import ReferenceState
+from controller_node.references.inertialised import InertialisedReference, Offset
+from controller_node.references.moved import Carry, MovedReference
+from controller_node.strength import weakened
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+
+_FALLEN_TILT = math.radians(60.0)  # from the target's upright
+_FALLEN_HEIGHT = 0.5  # of the target's root
+_SEVERE = 2.0 / 3.0  # of the threshold above which it goes limp: the full reaction
+_ONTO = 0.6  # of the blend's duration, until the motion that was found is reached
+_FIRM_AGAIN = 0.2  # s, in which the joints are as firm as before a hit
+_STILL_SPEED = 0.1  # m/s: it lies still with less kinetic energy than all of it at that speed
+_STILL_TIME, _LONGEST_LIMP = 0.4, 5.0  # s
+
+
+@dataclass(frozen=True)
+class ReactionKit:
+    """What all episodes of one controller have in common."""
+
+    character: Character
+    settings: ReactionSettings
+    model: DynamicsModel
+    posture: Posture
+    period: float  # s, of control
+    library: MotionLibrary | None = None  # of a behaviour that searches
+    get_ups: MotionLibrary | None = None  # of one that gets up by a clip
+
+
+_Step = Callable[[Observation, Hit | None], None]
+
+
+class Reaction:
+    """The state machine of `reactive` and `active_ragdoll`, for one episode."""
+
+    def __init__(self, kit: ReactionKit) -> None:
+        self._kit = kit
+        self._layout = kit.character.layout
+        self._settings = kit.settings
+        self._detector = HitDetector(kit.character, kit.period)
+        self._own = OwnWay(self._layout)
+        self._way: Way = self._own
+        self._hit = Hit(0, 0.0)  # the last one
+        self._begin(0.0, Mode.TRACK, self._track, self._firm)
+
+    def advance(self, seen: Observation) -> Directive:
+        """What to do in a tick: change the phase if it is time, and say what is tracked in it."""
+        self._kit.model.update(seen.position, seen.velocity)
+        hit = self._detector.strongest(seen.contacts, *self._kit.model.link_poses())
+        self._step(seen, hit)
+        return Directive(
+            self._phase,
+            self._way.target(seen.time, seen.now),
+            self._way.target(seen.next_time, seen.upcoming),
+            self._gains(seen),
+        )
+
+    def _begin(
+        self,
+        time: float,
+        mode: Mode,
+        step: _Step,
+        gains: Callable[[Observation], GainArrays],
+        **facts: object,
+    ) -> None:
+        """Begin a phase: what may end it, and which gains hold in it."""
+        self._phase = Phase(mode, facts)
+        self._since, self._step, self._gains = time, step, gains
+
+    def _elapsed(self, seen: Observation) -> float:
+        return seen.time - self._since
+
+    # What may end each phase
+
+    def _track(self, seen: Observation, hit: Hit | None) -> None:
+        """Give way to a hit, or go limp by a hard one."""
+        impulse = 0.0 if hit is None else hit.impulse
+        if hit is not None and impulse >= self._settings.limp_threshold:
+            self._go_limp(seen, "hit", hit)
+        elif (
+            hit is not None and impulse >= self._settings.hit_threshold and self._settings.searches
+        ):
+            self._react(seen, hit)
+        elif not self._settings.searches and self._has_fallen(seen):
+            self._go_limp(seen, "fallen", None)
+
+    def _return(self, seen: Observation, hit: Hit | None) -> None:
+        if self._elapsed(seen) >= self._settings.blend_duration:
+            self._way = self._own = OwnWay(self._layout, self._own.carry)
+            self._begin(seen.time, Mode.TRACK, self._track, self._firm, assistance="full")
+        self._track(seen, hit)
+
+    def _follow(self, seen: Observation, hit: Hit | None) -> None:
+        if self._elapsed(seen) >= self._settings.blend_duration:
+            self._come_back(seen, self._own.carry, self._settings.blend_duration)
+        self._track(seen, hit)
+
+    def _react_on(self, seen: Observation, hit: Hit | None) -> None:
+        if hit is not None and hit.impulse > self._hit.impulse:
+            self._hit = hit  # the impulse grows while the contact lasts
+        if self._hit.impulse >= self._settings.limp_threshold:
+            self._go_limp(seen, "hit", self._hit)
+        elif self._has_fallen(seen):
+            self._go_limp(seen, "fallen", self._hit)
+        elif self._elapsed(seen) >= self._severity * self._settings.react_duration:
+            self._begin(seen.time, Mode.SEARCH, self._search, self._soft, **self._hit_facts())
+
+    def _search(self, seen: Observation, hit: Hit | None) -> None:
+        """Go on with the motion that is nearest to what the present state leads to."""
+        library = self._kit.library
+        assert library is not None
+        match = library.nearest(library.predicted(self._led(seen), seen.velocity))
+        self._follow_clip(library, match, seen, _ONTO * self._settings.blend_duration)
+        self._begin(
+            seen.time,
+            Mode.BLEND,
+            self._follow,
+            self._firmer,
+            to="clip",
+            assistance="full",
+            **match.content(),
+        )
+
+    def _lie(self, seen: Observation, hit: Hit | None) -> None:
+        """Wait until it lies still."""
+        assert isinstance(self._way, BodyWay)
+        self._way.state = self._body(seen)
+        still_energy = 0.5 * self._kit.character.mass * _STILL_SPEED**2
+        if self._kit.model.kinetic_energy() > still_energy:
+            self._moved = seen.time
+        still = seen.time - self._moved >= _STILL_TIME
+        if still or self._elapsed(seen) >= _LONGEST_LIMP:
+            side = "faceup" if self._faces_up(seen) else "facedown"
+            self._begin(
+                seen.time, Mode.SEARCH, self._find_get_up, self._limp, side=side, assistance="none"
+            )
+
+    def _find_get_up(self, seen: Observation, hit: Hit | None) -> None:
+        assert isinstance(self._way, BodyWay)
+        self._way.state = self._body(seen)
+        self._rise_until = seen.time + self._settings.recovery_duration
+        if self._kit.get_ups is None:
+            carry = self._carry_to(seen.now, self._way.state)
+            self._come_back(seen, carry, self._settings.recovery_duration)
+            self._begin(
+                seen.time, Mode.BLEND, self._rise, self._rising, to="reference", assistance="rising"
+            )
+            return
+        clip = self._settings.face_up if self._faces_up(seen) else self._settings.face_down
+        library = self._kit.get_ups
+        still = library.predicted(seen.position, np.zeros_like(seen.velocity))
+        match = library.nearest(still, among=clip)
+        self._follow_clip(library, match, seen, self._settings.recovery_duration)
+        self._rise_until = seen.time + library.duration(clip) - match.time
+        self._begin(
+            seen.time,
+            Mode.BLEND,
+            self._rise,
+            self._rising,
+            to="clip",
+            assistance="rising",
+            **match.content(),
+        )
+
+    def _rise(self, seen: Observation, hit: Hit | None) -> None:
+        if hit is not None and hit.impulse >= self._settings.limp_threshold:
+            self._go_limp(seen, "hit", hit)
+        elif seen.time >= self._rise_until:
+            if isinstance(self._way, ClipWay):
+                carry = self._carry_to(seen.now, self._way.target(seen.time, seen.now))
+                self._come_back(seen, carry, self._settings.blend_duration)
+            else:
+                self._return(seen, hit)
+
+    # Changes
+
+    def _react(self, seen: Observation, hit: Hit) -> None:
+        kit, settings = self._kit, self._settings
+        self._hit = hit
+        target = self._way.target(seen.time, seen.now).configuration
+        self._lead = self._layout.difference(self._body(seen).configuration, target)
+        diagonal = np.diag(kit.model.mass_matrix())
+        self._give_way = GiveWay(kit.character, diagonal)
+        self._softness = softened(kit.character, hit.link, settings.softness)
+        self._begin(seen.time, Mode.REACT, self._react_on, self._soft, **self._hit_facts())
+
+    @property
+    def _severity(self) -> float:
+        """How hard the hit is, as a share: of light ones the reaction is short and slight.
+
+        Else the pause in assistance would move the character more than the hit itself does.
+        """
+        return min(self._hit.impulse / (_SEVERE * self._settings.limp_threshold), 1.0)
+
+    def _hit_facts(self) -> dict[str, object]:
+        name = self._kit.character.links[self._hit.link].name
+        share = self._settings.assistance
+        return {"link": name, "impulse": self._hit.impulse, "assistance": share}
+
+    def _go_limp(self, seen: Observation, why: str, hit: Hit | None) -> None:
+        """Let everything go; the target comes to the body, which nothing draws to it."""
+        target, body = self._way.target(seen.time, seen.now), self._body(seen)
+        offset = Offset(self._layout, body, target, seen.time, _STILL_TIME)
+        self._way = BodyWay(offset, body)
+        self._moved = seen.time
+        self._lead = np.zeros(self._layout.size)
+        facts: dict[str, object] = {"why": why}
+        if hit is not None:
+            name = self._kit.character.links[hit.link].name
+            facts |= {"link": name, "impulse": hit.impulse}
+        self._begin(seen.time, Mode.LIMP, self._lie, self._limp, assistance="none", **facts)
+
+    def _follow_clip(
+        self, library: MotionLibrary, match: Match, seen: Observation, duration: float
+    ) -> None:
+        """Go over to a moment of a clip, carried to where the character is."""
+        motion = library.references[match.clip]
+        there = self._led(seen)
+        place = motion.sample(match.time).configuration.position
+        carry = Carry.leading(place, 0.0, there, match.turn)
+        moved = MovedReference(self._layout, motion, carry, seen.time, match.time)
+        wanted = self._way.target(seen.time, seen.now)
+        self._way = ClipWay(
+            InertialisedReference(self._layout, moved, wanted, start=seen.time, duration=duration)
+        )
+
+    def _come_back(self, seen: Observation, carry: Carry, duration: float) -> None:
+        """Go over to the own reference, carried."""
+        wanted = self._way.target(seen.time, seen.now)
+        own = carry.moved(self._layout, seen.now)
+        offset = Offset(self._layout, own, wanted, seen.time, duration)
+        self._way = self._own = OwnWay(self._layout, carry, offset)
+        self._begin(
+            seen.time, Mode.BLEND, self._return, self._firm, to="reference", assistance="full"
+        )
+
+    # Gains
+
+    def _firm(self, seen: Observation) -> GainArrays:
+        """All as it is; of an active ragdoll the root's torque is bounded."""
+        if self._settings.searches:
+            return seen.gains
+        limits = seen.gains.effort_limits.copy()
+        limits[1] = min(limits[1], self._settings.upright_torque)
+        gains = seen.gains
+        return GainArrays(gains.stiffness, gains.damping, gains.integral, limits)
+
+    def _soft(self, seen: Observation) -> GainArrays:
+        force = self._settings.assistance * self._kit.model.weight
+        arm = float(seen.now.configuration.position[2])  # of the root's force about the feet
+        return self._give_way.gains(seen.gains, self._softness, force, force * abs(arm))
+
+    def _firmer(self, seen: Observation) -> GainArrays:
+        """From as soft as in the phase before to as it is; the root's limits are lifted at once."""
+        share = min(self._elapsed(seen) / _FIRM_AGAIN, 1.0)
+        firm = self._firm(seen)
+        if share >= 1.0:
+            return firm
+        soft = self._soft(seen)
+        return GainArrays(
+            soft.stiffness + share * (firm.stiffness - soft.stiffness),
+            soft.damping + share * (firm.damping - soft.damping),
+            firm.integral,
+            firm.effort_limits,
+        )
+
+    def _limp(self, seen: Observation) -> GainArrays:
+        return self._weak(seen, 0.0)
+
+    def _rising(self, seen: Observation) -> GainArrays:
+        return self._weak(seen, min(self._elapsed(seen) / self._settings.recovery_duration, 1.0))
+
+    def _weak(self, seen: Observation, strength: float) -> GainArrays:
+        strengths = np.full(len(self._layout.vector_starts), strength)
+        return weakened(self._layout, self._firm(seen), strengths)
+
+    # What is
+
+    def _body(self, seen: Observation) -> ReferenceState:
+        still = np.zeros(self._layout.size)
+        return ReferenceState(self._layout.configuration(seen.position), seen.velocity, still)
+
+    def _led(self, seen: Observation) -> FloatArray:
+        """The position (n,), led by as much as the target led it when it was struck.
+
+        A body lags behind what it tracks. Without that, a motion found by the body's own state
+        would be one that it lags behind once more.
+        """
+        turns = self._body(seen).configuration.orientations_xyzw
+        entries = self._layout.rotation_entries
+        position = seen.position + self._lead
+        turned = rotations.multiply(turns, rotations.exp(self._lead[entries]))
+        position[entries] = rotations.log(turned)
+        return position
+
+    def _carry_to(self, motion: ReferenceState, there: ReferenceState) -> Carry:
+        """What leads from where a motion's root is, and faces, to where another one's is."""
+        one, other = motion.configuration, there.configuration
+        heading = self._kit.posture.heading
+        return Carry.leading(
+            one.position[:3],
+            float(heading(one.orientations_xyzw[0])),
+            other.position[:3],
+            float(heading(other.orientations_xyzw[0])),
+        )
+
+    def _faces_up(self, seen: Observation) -> bool:
+        return self._kit.posture.faces_up(self._body(seen).configuration.orientations_xyzw[0])
+
+    def _has_fallen(self, seen: Observation) -> bool:
+        """Whether the root is far below the target's, or far from as upright."""
+        target = self._way.target(seen.time, seen.now).configuration
+        low = seen.position[2] < _FALLEN_HEIGHT * target.position[2]
+        turn = self._body(seen).configuration.orientations_xyzw[0]
+        return bool(low) or self._kit.posture.tilt(turn, target.orientations_xyzw[0]) > _FALLEN_TILT

@@ -1,0 +1,150 @@
+"""Makes a complete recording of what a killed recorder, a full disk or a broken copy has left."""
+
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from experiment.bags.claim import Claim
+from experiment.bags.metadata import METADATA
+from experiment.bags.reader import read_messages
+from experiment.bags.rewriting import Contents, Progress, rewrite
+from experiment.bags.storage import reason
+from experiment.figures import BAG, SUMMARY, write_figures
+from experiment.listener import CONFIGURATION, HEARD, RunListener
+from msgs_config import topics
+from msgs_config.errors import ActuatedCharactersError, RecordingError
+
+_DAMAGED, _SCRATCH, _COPIES = ".damaged", ".recovering", ".copies"
+_REPORT_PERIOD = 1000  # messages
+
+
+@dataclass
+class Recovered:
+    """What `recover` has found, and where it is."""
+
+    bag: Path
+    contents: Contents
+    damaged: Path | None  # the original; None where the bag was complete and nothing was done
+    measured: list[Path] = field(default_factory=list)  # directories with figures made anew
+    unmeasured: str = ""  # why there are none, in a run's directory
+
+
+def recover(path: Path, progress: Progress | None = None) -> Recovered:
+    """Make a bag complete that is not, in its place; the original stays beside it as `.damaged`.
+
+    Every message that is whole is kept, with its type's definition and its publishers' quality of
+    service. A run's directory gets its figures anew. A bag that is complete is not touched. Being
+    killed itself does no harm: the next call goes on.
+
+    Args:
+        path: A run's directory, or a bag: the directory that its files lie in.
+        progress: Told how far it is.
+
+    Raises:
+        RecordingError: there is nothing to recover, the recorder is still at work, the disk is
+            full, or the original of an earlier recovery is in the way.
+    """
+    report = progress or (lambda what, fraction: None)
+    try:
+        return _recover(path, report)
+    except OSError as error:
+        raise RecordingError(f"cannot recover {path}: {reason(error)}") from error
+
+
+def _recover(path: Path, report: Progress) -> Recovered:
+    is_run = any((path / f"{BAG}{end}").is_dir() for end in ("", _DAMAGED))
+    bag = path / BAG if is_run else path
+    if bag.name in ("", ".."):
+        bag = bag.resolve()
+    _finish_swap(bag)
+    recovered = _recover_bag(bag, report)
+    if is_run and (recovered.damaged is not None or not (path / SUMMARY).exists()):
+        _measure(path, recovered, report)
+    return recovered
+
+
+def _recover_bag(bag: Path, report: Progress) -> Recovered:
+    if not bag.is_dir():
+        hint = "; give the directory that it lies in" if bag.is_file() else ""
+        raise RecordingError(f"nothing to recover: {bag} is no directory{hint}")
+    contents = _whole_contents(bag, report)
+    if contents is not None:
+        return Recovered(bag, contents, None)
+    damaged, scratch = bag.with_name(bag.name + _DAMAGED), _scratch(bag)
+    if damaged.exists():
+        raise RecordingError(f"{damaged} is in the way: what an earlier recovery kept; move it")
+    claim = _claim(bag)
+    try:
+        shutil.rmtree(scratch, ignore_errors=True)  # of a recovery that was killed
+        copies = scratch / (bag.name + _COPIES)
+        copies.mkdir(parents=True)
+        contents = rewrite(bag, scratch / bag.name, copies, report)
+        bag.rename(damaged)
+        _finish_swap(bag)
+    finally:
+        claim.release()
+        if bag.exists():
+            shutil.rmtree(scratch, ignore_errors=True)
+    return Recovered(bag, contents, damaged)
+
+
+def _claim(bag: Path) -> Claim:
+    try:
+        return Claim(bag)
+    except BlockingIOError as error:
+        raise RecordingError(f"a recorder is still at work on {bag}; end it first") from error
+
+
+def _scratch(bag: Path) -> Path:
+    return bag.with_name(bag.name + _SCRATCH)
+
+
+def _finish_swap(bag: Path) -> None:
+    """Put the new bag where the old one was; also for a recovery that was killed before that."""
+    new = _scratch(bag) / bag.name
+    if not bag.exists() and (new / METADATA).is_file():
+        new.rename(bag)
+        shutil.rmtree(new.parent, ignore_errors=True)
+
+
+def _whole_contents(bag: Path, report: Progress) -> Contents | None:
+    """What is in a bag that can be read to its end; None for any other."""
+    contents = Contents()
+    report("checking", None)
+    try:
+        for message in read_messages(bag):
+            contents.add(message.topic, message.log_time_ns)
+    except RecordingError:
+        return None
+    return contents
+
+
+def _measure(directory: Path, recovered: Recovered, report: Progress) -> None:
+    """Make the figures of each character in a bag, as its recorder would have made them."""
+    suffix = f"/{CONFIGURATION}"
+    namespaces = [
+        name.removesuffix(suffix) for name in recovered.contents.counts if name.endswith(suffix)
+    ]
+    try:
+        listeners = {each: RunListener(f"{each}/{topics.SIM_NODE}"[1:]) for each in namespaces}
+        _listen(recovered, listeners, report)
+        for namespace, listener in listeners.items():
+            own = directory / Path(namespace).name if len(namespaces) > 1 else directory
+            write_figures(own, *listener.results())
+            recovered.measured.append(own)
+        if not namespaces:
+            recovered.unmeasured = f"it has no '{CONFIGURATION}'"
+    except ActuatedCharactersError as error:
+        recovered.unmeasured = str(error)
+
+
+def _listen(recovered: Recovered, listeners: dict[str, RunListener], report: Progress) -> None:
+    total = recovered.contents.counts.total()
+    for count, message in enumerate(read_messages(recovered.bag)):
+        if count % _REPORT_PERIOD == 0:
+            report("measuring", count / total)
+        for namespace, listener in listeners.items():
+            shared = message.topic == topics.DIAGNOSTICS.name
+            name = message.topic if shared else message.topic.removeprefix(f"{namespace}/")
+            if name in HEARD:
+                listener.take(name, message.raw, message.log_time_ns)

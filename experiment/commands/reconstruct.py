@@ -1,0 +1,141 @@
+"""The command `actuated_characters reconstruct`: captured motion with joint torques alone."""
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from msgs_config.errors import ConfigurationError
+
+if TYPE_CHECKING:  # it takes a second to import
+    from experiment.samcon.reconstruction import Job, Reconstruction
+    from experiment.samcon.search import Progress as SearchProgress
+
+_SUFFIX = ".json"
+
+
+def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters`."""
+    command = commands.add_parser(
+        "reconstruct",
+        help="have a character do a captured motion with joint torques alone",
+        description=(
+            "Search corrections of a motion clip with which the character does it without root "
+            "assistance (sampling-based motion control, Liu et al. 2010). The result is a clip "
+            "file: play it with `run --clip FILE --set controller_node.root_assistance:=false`."
+        ),
+        epilog="example: actuated_characters reconstruct --clip walk --cycles 4 --output walk.json",
+    )
+    command.set_defaults(command=_reconstruct)
+    command.add_argument("--character", default="humanoid", help="name (%(default)s)")
+    command.add_argument("--clip", default="walk", help="name of a clip, or a file (%(default)s)")
+    command.add_argument(
+        "--cycles", type=int, default=1, metavar="N", help="of the clip, one after another (1)"
+    )
+    command.add_argument(
+        "--output", type=Path, required=True, metavar="FILE", help="a .json file, the result"
+    )
+    command.add_argument("--overwrite", action="store_true", help="replace FILE")
+    command.add_argument(
+        "--resume", action="store_true", help="go on where a search for FILE was stopped"
+    )
+    command.add_argument("--seed", type=int, default=1, help="of all random numbers (1)")
+    command.add_argument("--samples", type=int, metavar="N", help="a window (1000)")
+    command.add_argument("--kept", type=int, metavar="N", help="of them to go on from (80)")
+    command.add_argument("--window", type=float, metavar="S", help="length of a window, s (0.1)")
+    command.add_argument("--rate", type=int, default=240, metavar="HZ", help="control rate (240)")
+    command.add_argument(
+        "--delay-ticks", type=int, default=0, metavar="D", help="by which commands come late (0)"
+    )
+    command.add_argument(
+        "--workers", type=int, metavar="N", help="processes (as many as there are cores)"
+    )
+    command.add_argument(
+        "--cluster", default="", metavar="ADDRESS", help="of a dask scheduler, for its workers"
+    )
+
+
+def _reconstruct(options: argparse.Namespace) -> None:
+    from experiment.samcon.reconstruction import reconstruct
+
+    job = _job(options)
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("window {task.completed:.0f}/{task.total:.0f}"),
+        TextColumn("{task.fields[state]}", markup=False),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )
+    task = bar.add_task(f"{job.problem.character}: {job.problem.clip}", total=1, state="begins")
+
+    def report(progress: "SearchProgress", windows: int, rate: float) -> None:
+        best = progress.levels[-1][0]
+        state = f"best cost {best.cost:.3g}, {rate:.0f} samples/s" if rate else ""
+        bar.update(task, completed=progress.window, total=windows, state=state)
+
+    with bar:
+        found = reconstruct(job, report)
+    _report(job, found)
+
+
+def _job(options: argparse.Namespace) -> "Job":
+    """What is to be done; raises ActuatedCharactersError where options cannot be used."""
+    from experiment.samcon.checkpoint import checkpoint_path
+    from experiment.samcon.problem import Problem
+    from experiment.samcon.reconstruction import Job, duration_of
+    from experiment.samcon.settings import preset
+
+    output: Path = options.output
+    if output.suffix != _SUFFIX:
+        raise ConfigurationError(f"--output is {output}; it must end in {_SUFFIX}, as clips do")
+    if not output.absolute().parent.is_dir():
+        raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
+    if not options.resume and not options.overwrite:
+        for file in (output, checkpoint_path(output)):
+            if file.exists():
+                raise ConfigurationError(
+                    f"{file} exists; --resume goes on, --overwrite begins anew"
+                )
+    workers = options.workers if options.workers is not None else os.cpu_count() or 1
+    if workers < 1:
+        raise ConfigurationError(f"--workers is {workers}; it must be 1 or more")
+    given = {name: getattr(options, name) for name in ("samples", "kept", "window", "seed")}
+    settings = preset(
+        options.character,
+        options.clip,
+        **{name: value for name, value in given.items() if value is not None},
+    )
+    problem = Problem(
+        options.character,
+        options.clip,
+        duration_of(options.character, options.clip, options.cycles),
+        settings.window,
+        {"rate": options.rate, "command_delay_ticks": options.delay_ticks},
+        feedback=settings.feedback,
+    )
+    return Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
+
+
+def _report(job: "Job", found: "Reconstruction") -> None:
+    figures = found.figures
+    rows = {
+        "windows": str(found.windows),
+        "samples": f"{found.samples}, {found.samples_a_second:.0f} a second",
+        "cost, mean": f"{found.cost:.3g}",
+        "centre of mass error, mean": f"{figures.centre_error_mean_m:.3f} m",
+        "joint error, mean": f"{figures.joint_error_mean_rad:.3f} rad",
+        "lowest root": f"{figures.least_root_height_m:.3f} m",
+        "root force, mean": f"{figures.assist_force_mean_n:.3g} N",
+        "fell": str(figures.fell),
+        "state_hash": figures.state_hash,
+    }
+    table = Table(title=escape(str(job.output)), title_justify="left", show_header=False)
+    for name, value in rows.items():
+        table.add_row(name, value)
+    Console().print(table)

@@ -1,0 +1,130 @@
+"""The command `actuated_characters replay`: does what was recorded come again, to the last bit?"""
+
+import argparse
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from experiment.commands.replay_topics import add_through_topics, replay_through_topics
+from msgs_config.errors import ConfigurationError, ReplayError
+
+if TYPE_CHECKING:  # they take a second to import
+    from experiment.bags.recording import Recording
+    from experiment.replay.comparison import ReplayResult
+
+_LARGEST_TOLERANCE = 1e6
+
+
+def add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters`."""
+    parser = commands.add_parser(
+        "replay",
+        help="simulate a recorded run again, and compare every state to the last bit",
+        description="Simulate a recorded run again, without ROS: the torques and pushes that were "
+        "really applied, tick by tick, in the world that the recording describes. Every state is "
+        "compared with the recorded one to the last bit, and the torques with the commands. Ends "
+        "with code 0 if all is identical, else it says which tick and degree of freedom differ "
+        "first.",
+        epilog="example: actuated_characters replay runs/demo",
+    )
+    parser.set_defaults(command=_replay)
+    parser.add_argument("bag", type=Path, metavar="BAG", help="a run's directory, or a bag")
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="X",
+        help="let positions and velocities differ by so much (rad, m, rad/s, m/s): for a bag from "
+        "another machine, whose last bits may be other ones",
+    )
+    add_through_topics(parser)
+
+
+def _replay(options: argparse.Namespace) -> None:
+    tolerance = options.tolerance
+    if tolerance is not None and not 0.0 <= tolerance <= _LARGEST_TOLERANCE:
+        raise ConfigurationError(
+            f"--tolerance is {tolerance}; it must be 0 to {_LARGEST_TOLERANCE:g}"
+        )
+    if replay_through_topics(options):
+        return
+    from experiment.bags.recording import read_recordings
+    from experiment.replay.replay import replay, tick_count
+
+    started = time.monotonic()
+    recordings = read_recordings(options.bag)
+    with _progress_bar(options.bag.name, tick_count(recordings)) as bar:
+        result = replay(
+            recordings,
+            tolerance=tolerance,
+            progress=lambda done: bar.update(bar.task_ids[0], completed=done),
+        )
+    for note in result.notes:
+        print(f"note: {note}")
+    if result.difference is not None:
+        raise ReplayError(f"{options.bag}: {result.difference}")
+    if tolerance is None:
+        _check_summaries(options.bag, recordings, result)
+    print(_verdict(recordings, result, tolerance, time.monotonic() - started))
+
+
+def _verdict(
+    recordings: "Sequence[Recording]",
+    result: "ReplayResult",
+    tolerance: float | None,
+    wall_time: float,
+) -> str:
+    """What the replay has shown, in one line."""
+    names = (f"{r.name} ({r.character.name})" if r.name else r.character.name for r in recordings)
+    episodes = f"{result.episodes} episode{'s' * (result.episodes != 1)}"
+    head = f"{result.states} states of {' and '.join(names)}, {episodes}"
+    speed = max(float(recording.times[-1]) for recording in recordings) / wall_time
+    tail = f"{speed:.3g} times real time"
+    if tolerance is None:
+        hashes = ", ".join(
+            f"of {name} {digest}" if name else digest
+            for name, digest in result.state_hashes.items()
+        )
+        return f"identical: {head}, state hash {hashes}; {tail}"
+    largest = ", ".join(f"{value:.3g} {unit}" for unit, value in sorted(result.largest.items()))
+    return f"within {tolerance:g}: {head}, largest differences {largest}; {tail}"
+
+
+def _check_summaries(bag: Path, recordings: "Sequence[Recording]", result: "ReplayResult") -> None:
+    """Compare the hashes with those that the recorder has written beside the bag, if it has."""
+    for recording in recordings:
+        below = recording.name if len(recordings) > 1 else ""
+        written = _written_hash(bag / below)
+        found = result.state_hashes[recording.name]
+        if written is not None and written != found and not recording.skipped_states:
+            raise ReplayError(
+                f"{bag}: all states of the bag came again, but they are not those of the run: "
+                f"their hash is {found}, and in summary.json it is {written}"
+            )
+
+
+def _written_hash(directory: Path) -> str | None:
+    from experiment.figures import SUMMARY
+
+    try:
+        content = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
+        return str(content["state_hash"])
+    except (OSError, ValueError, KeyError, TypeError):  # a bag alone, or of another recorder
+        return None
+
+
+def _progress_bar(description: str, count: int) -> Progress:
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("ticks"),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    bar.add_task(description, total=count)
+    return bar

@@ -1,0 +1,44 @@
+"""Counts the messages of a topic that never came. No ROS in here."""
+
+from collections.abc import Callable
+
+
+class LossCount:
+    """Finds gaps in the numbers that each publisher gives its own messages: 1, 2, 3 and so on.
+
+    The numbers do not say which publisher they are of. A number that follows none of the last ones
+    is the first of another publisher as long as there are more publishers than are known, and comes
+    after a gap otherwise. What was published before the first number that came is not missed.
+    """
+
+    def __init__(self, count_publishers: Callable[[], int]) -> None:
+        """`count_publishers` says how many there are; asked only where a number does not follow."""
+        self._count_publishers = count_publishers
+        self._last: list[int] = []  # number of each publisher, that used last at the end
+        self.lost = 0
+
+    def take(self, number: int | None) -> None:
+        """Take the number of a message as it came; None where the middleware has none."""
+        if number is None:
+            return
+        last = self._last
+        if last and last[-1] == number - 1:  # mostly
+            last[-1] = number
+            return
+        self._forget(number)
+        last.append(number)
+
+    def _forget(self, number: int) -> None:
+        """Forget the last number of the publisher whose next one is this; count what is between."""
+        last = self._last
+        if number - 1 in last:
+            last.remove(number - 1)
+            return
+        if len(last) < max(self._count_publishers(), 1):
+            return  # a publisher that is new
+        before = max((known for known in last if known < number), default=None)
+        if before is None:  # one that began anew
+            last.pop(0)
+            return
+        last.remove(before)
+        self.lost += number - before - 1

@@ -1,0 +1,30 @@
+"""The process of a player: `python -m experiment.replay.player_main commands|states`."""
+
+import sys
+from collections.abc import Callable
+
+from msgs_config.process import RunnableNode, limit_threads, run_node
+
+COMMANDS, STATES = "commands", "states"
+
+
+def main() -> int:
+    """Run a player until it has played; returns the exit code."""
+    limit_threads()
+    return run_node(_load_commands if sys.argv.pop(1) == COMMANDS else _load_states)
+
+
+def _load_commands() -> Callable[[], RunnableNode]:
+    from experiment.replay.player_of_commands import CommandPlayer
+
+    return CommandPlayer
+
+
+def _load_states() -> Callable[[], RunnableNode]:
+    from experiment.replay.player_of_states import StatePlayer
+
+    return StatePlayer
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,126 @@
+"""What a bag sends in the simulator's place: its messages as they are, state by state."""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory
+
+from experiment.bags.reader import read_messages
+from experiment.bags.recording import Recording, find_bag
+from msgs_config import topics
+from msgs_config.errors import RecordingError
+from msgs_config.messages import JointStateDecoder, decode
+from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
+from msgs_config.topics import Topic
+
+AROUND = (topics.CONTACTS, topics.APPLIED_WRENCH, topics.ODOM)
+"""What the simulator publishes of a tick before its state, for who listens."""
+
+_CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
+_SENT = topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE)
+_TAKEN = topics.ACTIVE_TRAJECTORY.of(topics.CONTROLLER_NODE)
+
+_Trajectory = tuple[int, JointTrajectory]
+"""When it was published, ns of wall time, and the message."""
+
+
+@dataclass
+class Stream:
+    """The messages that come before a state, by its row in the recording."""
+
+    configuration: bytes = b""  # the simulator's, before all states
+    episodes: dict[int, bytes] = field(default_factory=dict)
+    trajectories: dict[int, list[JointTrajectory]] = field(default_factory=dict)
+
+
+@dataclass
+class RecordedTick:
+    """What the simulator published at a tick, serialised."""
+
+    around: list[tuple[str, bytes]]  # what came before the state, each with its topic's name
+    state: bytes
+
+
+def read_ticks(path: Path, recording: Recording) -> Iterator[RecordedTick]:
+    """The ticks of a recording in order, each once.
+
+    Raises:
+        RecordingError: the bag cannot be read, or has become another one.
+    """
+    names = {_name(recording, topic): topic.name for topic in (*AROUND, topics.JOINT_STATES)}
+    decoder, row, around = JointStateDecoder(), 0, list[tuple[str, bytes]]()
+    for message in read_messages(find_bag(path)):
+        if row == len(recording.stamps_ns):
+            return
+        name = names.get(message.topic)
+        if name is None or _raw_stamp_ns(message.raw) < recording.stamps_ns[row]:
+            continue  # another topic, or what was published again
+        if name != topics.JOINT_STATES.name:
+            around.append((name, message.raw))
+        elif decoder.decode(message.raw).stamp_ns == recording.stamps_ns[row]:
+            row += 1
+            yield RecordedTick(around, message.raw)
+            around = []
+    if row < len(recording.stamps_ns):
+        raise RecordingError(f"recording {path} has changed while it was read")
+
+
+def _raw_stamp_ns(raw: bytes) -> int:
+    """The stamp of a serialised message that begins with a header."""
+    seconds, nanoseconds = struct.unpack_from("<iI" if raw[1] & 1 else ">iI", raw, 4)
+    return int(seconds) * NANOSECONDS_PER_SECOND + int(nanoseconds)
+
+
+def read_stream(path: Path, recording: Recording) -> Stream:
+    """Read what goes with a recording's states.
+
+    The trajectories are those that its controller took, each with the stamp that it began at; of
+    an older bag, which does not say it, those that were sent.
+
+    Raises:
+        RecordingError: the bag cannot be read.
+    """
+    stream, taken, sent = Stream(), list[_Trajectory](), list[_Trajectory]()
+    kept = {_name(recording, _SENT): sent, _name(recording, _TAKEN): taken}
+    for message in read_messages(find_bag(path)):
+        if message.topic == _name(recording, _CONFIGURATION):
+            stream.configuration = message.raw
+        elif message.topic == _name(recording, topics.EPISODE):
+            row = int(np.searchsorted(recording.stamps_ns, _stamp_ns(message.decode())))
+            stream.episodes[row] = message.raw
+        elif message.topic in kept:
+            trajectory = decode(message.raw, JointTrajectory)
+            kept[message.topic].append((message.log_time_ns, trajectory))
+    for published_ns, trajectory in taken or sent:
+        before = _row(recording, published_ns, _stamp_ns(trajectory.header))
+        if before is not None:
+            stream.trajectories.setdefault(before, []).append(trajectory)
+    return stream
+
+
+def _row(recording: Recording, published_ns: int, start_ns: int) -> int | None:
+    """The state before whose answer a trajectory came; None if there is none.
+
+    The controller published what it took before that answer, but two topics of a bag that another
+    recorder has written may be out of order: it came before it began, too.
+    """
+    stamps = recording.stamps_ns
+    answered = np.array([c[0].published_ns if c else 0 for c in recording.commands])
+    later = np.flatnonzero(answered >= published_ns)
+    row = int(later[0]) if len(later) else len(stamps)
+    if start_ns:
+        row = min(row, int(np.searchsorted(stamps, start_ns, side="right")) - 1)
+    return row if 0 <= row < len(stamps) else None
+
+
+def _name(recording: Recording, topic: Topic) -> str:
+    """A topic's name in the bag."""
+    return f"/{topic.under(recording.name).name}"
+
+
+def _stamp_ns(header: Header) -> int:
+    return int(header.stamp.sec) * NANOSECONDS_PER_SECOND + int(header.stamp.nanosec)

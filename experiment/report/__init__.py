@@ -1,0 +1,1 @@
+"""What a recording shows: facts, pictures, comparisons, tables."""

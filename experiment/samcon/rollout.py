@@ -1,0 +1,168 @@
+"""Simulates samples: the same simulation and the same controller as a run, window by window."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.feedback import responding
+from controller_node.parameters import make_controller
+from controller_node.references.base import Reference, ReferenceState
+from controller_node.references.corrected import Offset
+from experiment.samcon.features import Features
+from experiment.samcon.problem import Problem, Windows
+from msgs_config.arrays import FloatArray
+from msgs_config.errors import SimulationError
+from msgs_config.joint_layout import Configuration
+from sim_node.parameters import make_role, make_settings
+from sim_node.simulation import Simulation, Snapshot
+
+_NO_STATES = Configuration(np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A kept state, and the samples that are to go on from it."""
+
+    snapshot: Snapshot | None  # a state on the way there; None: the first one
+    start: int  # the window that begins in it
+    path: FloatArray  # (p, n) offsets of the windows from there on, the last one's first
+    before: FloatArray  # (n,) offset of the window before the path, zeros if there is none
+    samples: FloatArray  # (s, n) offsets to try in the window after the path
+    lookahead: int = 0  # windows without a correction that are simulated after that, to look
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """What has become of a branch."""
+
+    snapshot: Snapshot  # the kept state itself
+    start: FloatArray  # (f,) its features
+    features: FloatArray  # (s, 1 + l, f) at the windows' ends; NaN after a divergence, and the end
+
+
+class Trial:
+    """The reference of a window that is being tried: the motion with one offset."""
+
+    def __init__(self, motion: Reference) -> None:
+        self._motion = motion
+        self._times: tuple[float, ...] = ()
+        self._index: dict[float, int] = {}
+        self._states: list[ReferenceState] = []
+        self._table = ReferenceState(_NO_STATES, np.zeros(0), np.zeros(0))
+
+    def set(self, times: tuple[float, ...], before: Offset | None, offset: Offset) -> None:
+        """Have an offset at times in s but the first one, which has that of the window before.
+
+        All times are worked out at once: `Offset` gives each of them the same doubles so.
+        """
+        if times != self._times:
+            self._times, self._index = times, {time: row for row, time in enumerate(times)}
+            samples = [self._motion.sample(time) for time in times]
+            self._states = samples[:1]
+            self._table = ReferenceState(
+                Configuration(
+                    np.array([state.configuration.position for state in samples]),
+                    np.array([state.configuration.orientations_xyzw for state in samples]),
+                ),
+                np.array([state.velocity for state in samples]),
+                np.array([state.acceleration for state in samples]),
+            )
+        first = self._states[0] if before is None else before.applied(self._states[0])
+        table = offset.applied(self._table)
+        rows = zip(
+            table.configuration.position,
+            table.configuration.orientations_xyzw,
+            table.velocity,
+            table.acceleration,
+            strict=True,
+        )
+        states = [ReferenceState(Configuration(p, q), v, a) for p, q, v, a in rows]
+        self._sampled = [first, *states[1:]]
+
+    def sample(self, time: float) -> ReferenceState:
+        """The desired state at one of the times, as `CorrectedReference` has it."""
+        return self._sampled[self._index[time]]
+
+
+class Rollout:
+    """One engine and one controller, which try offsets from saved states."""
+
+    def __init__(self, problem: Problem) -> None:
+        """Build both.
+
+        Raises:
+            ActuatedCharactersError: the problem's plan cannot be made.
+        """
+        plan = problem.plan()
+        self.plan = plan
+        self.layout = plan.character.layout
+        self.windows = Windows(plan.ticks, plan.simulator.integer("rate"), problem.window)
+        self.features = Features(plan.character)
+        self._trial = Trial(plan.reference)
+        reference = responding(plan.character, self._trial, plan.reference, problem.feedback)
+        self._controller = make_controller(plan.character, reference, plan.controller)
+        self._nothing = Offset(self.layout, np.zeros(self.layout.size))
+        self._simulation = self._fresh()
+        self._episode_ns = self._simulation.actors[0].state.stamp_ns
+
+    def close(self) -> None:
+        """End the engine."""
+        self._simulation.close()
+
+    def desired(self, window: int) -> FloatArray:
+        """The features (f,) of the motion at a window's end."""
+        end = self.windows.time(int(self.windows.bounds[window + 1]))
+        state = self.plan.reference.sample(end)
+        return self.features.row(state.configuration.position, state.velocity)
+
+    def expand(self, branch: Branch) -> Expansion:
+        """Try a branch's samples."""
+        if branch.snapshot is None:  # only a new world returns to a state without a step
+            self._simulation.close()
+            self._simulation = self._fresh()
+        else:
+            self._simulation.take_over(branch.snapshot)
+        simulation = self._simulation
+        window, before = branch.start, self._offset(branch.start - 1, branch.before)
+        for row in branch.path:
+            offset = Offset(self.layout, row)
+            self._advance(window, before, offset)
+            window, before = window + 1, offset
+        saved, snapshot, start = simulation.save(), simulation.snapshot(), self._features()
+        rows = np.full((len(branch.samples), 1 + branch.lookahead, self.features.width), np.nan)
+        for row, sample in zip(rows, branch.samples, strict=True):
+            simulation.restore(saved)
+            self._try(window, before, Offset(self.layout, sample), row)
+        simulation.forget(saved)
+        return Expansion(snapshot, start, rows)
+
+    def _try(self, window: int, before: Offset | None, offset: Offset, rows: FloatArray) -> None:
+        """Fill in the features (1 + l, f) that an offset leads to, as far as it goes well."""
+        for row in rows[: len(self.windows) - window]:
+            try:
+                self._advance(window, before, offset)
+            except SimulationError:
+                return
+            row[:] = self._features()
+            window, before, offset = window + 1, offset, self._nothing
+
+    def _features(self) -> FloatArray:
+        state = self._simulation.actors[0].state
+        return self.features.row(state.position, state.velocity)
+
+    def _fresh(self) -> Simulation:
+        role = make_role(self.plan.character, self.plan.simulator)
+        return Simulation([role], make_settings(self.plan.simulator))
+
+    def _offset(self, window: int, row: FloatArray) -> Offset | None:
+        return Offset(self.layout, row) if window >= 0 else None
+
+    def _advance(self, window: int, before: Offset | None, offset: Offset) -> None:
+        """Simulate one window from the present state. Raises SimulationError if it diverges."""
+        first, last = self.windows.bounds[window : window + 2].tolist()
+        self._trial.set(self.windows.times(window), before, offset)
+        simulation, controller = self._simulation, self._controller
+        (actor,) = simulation.actors
+        for _ in range(last - first):
+            effort, _ = controller.answer(actor.state, self._episode_ns)
+            simulation.step([np.where(actor.commanded, effort, 0.0)])

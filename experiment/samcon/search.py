@@ -1,0 +1,188 @@
+"""Sampling-based motion control: window by window, offsets are sampled, simulated and chosen.
+
+Source: Liu, Yin, van de Panne, Shao and Xu 2010, "Sampling-based Contact-rich Motion Control".
+Ours are the look ahead, the second round of samples around the best ones of the first, and the
+way back.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from experiment.samcon import cost
+from experiment.samcon.rollout import Expansion, Rollout
+from experiment.samcon.settings import Settings
+from experiment.samcon.tree import Node, chosen, prune
+from experiment.samcon.workers import Workers
+from msgs_config.arrays import FloatArray, IntArray
+
+_GOOD = 0.4  # share of the samples that are not lost from which some are kept
+_ELITE = 0.1  # share of the first round around which the second one is drawn
+_NARROW = 0.3  # of the noise, in the second round
+_WORST = 150.0  # cost of a state ahead, which may still be mended
+_REACH = 12  # windows back of which snapshots are kept
+
+
+@dataclass
+class Progress:
+    """Where a search is; all that it needs to go on, beside its problem and settings."""
+
+    levels: list[list[Node]]  # of each window's kept nodes, after the first state
+    tries: dict[int, int] = field(default_factory=dict)  # failures of each window
+    best: Node | None = None  # of the furthest window that was reached
+    samples: int = 0  # simulated so far
+
+    @property
+    def window(self) -> int:
+        """The window that comes next."""
+        return len(self.levels) - 1
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a search ended before the last window."""
+
+    window: int
+    costs: tuple[float, ...]  # of its best samples; infinite: all were lost
+
+
+def first_progress(rollout: Rollout) -> Progress:
+    """A search that has not begun."""
+    return Progress([[Node(None, np.zeros(rollout.layout.size))]])
+
+
+def search(
+    rollout: Rollout,
+    workers: Workers,
+    settings: Settings,
+    progress: Progress,
+    report: Callable[[Progress], None],
+) -> Failure | None:
+    """Go on to the last window, or until a window has failed too often; None if all went well.
+
+    Raises:
+        ActuatedCharactersError: a worker failed.
+    """
+    steps = _Steps(rollout, workers, settings)
+    while progress.window < len(rollout.windows):
+        window = progress.window
+        nodes = steps.next_level(progress)
+        if nodes:
+            progress.levels.append(nodes)
+            best = min(nodes, key=lambda node: node.cost)
+            if progress.best is None or window + 1 > len(progress.best.path) - 1:
+                progress.best = best
+            prune(progress.levels, _REACH)
+        else:
+            failures = progress.tries.get(window, 0) + 1
+            progress.tries[window] = failures
+            if failures >= settings.tries:
+                return Failure(window, steps.last_costs)
+            back = min(2 ** (failures - 1), window)
+            del progress.levels[window + 1 - back :]
+        report(progress)
+    return None
+
+
+def result(progress: Progress, workers: Workers) -> Node:
+    """The best path that was found: of the last level, the one of least mean cost.
+
+    If the search has gone back, it is that of the furthest window. Its last state is simulated
+    again on the way from the first one.
+    """
+    level = progress.levels[-1]
+    best = min(level, key=lambda node: float(np.mean([step.cost for step in node.path] or [0.0])))
+    if progress.best is not None and len(progress.best.path) > progress.window:
+        best = progress.best
+    (again,) = workers.expand([best.branch(np.zeros((0, len(best.offset))))])
+    best.end = again.start
+    return best
+
+
+class _Steps:
+    """Makes one level of the tree from the one before."""
+
+    def __init__(self, rollout: Rollout, workers: Workers, settings: Settings) -> None:
+        self._rollout, self._workers, self._settings = rollout, workers, settings
+        layout = rollout.layout
+        self._noise = np.zeros(layout.size)
+        for name, widths in settings.noise.items():
+            self._noise[layout.joint(name).entries] = widths
+        self._corrected: IntArray = np.flatnonzero(self._noise)
+        self._height = float(rollout.desired(0)[2]) if layout.has_floating_base else 1.0
+        self.last_costs: tuple[float, ...] = ()
+
+    def next_level(self, progress: Progress) -> list[Node]:
+        """The nodes that are kept of the next window; none if all samples are lost."""
+        window, parents = progress.window, progress.levels[-1]
+        settings = self._settings
+        tried = sum(progress.tries.values())
+        rng = np.random.default_rng(np.random.SeedSequence([settings.seed, window, tried]))
+        refined = int(settings.refined * settings.samples)
+        broad = max(settings.samples - refined, 1)
+        owners = np.arange(broad) * len(parents) // broad
+        offsets = self._drawn(rng, broad)
+        firsts = np.flatnonzero(np.diff(owners, prepend=-1))
+        offsets[firsts] = 0.0  # each goes on without a correction, too
+        ends = self._simulate(parents, owners, offsets)
+        costs = self._costs(window, ends)
+        elite = chosen(costs, max(int(_ELITE * broad), 1), 0.0)
+        if refined and elite:
+            around = np.array([elite[index % len(elite)] for index in range(refined)])
+            more = offsets[around] + _NARROW * self._drawn(rng, refined)
+            order = np.argsort(owners[around], kind="stable")
+            around, more = around[order], more[order]
+            more_ends = self._simulate(parents, owners[around], more)
+            owners = np.concatenate((owners, owners[around]))
+            offsets, ends = np.vstack((offsets, more)), np.vstack((ends, more_ends))
+            costs = np.concatenate((costs, self._costs(window, more_ends)))
+        progress.samples += len(costs)
+        self.last_costs = tuple(np.sort(costs)[:5].tolist())
+        return [
+            Node(parents[owners[index]], offsets[index], float(costs[index]), ends[index, 0])
+            for index in chosen(costs, settings.kept, _GOOD)
+        ]
+
+    def _drawn(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Offsets (s, n): small ones and large ones, of few joints and of many, evenly."""
+        offsets = np.zeros((count, len(self._noise)))
+        shape = count, len(self._corrected)
+        wide = rng.uniform(-1.0, 1.0, shape)
+        sizes, shares = rng.uniform(0.0, 1.0, (2, count, 1))
+        moved = rng.uniform(0.0, 1.0, shape) < shares
+        offsets[:, self._corrected] = moved * sizes * wide * self._noise[self._corrected]
+        return offsets
+
+    def _simulate(
+        self, parents: Sequence[Node], owners: IntArray, offsets: FloatArray
+    ) -> FloatArray:
+        """The features (s, 1 + l, f) to which offsets (s, n) lead; their owners are rising."""
+        used = sorted(set(owners.tolist()))
+        branches = [
+            parents[index].branch(offsets[np.flatnonzero(owners == index)]) for index in used
+        ]
+        expansions: Iterator[Expansion] = self._workers.expand(branches)
+        rows: list[FloatArray] = []
+        for index, expansion in zip(used, expansions, strict=True):
+            parents[index].snapshot, parents[index].end = expansion.snapshot, expansion.start
+            rows.append(expansion.features)
+        return np.vstack(rows)
+
+    def _costs(self, window: int, ends: FloatArray) -> FloatArray:
+        """The costs (s,) of features (s, 1 + l, f): of the window, and of how it goes on."""
+        costs = self._costs_at(window, ends[:, 0])
+        beyond = range(window + 1, min(window + ends.shape[1], len(self._rollout.windows)))
+        for later in beyond:
+            ahead = self._costs_at(later, ends[:, later - window])
+            costs = costs + np.minimum(ahead, _WORST)
+        return costs / (1 + len(beyond))
+
+    def _costs_at(self, window: int, ends: FloatArray) -> FloatArray:
+        rollout, settings = self._rollout, self._settings
+        sound = np.all(np.isfinite(ends), axis=1)
+        desired = rollout.desired(window)
+        found = cost.terms(
+            rollout.layout, self._height, np.nan_to_num(ends), desired, settings.bounds
+        ).cost(settings.weights)
+        return np.where(sound, found, np.inf)

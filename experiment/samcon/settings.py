@@ -1,0 +1,106 @@
+"""What a search for corrections depends on, and its presets for each clip."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from controller_node.feedback_gains import checked_gains
+from msgs_config.errors import ConfigurationError, one_of
+
+PRESETS = Path(__file__).with_name("presets.yaml")
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What the differences from the motion cost; each is about 0.1 where it begins to be seen."""
+
+    pose: float = 3.0  # a rad of joint angle, mean of the joints
+    root: float = 20.0  # a rad of the root's orientation, and 0.1 of its angular velocity in rad/s
+    end_effectors: float = 20.0  # a m of height, mean of the end effectors
+    balance: float = 60.0  # a height of the character, of the centre of mass above each of them
+    centre: float = 60.0  # a m of the centre of mass
+    ahead: float = 30.0  # a m of where it gets to as it moves
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Beyond them a sample is lost, and is not gone on from."""
+
+    centre: float = 0.4  # m, of the centre of mass from the motion's
+    root: float = 1.2  # rad, of the root's orientation
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A search's settings: the same ones give the same result on any number of processes."""
+
+    samples: int = 1000  # a window
+    kept: int = 80  # of them, at most
+    window: float = 0.1  # s
+    seed: int = 1
+    tries: int = 6  # of one window, going back further each time
+    lookahead: int = 3  # windows beyond it, left to the feedback, whose costs count too
+    refined: float = 0.5  # share of the samples that are drawn around the best of the others
+    # largest offset of each joint that is corrected, rad or m, one number a degree of freedom
+    noise: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name; none: without
+    weights: Weights = Weights()
+    bounds: Bounds = Bounds()
+
+    def content(self) -> dict[str, Any]:
+        """The settings as JSON has them."""
+        return asdict(self) | {"noise": {name: list(row) for name, row in self.noise.items()}}
+
+
+def preset(character: str, clip: str, **given: object) -> Settings:
+    """The settings for a clip by name, or else for any of the character's, with some given.
+
+    Raises:
+        ConfigurationError: there is none for the character, or a value is wrong.
+    """
+    content = yaml.safe_load(PRESETS.read_text(encoding="utf-8"))
+    if character not in content:
+        raise ConfigurationError(
+            f"{one_of('character to reconstruct', character, sorted(content))}"
+        )
+    values: dict[str, Any] = dict(content[character]["default"])
+    for name, value in content[character].get(clip, {}).items():
+        values[name] = {**values.get(name, {}), **value} if isinstance(value, dict) else value
+    return settings_from({**values, **given})
+
+
+def settings_from(content: Mapping[str, Any]) -> Settings:
+    """The settings that a mapping says, such as `Settings.content` gives it.
+
+    Raises:
+        ConfigurationError: a name or a value is wrong.
+    """
+    known = {item.name for item in fields(Settings)}
+    for name in content:
+        if name not in known:
+            raise ConfigurationError(one_of("setting", name, sorted(known)))
+    values = dict(content)
+    values["noise"] = {
+        name: tuple(float(number) for number in row) for name, row in values["noise"].items()
+    }
+    for name, kind in (("weights", Weights), ("bounds", Bounds)):
+        if isinstance(values.get(name), Mapping):
+            values[name] = replace(kind(), **values[name])
+    values["feedback"] = checked_gains(values.get("feedback", {}))
+    settings = Settings(**values)
+    for name, least, most in (
+        ("samples", 1, 1_000_000),
+        ("kept", 1, 100_000),
+        ("tries", 1, 1000),
+        ("lookahead", 0, 100),
+    ):
+        if not least <= getattr(settings, name) <= most:
+            raise ConfigurationError(
+                f"{name} is {getattr(settings, name)}; it must be {least} to {most}"
+            )
+    if not 0.0 < settings.window <= 10.0:
+        raise ConfigurationError(f"window is {settings.window} s; it must be above 0, at most 10 s")
+    return settings

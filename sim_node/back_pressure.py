@@ -1,0 +1,47 @@
+"""When the simulator waits for subscribers that are behind. No ROS in here."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass
+class BackPressure:
+    """Holds the simulation until its subscribers have acknowledged what was published.
+
+    A publisher keeps the last few thousand messages for who is slow; a subscriber whose process
+    stands still for longer than those last loses some. Waiting costs wall time only, so in lockstep
+    it alters nothing. Who does not acknowledge in time is not waited for again until it has.
+    """
+
+    acknowledged: Callable[[float], bool]  # whether all have all, or get it within so many s
+    every_ticks: int = 2000  # between questions; a publisher keeps the last 5000 messages
+    longest: float = 10.0  # s of wall time
+    turn: float = 0.02  # s of it between looks at everything else
+    _last_tick: int = 0  # at which they were asked
+    _gives_up_at: float = math.inf
+    _has_given_up: bool = False
+
+    def holds(self, tick: int, now: float) -> bool:
+        """Whether the tick may not begin yet; `now` in s of wall time."""
+        if tick - self._last_tick < self.every_ticks:
+            return False
+        if self.acknowledged(0.0 if self._has_given_up else self.turn):
+            self._has_given_up = False
+        elif not self._has_given_up:
+            self._gives_up_at = min(self._gives_up_at, now + self.longest)
+            if now < self._gives_up_at:
+                return True
+            self._has_given_up = True
+        self._last_tick, self._gives_up_at = tick, math.inf
+        return False
+
+    @property
+    def complaint(self) -> str | None:
+        """What to say of a subscriber that is not waited for; None while there is none."""
+        if not self._has_given_up:
+            return None
+        return (
+            f"a subscriber has not acknowledged the states within {self.longest:g} s; it is not "
+            "waited for any more, and may lose some"
+        )

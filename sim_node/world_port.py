@@ -1,0 +1,67 @@
+"""What concerns a world and none of its characters: balls that are thrown into it."""
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+from msgs_config import topics
+from msgs_config.throw import Throw
+from msgs_config.throw_messages import BallStates, ThrowCodec, ball_names, encode_balls
+from msgs_config.warnings import Warnings
+from sim_node.inbox import FirstTick, StampedInbox
+from sim_node.simulation import Simulation
+from sim_node.throwing import ThrowSchedule
+
+
+class WorldPort:
+    """Takes throws, and says which ones began and where the balls are."""
+
+    def __init__(self, node: Node, simulation: Simulation, warnings: Warnings) -> None:
+        """Offer the topics, in the node's own namespace."""
+        self._simulation = simulation
+        self._schedule = ThrowSchedule()
+        self._codec = ThrowCodec()
+        self._told_ns = -1  # of the last throws that were published
+        self._inbox = StampedInbox(node, topics.THROW, "throw", "", warnings)
+        self._applied = topics.create_publisher(node, topics.APPLIED_THROW)
+        self._thrown = topics.create_publisher(node, topics.THROWN)
+
+    @property
+    def counts(self) -> dict[str, object]:
+        """How many throws were taken and refused, for the diagnostics."""
+        return {f"{kind}_throws": self._inbox.counts[kind] for kind in ("accepted", "rejected")}
+
+    def take_throws(self) -> list[Throw]:
+        """The throws that begin with the present state, with those just sent."""
+        simulation = self._simulation
+        self._inbox.take(simulation.clock, simulation.tick, self._use)
+        return self._schedule.take(simulation.tick)
+
+    def forget(self) -> None:
+        """Forget what was sent in the episode before, taken already or not."""
+        self._schedule.clear()
+        self._inbox.forget()
+
+    def publish(self) -> None:
+        """Publish what was thrown in the tick before, and where the balls are, if there are any."""
+        simulation = self._simulation
+        if not simulation.balls:
+            return
+        if simulation.stamp_ns != self._told_ns:  # after a pause a tick begins again
+            self._told_ns = simulation.stamp_ns
+            for throw in simulation.throws:
+                self._applied.publish(self._codec.encode(simulation.stamp_ns, throw))
+        if self._thrown.get_subscription_count():
+            names = ball_names(len(simulation.balls))
+            balls = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
+            self._thrown.publish(encode_balls(balls))
+
+    def flush(self, seconds: float) -> bool:
+        """Wait until every subscriber has all that was said, at the most `seconds`; whether so."""
+        return all(
+            publisher.wait_for_all_acked(Duration(seconds=seconds))
+            for publisher in (self._applied, self._thrown)
+        )
+
+    def _use(self, raw: bytes, first_tick: FirstTick) -> None:
+        stamp_ns, throw = self._codec.decode(raw)
+        self._schedule.add(throw, first_tick(stamp_ns))
