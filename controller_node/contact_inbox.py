@@ -11,6 +11,8 @@ from msgs_config.polling import DirectSubscription
 from msgs_config.warnings import Warnings
 from msgs_config.wrench_messages import decode_wrenches
 
+_LARGEST = 1e9  # N and N m
+
 
 class ContactInbox:
     """Takes `contacts`, and has those of each state ready."""
@@ -19,23 +21,30 @@ class ContactInbox:
         self._inbox = DirectSubscription(node, topics.CONTACTS)
         self._rows = {link.name: row for row, link in enumerate(character.links)}
         self._warnings = warnings
-        self._until_ns = -1  # of the last state that has had its contacts
+        self._until_ns = -1  # of the last state of the episode that has had its contacts
         self._newest_ns = -1
         self._kept = dict[int, FloatArray]()  # by stamp
 
-    def until(self, stamp_ns: int) -> FloatArray | None:
+    def begin(self) -> None:
+        """An episode begins, whose stamps may be those of another simulator's episode before."""
+        self._until_ns = -1
+
+    def until(self, stamp_ns: int, episode_ns: int) -> FloatArray | None:
         """Net wrenches (links, 6), N and N m, of all ticks since the last call up to a state.
 
         None as long as those of the state's own tick are yet to come. In lockstep they are of one
-        tick, in real time of those as well whose states were left without an answer.
+        tick, in real time of those as well whose states were left without an answer. What lies
+        before the episode's first state does not count.
         """
         while (raw := self._inbox.take()) is not None:
             self._keep(raw)
-        if self._newest_ns < stamp_ns:
+        if stamp_ns not in self._kept:
             return None
         wrenches = np.zeros((len(self._rows), 6))
         for stamp in sorted(stamp for stamp in self._kept if stamp <= stamp_ns):
-            wrenches += self._kept.pop(stamp)
+            contacts = self._kept.pop(stamp)
+            if stamp >= episode_ns:
+                wrenches += contacts
         self._until_ns = stamp_ns
         return wrenches
 
@@ -45,14 +54,20 @@ class ContactInbox:
         except MessageError as error:
             self._warnings.say_once(f"contacts ignored: {error}")
             return
-        self._newest_ns = max(self._newest_ns, message.stamp_ns)
+        if message.stamp_ns < self._newest_ns:  # of a simulator that was started again
+            self._kept.clear()
+            self._until_ns = -1
+        self._newest_ns = message.stamp_ns
         if message.stamp_ns <= self._until_ns:
             return
         wrenches = np.zeros((len(self._rows), 6))
-        if len(message.wrenches) == len(message.links) and np.isfinite(message.wrenches).all():
+        fits = len(message.wrenches) == len(message.links)
+        if fits and (np.abs(message.wrenches) <= _LARGEST).all():  # NaN is not
             for link, wrench in zip(message.links, message.wrenches, strict=True):
                 if link in self._rows:
                     wrenches[self._rows[link]] += wrench
         else:
-            self._warnings.say_once("contacts ignored: not one finite wrench a link")
+            self._warnings.say_once(
+                f"contacts ignored: not one wrench a link, of {_LARGEST:g} N and N m at most"
+            )
         self._kept[message.stamp_ns] = wrenches

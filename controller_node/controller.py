@@ -13,6 +13,7 @@ from controller_node.effort_series import EffortSeries
 from controller_node.feedback import RespondingReference
 from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
 from controller_node.references.base import Reference, ReferenceState
+from controller_node.references.moved import Carry, MovedReference
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
 from controller_node.strength import Strengths, StrengthSchedule, weakened
 from msgs_config.arrays import FloatArray
@@ -31,6 +32,16 @@ class Settings:
     gains: GainArrays
     follows_velocity: bool  # the reference's; else the desired velocity is zero
     balance: BalanceGains | None = None  # None: nothing but the law
+    strengths: FloatArray | None = None  # (b,) shares of the gains that count; None: all of them
+
+
+def check_reference(reference: Reference, behaviour: BehaviourChoice) -> None:
+    """Raise ConfigurationError if a behaviour cannot follow a reference."""
+    if behaviour.needs_contacts and isinstance(reference, RespondingReference):
+        raise ConfigurationError(
+            "the clip has corrections with feedback, which holds it to where the clip is; "
+            "'behaviour' must be tracking or ragdoll with it, as the others leave the clip"
+        )
 
 
 class Controller:
@@ -58,8 +69,11 @@ class Controller:
 
         Raises:
             CharacterError: a joint moves neither mass nor inertia, or a foot is none.
-            ConfigurationError: the law needs a series, or the balance feet, and there are none.
+            ConfigurationError: the law needs a series, or the balance feet, and there are none; or
+                the behaviour cannot follow the reference.
         """
+        self._choice = behaviour or BehaviourChoice()
+        check_reference(reference, self._choice)
         self.layout = character.layout
         self._character = character
         self.clock = TickClock(rate_hz)
@@ -73,7 +87,6 @@ class Controller:
         self.check(settings)
         self._settings = settings
         self._next: tuple[float, ReferenceState] | None = None
-        self._choice = behaviour or BehaviourChoice()
         self._behaviour = self._choice.make()
         self._strengths = StrengthSchedule(self.layout)
         self._no_contacts = np.zeros((len(character.links), 6))
@@ -124,18 +137,22 @@ class Controller:
     ) -> None:
         """Track a trajectory from a stamp on, instead of what is tracked, until the episode ends.
 
-        The reference goes on without a jump: first from where it is then to the first point.
+        The reference goes on without a jump: first from where it is then to the first point. What
+        a behaviour had carried to another place is there, and the points are not carried.
 
         Raises:
             MotionError: the character cannot follow it.
             LayoutError: a degree of freedom does not exist, or part of a ball joint is missing.
         """
-        self._begin_episode(episode_ns)
-        before = self._reference
+        self._enter_episode(episode_ns)
+        carry, before = self._behaviour.carry, self._reference
+        if carry != Carry():
+            before = MovedReference(self.layout, before, carry)
         if not isinstance(before, TrajectoryReference):
             before = TrajectoryReference(self._character, before)
         start, now = self._time(start_ns), self._time(now_ns)
         self._reference = before.replaced(points, start, now)
+        self._behaviour.carry = Carry()
         self._next = None
 
     def weaken(self, strengths: Strengths, *, episode_ns: int) -> None:
@@ -144,19 +161,26 @@ class Controller:
         Raises:
             MotionError: too many wait for their stamps.
         """
-        self._begin_episode(episode_ns)
+        self._enter_episode(episode_ns)
         self._strengths.add(strengths)
 
-    def _begin_episode(self, episode_ns: int) -> None:
-        """Track the own reference again, if the episode is another one."""
+    def begin_episode(self, episode_ns: int) -> None:
+        """Begin an episode, its first state of a stamp in ns: all of another one is forgotten.
+
+        A simulator that was started again begins with the same stamp as before.
+        """
+        self._behaviour = self._choice.make()
+        self._strengths.clear()
+        self.mode = None
+        self._episode_ns = episode_ns
+        self._reference = self._own_reference
+        self._law = make_law(self._settings.law, self._plant)
+        self._next = None
+
+    def _enter_episode(self, episode_ns: int) -> None:
+        """Begin an episode whose stamp says that it is another one."""
         if episode_ns != self._episode_ns:
-            self._behaviour = self._choice.make()
-            self._strengths.clear()
-            self.mode = None
-            self._episode_ns = episode_ns
-            self._reference = self._own_reference
-            self._law = make_law(self._settings.law, self._plant)
-            self._next = None
+            self.begin_episode(episode_ns)
 
     def _time(self, stamp_ns: int) -> float:
         """Time in s of a stamp's tick since the episode's first state.
@@ -181,14 +205,14 @@ class Controller:
             ClockError: the state's stamp is no tick at this controller's rate.
             ConfigurationError: the behaviour needs contacts, and there are none.
         """
-        self._begin_episode(episode_ns)
+        self._enter_episode(episode_ns)
         next_stamp = self.clock.stamp_ns(self.clock.tick(state.stamp_ns) + 1)
         time, next_time = self._time(state.stamp_ns), self._time(next_stamp)
         now, upcoming = self._reference_at(time), self._reference_at(next_time)
         self._next = next_time, upcoming
         if contacts is None and self.needs_contacts:
             raise ConfigurationError("the behaviour needs the contacts of each state's tick")
-        strengths = self._strengths.at(state.stamp_ns)
+        gains, strengths = self._gains_at(state.stamp_ns)
         directive = self._behaviour.advance(
             Observation(
                 time=time,
@@ -198,7 +222,10 @@ class Controller:
                 contacts=self._no_contacts if contacts is None else contacts,
                 now=now,
                 upcoming=upcoming,
-                gains=weakened(self.layout, self._settings.gains, strengths),
+                gains=gains,
+                whole_gains=self._settings.gains,
+                strengths=strengths,
+                assisted=self._is_assisted(gains),
             )
         )
         self._report(directive.phase, state.stamp_ns)
@@ -215,6 +242,20 @@ class Controller:
         return effort, StampedReference(
             state.stamp_ns, desired.configuration.position, desired.velocity
         )
+
+    def _gains_at(self, stamp_ns: int) -> tuple[GainArrays, FloatArray]:
+        """The gains in force at a stamp, and the strengths (b,) that they have been weakened by."""
+        gains, strengths = self._settings.gains, self._strengths.at(stamp_ns)
+        own = self._settings.strengths
+        if own is None:
+            return weakened(self.layout, gains, strengths), strengths
+        both = weakened(self.layout, weakened(self.layout, gains, own), strengths)
+        return both, own * strengths
+
+    def _is_assisted(self, gains: GainArrays) -> bool:
+        """Whether gains drive a floating base."""
+        driven = gains.stiffness[:6].any() or gains.damping[:6].any()
+        return self.layout.has_floating_base and bool(driven)
 
     def _report(self, phase: Phase, stamp_ns: int) -> None:
         """Keep since which state a phase lasts."""

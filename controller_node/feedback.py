@@ -78,7 +78,7 @@ class Feedback:
         self._feet = np.array([names.index(foot) for foot in character.feet])
         self._entries = [_leg(character, int(foot)) for foot in self._feet]
         matrices = np.stack((gains.stance, gains.swing))
-        self._gains = np.vstack(matrices[:, :, :-1])
+        self._gains = np.concatenate((gains.stance[:, :-1], gains.swing[:, :-1]))
         self._side_gains = matrices[:, :, -1]
         self._sides = self._sides_at(np.array(character.rest_position))
         self._motion = motion

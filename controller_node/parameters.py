@@ -10,7 +10,6 @@ from controller_node.effort_series import read_effort_series
 from controller_node.laws import LAWS, GainArrays
 from controller_node.motion import MOTION_PARAMETERS
 from controller_node.references.base import Reference
-from controller_node.strength import weakened
 from msgs_config.arrays import FloatArray
 from msgs_config.character import ROOT_TORQUE, Character
 from msgs_config.joint_layout import ROOT
@@ -142,9 +141,10 @@ def make_settings(character: Character, values: Values) -> Settings:
     ]
     return Settings(
         law="zero" if _is_ragdoll(values) else values.text("law"),
-        gains=weakened(character.layout, gains, np.array(strengths)),
+        gains=gains,
         follows_velocity=values.text("reference_velocity") == "clip",
         balance=_balance_gains(values) if _balances(values) else None,
+        strengths=np.array(strengths),
     )
 
 

@@ -35,6 +35,14 @@ LATCHED_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
+CHANGES_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=100,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+"""For what changes at once again: a listener of depth 1 has the last one, a recorder all."""
+
 
 DISPLAY_QOS = QoSProfile(  # a viewer's own depth may be 1; a recorder's is not
     history=HistoryPolicy.KEEP_LAST,
@@ -98,8 +106,8 @@ NET_WRENCH = Topic("~/net_wrench", WrenchStamped, STREAM_QOS)
 JOINT_TRAJECTORY = Topic("~/joint_trajectory", JointTrajectory, STREAM_QOS)
 ACTIVE_TRAJECTORY = Topic("~/active_trajectory", JointTrajectory, LATCHED_QOS)
 STRENGTH = Topic("~/strength", JointState, STREAM_QOS)
-ACTIVE_STRENGTH = Topic("~/active_strength", JointState, LATCHED_QOS)
-MODE = Topic("~/mode", String, LATCHED_QOS)
+ACTIVE_STRENGTH = Topic("~/active_strength", JointState, CHANGES_QOS)
+MODE = Topic("~/mode", String, CHANGES_QOS)
 CLOCK = Topic("/clock", Clock, STREAM_QOS)
 EPISODE = Topic("episode", Header, LATCHED_QOS)
 CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS)

@@ -155,7 +155,8 @@ class SimNode(Node):
         return False
 
     def _is_acknowledged(self, seconds: float) -> bool:
-        return all(port.outputs.flush(seconds) for port in self._ports)
+        flushes = [port.outputs.flush for port in self._ports] + [self._world_port.flush]
+        return all(flush(seconds) for flush in flushes)
 
     def _receive(self) -> bool:
         """Take one command a character, or all in real time; whether there was one."""

@@ -203,6 +203,14 @@ def test_what_is_lost_is_never_kept(finite: int, kept: int) -> None:
 # Settings
 
 
+def test_a_clips_feedback_is_its_own() -> None:
+    walk, kick = preset("humanoid", "walk"), preset("humanoid", "kick")
+
+    assert walk.feedback != kick.feedback
+    assert walk.noise == kick.noise
+    assert preset("humanoid", "walk", feedback={}).feedback == {}
+
+
 def test_settings_are_what_their_content_says() -> None:
     content = json.loads(json.dumps(SMALL.content()))
 

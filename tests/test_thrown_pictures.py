@@ -151,4 +151,4 @@ def test_a_mode_lasts_until_the_next_one_or_the_end(recording: Recording) -> Non
     ]
     line = mode_line(ModeSpan("REACT", 1.0, 0.25, {"link": "chest", "impulse": 19.79123}))
     assert line == "REACT for 0.25 s: link chest, impulse 19.79"
-    assert mode_spans(recording) == []
+    assert mode_spans(replace(recording, modes=())) == []

@@ -7,6 +7,7 @@ from typing import Protocol, TypeAlias
 
 from controller_node.laws import GainArrays
 from controller_node.references.base import ReferenceState
+from controller_node.references.moved import Carry
 from msgs_config.arrays import FloatArray
 
 
@@ -32,6 +33,13 @@ class Observation:
     now: ReferenceState  # of the own reference
     upcoming: ReferenceState  # of the own reference, one tick later
     gains: GainArrays  # in force
+    whole_gains: GainArrays  # of joints at full strength
+    strengths: FloatArray  # (b,) by which those in force are weaker
+    assisted: bool  # whether the gains in force drive a floating base
+
+    def assistance(self, unless_none: object = "full") -> object:
+        """What a report says of the assistance; of what has none, that it has none."""
+        return unless_none if self.assisted else "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +62,8 @@ class Directive:
 
 class Behaviour(Protocol):
     """A state machine, made anew for each episode."""
+
+    carry: Carry  # of the own reference, to where the character goes on with it
 
     def advance(self, seen: Observation) -> Directive:
         """What to do in a tick; called once a tick, in order."""
@@ -80,10 +90,13 @@ class Tracking:
     """Follows the own reference, whatever comes."""
 
     def __init__(self) -> None:
-        self._phase = Phase(Mode.TRACK)
+        self.carry = Carry()
+        self._phase: Phase | None = None
 
     def advance(self, seen: Observation) -> Directive:
         """The reference and the gains as they are."""
+        if self._phase is None:
+            self._phase = Phase(Mode.TRACK, {"assistance": seen.assistance()})
         return Directive(self._phase, seen.now, seen.upcoming, seen.gains)
 
 
@@ -91,6 +104,7 @@ class Ragdoll:
     """Follows nothing; its law is to be `zero`."""
 
     def __init__(self) -> None:
+        self.carry = Carry()
         self._phase = Phase(Mode.LIMP, {"assistance": "none"})
 
     def advance(self, seen: Observation) -> Directive:

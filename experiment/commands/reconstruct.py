@@ -44,10 +44,18 @@ def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParse
     command.add_argument(
         "--resume", action="store_true", help="go on where a search for FILE was stopped"
     )
+    _add_search(command)
+
+
+def _add_search(command: argparse.ArgumentParser) -> None:
+    """Add the options of how it is searched."""
     command.add_argument("--seed", type=int, default=1, help="of all random numbers (1)")
     command.add_argument("--samples", type=int, metavar="N", help="a window (1000)")
     command.add_argument("--kept", type=int, metavar="N", help="of them to go on from (80)")
     command.add_argument("--window", type=float, metavar="S", help="length of a window, s (0.1)")
+    command.add_argument(
+        "--open-loop", action="store_true", help="without the balance feedback of the preset"
+    )
     command.add_argument("--rate", type=int, default=240, metavar="HZ", help="control rate (240)")
     command.add_argument(
         "--delay-ticks", type=int, default=0, metavar="D", help="by which commands come late (0)"
@@ -106,6 +114,8 @@ def _job(options: argparse.Namespace) -> "Job":
     if workers < 1:
         raise ConfigurationError(f"--workers is {workers}; it must be 1 or more")
     given = {name: getattr(options, name) for name in ("samples", "kept", "window", "seed")}
+    if options.open_loop:
+        given["feedback"] = {}
     settings = preset(
         options.character,
         options.clip,
@@ -125,7 +135,7 @@ def _job(options: argparse.Namespace) -> "Job":
 def _report(job: "Job", found: "Reconstruction") -> None:
     figures = found.figures
     rows = {
-        "windows": str(found.windows),
+        "length": f"{job.problem.duration:g} s, {figures.ticks} ticks, {found.windows} windows",
         "samples": f"{found.samples}, {found.samples_a_second:.0f} a second",
         "cost, mean": f"{found.cost:.3g}",
         "centre of mass error, mean": f"{figures.centre_error_mean_m:.3f} m",

@@ -19,6 +19,7 @@ from msgs_config.arrays import FloatArray, IntArray
 
 _GOOD = 0.4  # share of the samples that are not lost from which some are kept
 _ELITE = 0.1  # share of the first round around which the second one is drawn
+_PLAIN = 0.1  # of what is kept, samples without a correction
 _NARROW = 0.3  # of the noise, in the second round
 _WORST = 150.0  # cost of a state ahead, which may still be mended
 _REACH = 12  # windows back of which snapshots are kept
@@ -100,6 +101,30 @@ def result(progress: Progress, workers: Workers) -> Node:
     return best
 
 
+@dataclass(frozen=True)
+class _Samples:
+    """Samples of a window that were simulated."""
+
+    owners: IntArray  # (s,) indices of their parents
+    offsets: FloatArray  # (s, n)
+    ends: FloatArray  # (s, f) features
+    costs: FloatArray  # (s,)
+
+    def and_those(self, other: "_Samples") -> "_Samples":
+        """These, and then the others."""
+        return _Samples(
+            np.concatenate((self.owners, other.owners)),
+            np.vstack((self.offsets, other.offsets)),
+            np.vstack((self.ends, other.ends)),
+            np.concatenate((self.costs, other.costs)),
+        )
+
+    def node(self, parents: Sequence[Node], index: int) -> Node:
+        """The state that a sample has led to."""
+        parent, end = parents[self.owners[index]], self.ends[index]
+        return Node(parent, self.offsets[index], float(self.costs[index]), end)
+
+
 class _Steps:
     """Makes one level of the tree from the one before."""
 
@@ -115,34 +140,48 @@ class _Steps:
 
     def next_level(self, progress: Progress) -> list[Node]:
         """The nodes that are kept of the next window; none if all samples are lost."""
-        window, parents = progress.window, progress.levels[-1]
-        settings = self._settings
+        window, parents, settings = progress.window, progress.levels[-1], self._settings
         tried = sum(progress.tries.values())
         rng = np.random.default_rng(np.random.SeedSequence([settings.seed, window, tried]))
         refined = int(settings.refined * settings.samples)
         broad = max(settings.samples - refined, 1)
         owners = np.arange(broad) * len(parents) // broad
         offsets = self._drawn(rng, broad)
-        firsts = np.flatnonzero(np.diff(owners, prepend=-1))
-        offsets[firsts] = 0.0  # each goes on without a correction, too
-        ends = self._simulate(parents, owners, offsets)
-        costs = self._costs(window, ends)
-        elite = chosen(costs, max(int(_ELITE * broad), 1), 0.0)
+        plain = np.flatnonzero(np.diff(owners, prepend=-1))
+        offsets[plain] = 0.0  # each goes on without a correction, too
+        samples = self._tried(window, parents, owners, offsets)
+        elite = chosen(samples.costs, max(int(_ELITE * broad), 1), 0.0)
         if refined and elite:
             around = np.array([elite[index % len(elite)] for index in range(refined)])
             more = offsets[around] + _NARROW * self._drawn(rng, refined)
             order = np.argsort(owners[around], kind="stable")
-            around, more = around[order], more[order]
-            more_ends = self._simulate(parents, owners[around], more)
-            owners = np.concatenate((owners, owners[around]))
-            offsets, ends = np.vstack((offsets, more)), np.vstack((ends, more_ends))
-            costs = np.concatenate((costs, self._costs(window, more_ends)))
-        progress.samples += len(costs)
-        self.last_costs = tuple(np.sort(costs)[:5].tolist())
+            second = self._tried(window, parents, owners[around][order], more[order])
+            samples = samples.and_those(second)
+        progress.samples += len(samples.costs)
+        self.last_costs = tuple(np.sort(samples.costs)[:5].tolist())
+        picked = set(chosen(samples.costs, settings.kept, _GOOD))
+        picked |= set(self._plain(parents, samples, plain))
         return [
-            Node(parents[owners[index]], offsets[index], float(costs[index]), ends[index, 0])
-            for index in chosen(costs, settings.kept, _GOOD)
+            samples.node(parents, index)
+            for index in sorted(picked, key=lambda index: (samples.costs[index], index))
         ]
+
+    def _plain(self, parents: Sequence[Node], samples: "_Samples", plain: IntArray) -> list[int]:
+        """The samples without a correction that are kept: what the feedback alone can do.
+
+        The best ones, and the one that has never been corrected: feedback may well bring it to the
+        end where what looks better now leads out of its reach.
+        """
+        sound = [int(index) for index in plain if np.isfinite(samples.costs[index])]
+        sound.sort(key=lambda index: (samples.costs[index], index))
+        never = [i for i in sound if not parents[samples.owners[i]].offsets.any()]
+        return sound[: max(int(_PLAIN * self._settings.kept), 1)] + never
+
+    def _tried(
+        self, window: int, parents: Sequence[Node], owners: IntArray, offsets: FloatArray
+    ) -> "_Samples":
+        ends = self._simulate(parents, owners, offsets)
+        return _Samples(owners, offsets, ends[:, 0], self._costs(window, ends))
 
     def _drawn(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Offsets (s, n): small ones and large ones, of few joints and of many, evenly."""

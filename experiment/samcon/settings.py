@@ -68,7 +68,8 @@ def preset(character: str, clip: str, **given: object) -> Settings:
         )
     values: dict[str, Any] = dict(content[character]["default"])
     for name, value in content[character].get(clip, {}).items():
-        values[name] = {**values.get(name, {}), **value} if isinstance(value, dict) else value
+        adds = isinstance(value, dict) and name != "feedback"  # gains belong together
+        values[name] = {**values.get(name, {}), **value} if adds else value
     return settings_from({**values, **given})
 
 

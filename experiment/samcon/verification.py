@@ -16,6 +16,7 @@ from msgs_config import configuration
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.joint_layout import JointLayout, JointType
+from msgs_config.stamped import StampedState
 
 
 @dataclass(frozen=True)
@@ -42,45 +43,56 @@ def verified(problem: Problem, file: Path, best: Node) -> Figures:
     plan, motion = problem.plan(str(file)), problem.plan().reference
     windows = Windows(plan.ticks, plan.simulator.integer("rate"), problem.window)
     ends = dict(zip(windows.bounds[1:].tolist(), best.path, strict=False))
-    centre, known = (
-        _Centre(plan),
-        configuration.parse(configuration.describe(plan.character, plan.simulator)),
-    )
+    known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     measurement = Measurement(known)
-    errors: list[float] = []
     positions: list[FloatArray] = []
-    motions: list[FloatArray] = []
-    lowest, size = np.inf, plan.character.layout.size
     for count, tick in enumerate(ticks_in_process(plan), start=1):
         if count == 1:
             measurement.add_state(tick.state)
         measurement.add_state(tick.following)
         measurement.add_tick(tick)
-        state = tick.following
+        positions.append(tick.following.position)
         if count in ends:
-            found = np.concatenate((state.position, state.velocity))
-            if found.tobytes() != ends[count].end[: 2 * size].tobytes():
-                raise SimulationError(
-                    f"the search's states are not repeated: at {windows.time(count):g} s "
-                    f"{np.abs(found - ends[count].end[: 2 * size]).max():.3g} away"
-                )
-        desired = motion.sample(windows.time(count)).configuration.position
-        positions.append(state.position)
-        motions.append(desired)
-        errors.append(float(np.linalg.norm(centre.of(state.position) - centre.of(desired))))
-        lowest = min(lowest, float(state.position[2]))
+            _check_equal(tick.following, ends[count], windows.time(count))
+    times = [windows.time(count) for count in range(1, len(positions) + 1)]
+    motions = [motion.sample(time).configuration.position for time in times]
     summary = measurement.summary(wall_time=0.0)
     return Figures(
-        ticks=len(errors),
+        ticks=len(positions),
         fell=bool(summary["fell"]),
-        centre_error_mean_m=float(np.mean(errors)),
+        centre_error_mean_m=centre_error(plan, positions, motions),
         joint_error_mean_rad=joint_error(plan.character.layout, positions, motions),
         root_error_mean_m=_number(summary["root_error_mean_m"]),
-        least_root_height_m=lowest,
+        least_root_height_m=float(min(position[2] for position in positions)),
         assist_force_mean_n=_number(summary["assist_force_mean_n"]),
         saturated_fraction=_number(summary["saturated_fraction"]),
         state_hash=measurement.state_hash,
     )
+
+
+def _check_equal(state: StampedState, node: Node, time: float) -> None:
+    found = np.concatenate((state.position, state.velocity))
+    wanted = node.end[: len(found)]
+    if found.tobytes() != wanted.tobytes():
+        raise SimulationError(
+            f"the search's states are not repeated: at {time:g} s "
+            f"{np.abs(found - wanted).max():.3g} away"
+        )
+
+
+def centre_error(
+    plan: Plan, positions: Sequence[FloatArray], motions: Sequence[FloatArray]
+) -> float:
+    """Mean distance in m of the centre of mass from the motion's, over states (n,) each."""
+    model = DynamicsModel(plan.character)
+    still = np.zeros(plan.character.layout.size)
+
+    def centre(position: FloatArray) -> FloatArray:
+        model.update(position, still)
+        return model.centre_of_mass()
+
+    pairs = zip(positions, motions, strict=True)
+    return float(np.mean([np.linalg.norm(centre(here) - centre(there)) for here, there in pairs]))
 
 
 def joint_error(
@@ -96,19 +108,6 @@ def joint_error(
         layout.configuration(np.array(motions)), layout.configuration(np.array(positions))
     )
     return float(layout.norms(difference)[:, rotates].mean())
-
-
-class _Centre:
-    """The centre of mass of a character in a position."""
-
-    def __init__(self, plan: Plan) -> None:
-        self._model = DynamicsModel(plan.character)
-        self._still = np.zeros(plan.character.layout.size)
-
-    def of(self, position: FloatArray) -> FloatArray:
-        """The centre of mass (3,) in the world, m."""
-        self._model.update(position, self._still)
-        return self._model.centre_of_mass()
 
 
 def _number(value: object) -> float:

@@ -1,7 +1,7 @@
 """A character that is hit by balls: how far it gives way, and how it comes back."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -194,13 +194,14 @@ def _draw(
 
     figure = Figure(figsize=(11, 9), layout="constrained")
     panels = figure.subplots(len(hits), 2, sharex=True)
-    marks = Marks()
+    marks, modes = Marks(), list[tuple[float, float, str]]()  # of all of them, for the legend
     for (impulse, run), (moved, error) in zip(hits.items(), panels, strict=True):
         reaction = reactions[impulse]
         marks = Marks(
             throws=[float(run.times[tick]) for tick, each in enumerate(run.throws) if each],
             modes=[(span.start, span.duration, span.mode) for span in mode_spans(run)],
         )
+        modes += marks.modes
         moved.plot(run.times, reaction.displacement)
         moved.set_ylabel("root moved (m)")
         moved.set_title(f"{impulse:g} N s", fontsize="medium", loc="left")
@@ -216,7 +217,7 @@ def _draw(
     for panel in panels[-1]:
         panel.set_xlabel("time (s)")
     panels[0, 1].legend(fontsize="small")
-    marks.legend(figure)
+    replace(marks, modes=modes).legend(figure)
     figure.suptitle("hit against the chest at 1 s; the assistance is full in TRACK and BLEND")
     return figure
 
