@@ -12,8 +12,8 @@ from experiment.samcon.problem import Problem
 from experiment.samcon.reconstruction import Job, reconstruct
 from experiment.samcon.settings import preset
 
-_DURATION = 0.4  # s of the motion
-_SAMPLES = 300  # a window
+_DURATION = 0.3  # s of the motion
+_SAMPLES = 1000  # a window
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from std_msgs.msg import Header, String
 
 from controller_node.actuation import Actuation
 from controller_node.behaviours.base import ModeReport
+from controller_node.behaviours.settings import check_terrain
 from controller_node.contact_inbox import ContactInbox
 from controller_node.motion import make_motion
 from controller_node.outputs import Answer, Outputs
@@ -155,10 +156,13 @@ class ControllerNode(Node):
     def _overtake(self, raw: bytes) -> None:
         """Leave a state without an answer, save that it may be the first of an episode."""
         self._counts["overtaken"] += 1
-        with suppress(MessageError, LayoutError):
+        if self._answer is not None and self._answer.raw_state == raw:
+            return
+        with suppress(MessageError, LayoutError, ClockError):
             state = state_in_layout(self._layout, self._decoder.decode(raw))
+            self._controller.clock.tick(state.stamp_ns)  # it is one
             if state.effort is None:
-                self._episode_ns = state.stamp_ns
+                self._begin_episode(state.stamp_ns)
 
     def _check_simulator(self) -> None:
         """Compare a simulator that says what it simulates with this controller."""
@@ -179,6 +183,7 @@ class ControllerNode(Node):
                 f"than '{self._character.name}'; set 'character' to the simulator's"
             )
         self._controller.check_agreement(simulator.probe)
+        check_terrain(self._values.text("behaviour"), simulator.parameters.get("terrain"))
         for name in ("rate", "placement"):
             its, own = simulator.parameters.get(name), self._values[name]
             if its != own:
@@ -205,7 +210,9 @@ class ControllerNode(Node):
             return
         if episode_ns is None:
             return  # the simulator publishes the state again
-        contacts = None if self._contacts is None else self._contacts.until(state.stamp_ns)
+        contacts = None
+        if self._contacts is not None:
+            contacts = self._contacts.until(state.stamp_ns, episode_ns)
         if self._contacts is not None and contacts is None:
             self._waiting = raw
             return  # the simulator publishes the contacts again, too
@@ -250,17 +257,27 @@ class ControllerNode(Node):
     def _episode_of(self, state: StampedState) -> int | None:
         """Stamp of the first state of the state's episode; None if it is not known yet.
 
-        The first state says so itself. Who joins later learns it from the latched topic.
+        The first state says so itself, and begins another episode even with the stamp of the one
+        before: the simulator may have been started again. Who joins later learns it from the
+        latched topic.
         """
         raw = self._episodes.take()
         if raw is not None:
             stamp = decode(raw, Header).stamp
             self._episode_ns = stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
         if state.effort is None:
-            self._episode_ns = state.stamp_ns
+            self._begin_episode(state.stamp_ns)
         if self._episode_ns is None or self._episode_ns > state.stamp_ns:
             return None
         return self._episode_ns
+
+    def _begin_episode(self, stamp_ns: int) -> None:
+        """Forget the episode before; a first state that waits for its contacts may do it again."""
+        self._episode_ns = stamp_ns
+        self._controller.begin_episode(stamp_ns)
+        self._told_mode = None
+        if self._contacts is not None:
+            self._contacts.begin()
 
     def _report(self, *, at_once: bool = False) -> None:
         """Publish the diagnostics if they are due and anybody listens."""

@@ -87,7 +87,10 @@ class Movie:
         self._scene = make_scene(recordings)
         self._ghost = _ghost_place(self._scene, self._settings.ghost)
         if self._settings.contacts and not any(r.contacts for r in self._scene.recordings):
-            raise RecordingError("the recording has no contacts to mark; see run --contacts")
+            raise RecordingError(
+                "the recording has no contacts to mark: it was recorded with --exclude contacts, "
+                "or by another recorder"
+            )
         self.rows = picture_rows(self._scene.times, self._settings)
         self._paths = camera_paths(self._scene)[self.rows]
         self._view, offset, self._arrows = self._framing()

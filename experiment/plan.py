@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from controller_node import parameters as controller_parameters
 from controller_node.agreement import check_agreement
 from controller_node.behaviours.make import choose_behaviour
+from controller_node.behaviours.settings import check_terrain
+from controller_node.controller import check_reference
 from controller_node.dynamics import DynamicsModel
 from controller_node.motion import make_motion
 from controller_node.references.base import Reference
@@ -78,7 +80,7 @@ def make_plan(
         controller_given,
     )
     motion = make_motion(character, controller)
-    choose_behaviour(character, controller)  # it can be had
+    check_reference(motion.reference, choose_behaviour(character, controller))
     first = motion.reference.sample(0.0)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {
@@ -87,6 +89,7 @@ def make_plan(
         "initial_velocity": first.velocity.tolist(),
     }
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
+    check_terrain(controller.text("behaviour"), simulator.text("terrain"))
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
     notes = character.notes + motion.notes

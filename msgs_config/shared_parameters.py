@@ -7,6 +7,7 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Parameter
 
 DEFAULT_CHARACTER = "humanoid"
+PLANE, NO_GROUND = "plane", "none"  # of a simulator's `terrain`; else it is a URDF's path
 
 CHARACTER = Parameter(
     "character", DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml or .urdf file"

@@ -37,6 +37,7 @@ LIMITED = (
 MOST_UNACKNOWLEDGED = 2200  # ticks: the simulator looks each 2000
 STILL = 1.0  # s without a tick, that say that the simulator waits
 SLOW = 120.0  # s that thousands of ticks may take on a machine that is busy with other things
+BEGIN, END = "before_the_flood", "after_the_flood"  # in no message definition
 FLOOD = 4000  # messages, many more than the middleware has room for while nobody takes them
 
 
@@ -212,7 +213,7 @@ def test_messages_that_were_lost_are_counted_by_topic_and_said(
 
     # Act
     client.spin_sending(
-        lambda: send("before"), lambda: b"before" in file.read_bytes(), "a message in the bag"
+        lambda: send(BEGIN), lambda: BEGIN.encode() in file.read_bytes(), "a message in the bag"
     )
     recorder.send(signal.SIGSTOP)
     stopped = Path(f"/proc/{recorder.pid}/stat")
@@ -221,7 +222,7 @@ def test_messages_that_were_lost_are_counted_by_topic_and_said(
         send("flood")
     recorder.send(signal.SIGCONT)
     client.spin_sending(
-        lambda: send("after"), lambda: b"after" in file.read_bytes(), "the flood's end in the bag"
+        lambda: send(END), lambda: END.encode() in file.read_bytes(), "the flood's end in the bag"
     )
     client.answer(state, {})
     recorder.send(signal.SIGINT)

@@ -28,11 +28,9 @@ class GiveWay:
         self._starts = layout.vector_starts
         self._turning = layout.mask(joint.name for joint in turning)
         # one inertia a joint, so that a ball joint stays as firm in all directions
-        self._shares = np.ones(layout.size)
-        if turning:
-            inertias = [float(mass_diagonal[joint.entries].mean()) for joint in turning]
-            for joint, inertia in zip(turning, inertias, strict=True):
-                self._shares[joint.entries] = inertia / np.mean(inertias)
+        self._inertias = np.ones(layout.size)
+        for joint in turning:
+            self._inertias[joint.entries] = float(mass_diagonal[joint.entries].mean())
         self._heads = np.array([joint.start for joint in turning], dtype=np.intp)
         self._layout = layout
 
@@ -42,7 +40,8 @@ class GiveWay:
         """Gains by inertia, times strengths (b,), with bounds of the root's force and torque.
 
         Stiffness and damping of the joints that turn are proportional to the inertia that they
-        move, and so they all swing alike; their mean over the joints stays what it was.
+        move, and so they all swing alike; their mean over the joints stays what it was. Those that
+        have none get none, and do not count in the mean. The strengths come afterwards.
 
         Source: Zordan and Hodgins 2002, "Motion capture-driven simulations that hit and react".
         """
@@ -58,9 +57,11 @@ class GiveWay:
         )
 
     def _by_inertia(self, gains: FloatArray) -> FloatArray:
-        if not len(self._heads):
+        heads = self._heads[gains[self._heads] > 0.0]
+        if not len(heads):
             return gains
-        return np.where(self._turning, self._shares * gains[self._heads].mean(), gains)
+        shares = self._inertias / self._inertias[heads].mean()
+        return np.where(self._turning & (gains > 0.0), shares * gains[heads].mean(), gains)
 
 
 def softened(character: Character, struck: int, softness: float) -> FloatArray:

@@ -16,7 +16,8 @@ from controller_node.behaviours.hull import Hull
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character
 
-_GROUND_MARGIN = 0.03  # m, above the ground
+WINDOW = 1.0 / 60.0  # s
+_GROUND_MARGIN = 0.03  # m, above the ground, z = 0
 _TOUCH_MARGIN = 0.03  # m, between two links
 _FRICTION = 0.9  # of link against ground, no less than it is
 
@@ -32,7 +33,7 @@ class Hit:
 class HitDetector:
     """Watches the contacts of an episode, tick by tick."""
 
-    def __init__(self, character: Character, period: float, window: float = 1.0 / 60.0) -> None:
+    def __init__(self, character: Character, period: float, window: float = WINDOW) -> None:
         """For ticks of `period`; impulses are added up over `window`; s."""
         self._hull = Hull(character)
         self._period = period

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from controller_node.behaviours.base import BehaviourMaker, Ragdoll, Tracking
 from controller_node.behaviours.library import MotionLibrary
 from controller_node.behaviours.posture import Posture
@@ -37,6 +39,7 @@ def choose_behaviour(character: Character, values: Values) -> BehaviourChoice:
     posture = Posture(character)
     settings = reaction_settings(character, values)
     library = get_ups = None
+    rest = np.array(character.rest_position)
     if settings.searches:
         library = MotionLibrary(character, settings.library, settings.blend_duration)
     if settings.by_clip:
@@ -51,4 +54,7 @@ def choose_behaviour(character: Character, values: Values) -> BehaviourChoice:
         library=library,
         get_ups=get_ups,
     )
+    for made in (library, get_ups):
+        if made is not None:  # a first search takes longer than others
+            made.nearest(made.predicted(rest, np.zeros_like(rest)))
     return BehaviourChoice(lambda: Reaction(kit), needs_contacts=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from controller_node.behaviours.base import Directive, Mode, Observation, Phase
 from controller_node.behaviours.give_way import GiveWay, softened
-from controller_node.behaviours.hits import Hit, HitDetector
+from controller_node.behaviours.hits import WINDOW, Hit, HitDetector
 from controller_node.behaviours.library import Match, MotionLibrary
 from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.settings import ReactionSettings
@@ -66,7 +66,16 @@ class Reaction:
         self._own = OwnWay(self._layout)
         self._way: Way = self._own
         self._hit = Hit(0, 0.0)  # the last one
-        self._begin(0.0, Mode.TRACK, self._track, self._firm)
+        self._begin(0.0, Mode.TRACK, self._begin_tracking, self._firm)
+
+    @property
+    def carry(self) -> Carry:
+        """Of the own reference, to where the character goes on with it."""
+        return self._own.carry
+
+    @carry.setter
+    def carry(self, carry: Carry) -> None:
+        self._own.carry = carry
 
     def advance(self, seen: Observation) -> Directive:
         """What to do in a tick: change the phase if it is time, and say what is tracked in it."""
@@ -97,8 +106,13 @@ class Reaction:
 
     # What may end each phase
 
+    def _begin_tracking(self, seen: Observation, hit: Hit | None) -> None:
+        assistance = seen.assistance()
+        self._begin(seen.time, Mode.TRACK, self._track, self._firm, assistance=assistance)
+        self._track(seen, hit)
+
     def _track(self, seen: Observation, hit: Hit | None) -> None:
-        """Give way to a hit, or go limp by a hard one."""
+        """Give way to a hit, or go limp by a hard one or having fallen."""
         impulse = 0.0 if hit is None else hit.impulse
         if hit is not None and impulse >= self._settings.limp_threshold:
             self._go_limp(seen, "hit", hit)
@@ -106,14 +120,15 @@ class Reaction:
             hit is not None and impulse >= self._settings.hit_threshold and self._settings.searches
         ):
             self._react(seen, hit)
-        elif not self._settings.searches and self._has_fallen(seen):
+        elif self._has_fallen(seen):
             self._go_limp(seen, "fallen", None)
 
     def _return(self, seen: Observation, hit: Hit | None) -> None:
         if self._elapsed(seen) >= self._settings.blend_duration:
             self._way = self._own = OwnWay(self._layout, self._own.carry)
-            self._begin(seen.time, Mode.TRACK, self._track, self._firm, assistance="full")
-        self._track(seen, hit)
+            self._begin_tracking(seen, hit)
+        else:
+            self._track(seen, hit)
 
     def _follow(self, seen: Observation, hit: Hit | None) -> None:
         if self._elapsed(seen) >= self._settings.blend_duration:
@@ -127,13 +142,15 @@ class Reaction:
             self._go_limp(seen, "hit", self._hit)
         elif self._has_fallen(seen):
             self._go_limp(seen, "fallen", self._hit)
-        elif self._elapsed(seen) >= self._severity * self._settings.react_duration:
-            self._begin(seen.time, Mode.SEARCH, self._search, self._soft, **self._hit_facts())
+        elif self._elapsed(seen) >= max(self._severity * self._settings.react_duration, WINDOW):
+            facts = self._hit_facts(seen)
+            self._begin(seen.time, Mode.SEARCH, self._search, self._soft, **facts)
 
     def _search(self, seen: Observation, hit: Hit | None) -> None:
         """Go on with the motion that is nearest to what the present state leads to."""
         library = self._kit.library
         assert library is not None
+        self._detector.forget()  # what it has reacted to
         match = library.nearest(library.predicted(self._led(seen), seen.velocity))
         self._follow_clip(library, match, seen, _ONTO * self._settings.blend_duration)
         self._begin(
@@ -142,7 +159,7 @@ class Reaction:
             self._follow,
             self._firmer,
             to="clip",
-            assistance="full",
+            assistance=seen.assistance(),
             **match.content(),
         )
 
@@ -162,13 +179,15 @@ class Reaction:
 
     def _find_get_up(self, seen: Observation, hit: Hit | None) -> None:
         assert isinstance(self._way, BodyWay)
+        self._detector.forget()
         self._way.state = self._body(seen)
+        rising = seen.assistance("rising")
         self._rise_until = seen.time + self._settings.recovery_duration
         if self._kit.get_ups is None:
             carry = self._carry_to(seen.now, self._way.state)
             self._come_back(seen, carry, self._settings.recovery_duration)
             self._begin(
-                seen.time, Mode.BLEND, self._rise, self._rising, to="reference", assistance="rising"
+                seen.time, Mode.BLEND, self._rise, self._rising, to="reference", assistance=rising
             )
             return
         clip = self._settings.face_up if self._faces_up(seen) else self._settings.face_down
@@ -183,7 +202,7 @@ class Reaction:
             self._rise,
             self._rising,
             to="clip",
-            assistance="rising",
+            assistance=rising,
             **match.content(),
         )
 
@@ -207,7 +226,7 @@ class Reaction:
         diagonal = np.diag(kit.model.mass_matrix())
         self._give_way = GiveWay(kit.character, diagonal)
         self._softness = softened(kit.character, hit.link, settings.softness)
-        self._begin(seen.time, Mode.REACT, self._react_on, self._soft, **self._hit_facts())
+        self._begin(seen.time, Mode.REACT, self._react_on, self._soft, **self._hit_facts(seen))
 
     @property
     def _severity(self) -> float:
@@ -217,9 +236,9 @@ class Reaction:
         """
         return min(self._hit.impulse / (_SEVERE * self._settings.limp_threshold), 1.0)
 
-    def _hit_facts(self) -> dict[str, object]:
+    def _hit_facts(self, seen: Observation) -> dict[str, object]:
         name = self._kit.character.links[self._hit.link].name
-        share = self._settings.assistance
+        share = seen.assistance(self._settings.assistance)
         return {"link": name, "impulse": self._hit.impulse, "assistance": share}
 
     def _go_limp(self, seen: Observation, why: str, hit: Hit | None) -> None:
@@ -255,9 +274,8 @@ class Reaction:
         own = carry.moved(self._layout, seen.now)
         offset = Offset(self._layout, own, wanted, seen.time, duration)
         self._way = self._own = OwnWay(self._layout, carry, offset)
-        self._begin(
-            seen.time, Mode.BLEND, self._return, self._firm, to="reference", assistance="full"
-        )
+        facts = {"to": "reference", "assistance": seen.assistance()}
+        self._begin(seen.time, Mode.BLEND, self._return, self._firm, **facts)
 
     # Gains
 
@@ -273,7 +291,8 @@ class Reaction:
     def _soft(self, seen: Observation) -> GainArrays:
         force = self._settings.assistance * self._kit.model.weight
         arm = float(seen.now.configuration.position[2])  # of the root's force about the feet
-        return self._give_way.gains(seen.gains, self._softness, force, force * abs(arm))
+        strengths = self._softness * seen.strengths
+        return self._give_way.gains(seen.whole_gains, strengths, force, force * abs(arm))
 
     def _firmer(self, seen: Observation) -> GainArrays:
         """From as soft as in the phase before to as it is; the root's limits are lifted at once."""

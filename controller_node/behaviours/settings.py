@@ -6,8 +6,10 @@ from controller_node.references.clip_file import available_clips
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.parameters import Parameter, Values
+from msgs_config.shared_parameters import NO_GROUND, PLANE
 
 BEHAVIOURS = ("tracking", "ragdoll", "active_ragdoll", "reactive")
+_TELLS_HITS = ("active_ragdoll", "reactive")
 
 BEHAVIOUR_PARAMETERS = [
     Parameter(
@@ -19,7 +21,15 @@ BEHAVIOUR_PARAMETERS = [
     ),
     Parameter("hit.threshold", 3.0, "impulse of contacts that counts as a hit", unit="N s"),
     Parameter("limp.threshold", 30.0, "impulse of a hit that makes it limp", unit="N s"),
-    Parameter("react.duration", 0.25, "how long it gives way", unit="s", minimum=0.01, maximum=10),
+    Parameter(
+        "react.duration",
+        0.25,
+        "how long it gives way to a hit of two thirds of limp.threshold or more; to a lighter one "
+        "in proportion, at least 1/60 s",
+        unit="s",
+        minimum=0.01,
+        maximum=10,
+    ),
     Parameter("react.softness", 0.2, "strength of the joints at the struck link", maximum=1.0),
     Parameter(
         "react.assistance",
@@ -73,6 +83,18 @@ class ReactionSettings:
     recovery_duration: float  # s
     face_up: str  # clips
     face_down: str
+
+
+def check_terrain(behaviour: str, terrain: object) -> None:
+    """Raise ConfigurationError if a behaviour cannot tell a hit from what a simulator's ground does.
+
+    It knows the plane at z = 0 alone. `terrain` is the simulator's parameter, None if unknown.
+    """
+    if behaviour in _TELLS_HITS and terrain not in (None, PLANE, NO_GROUND):
+        raise ConfigurationError(
+            f"parameter 'behaviour' is {behaviour}, which tells a hit from the ground at z = 0, "
+            f"but sim_node's 'terrain' is {terrain}; it must be {PLANE} or {NO_GROUND}"
+        )
 
 
 def reaction_settings(character: Character, values: Values) -> ReactionSettings:

@@ -92,7 +92,9 @@ def _storage_files(bag: Path) -> list[Path]:
     Raises:
         RecordingError: there are none, or of different storages.
     """
-    found = [file for file in bag.iterdir() if _storage_of(file)]
+    present = {file for file in bag.iterdir() if _storage_of(file)}
+    copies = {file.with_name(file.name + _ZSTD_SUFFIX) for file in present}
+    found = present - copies  # what was being compressed is there twice
     if not found:
         names = " or ".join(SUFFIXES.values())
         raise RecordingError(f"nothing to recover in {bag}: it has no {names} file")

@@ -138,7 +138,7 @@ class _Check:
             self._layout.vector_starts.tolist(), self._layout.vector_lengths.tolist(), strict=True
         ):
             entries = slice(start, start + length)
-            if silent[start]:
+            if silent[entries].any():
                 continue
             for candidate, effort in zip(candidates, clipped, strict=True):
                 if same_bits(effort[entries], applied[entries]):

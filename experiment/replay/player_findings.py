@@ -106,7 +106,9 @@ def compare_commands(recording: Recording, received: FloatArray) -> CommandFindi
     first = largest = None
     if differs.any():
         first = _difference(recording, recorded, received, int(np.argmax(differs)))
-        largest = _difference(recording, recorded, received, int(np.argmax(apart)))
+        largest = _difference(
+            recording, recorded, received, int(np.argmax(np.where(differs, apart, -1.0)))
+        )
     return CommandFindings(
         states=int(both.any(axis=1).sum()),
         first=first,

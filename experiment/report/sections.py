@@ -201,7 +201,10 @@ class CharacterReport:
         title, recording = "contacts", self._recording
         series = contact_series(recording.character, recording.contacts)
         if series is None:
-            note = "The recording has no contacts; a run with --contacts has."
+            note = (
+                "The recording has no contacts: it was recorded with --exclude contacts, or by "
+                "another recorder."
+            )
             return Section(title, notes=[note])
         heavy = weight(recording)
         figure = charts.contact_chart(
