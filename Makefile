@@ -13,10 +13,10 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
 
-.PHONY: help venv demo test bench soak format clean distclean
+.PHONY: help venv demo test bench soak kills long-recording format clean distclean
 
 help: ## Show this list
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
 	@echo "PYTHON=... chooses the interpreter of a new .venv (3.11 or 3.12)."
 
 venv: .venv/.installed ## Set up .venv
@@ -35,6 +35,12 @@ bench: .venv/.installed ## Measure speed
 
 soak: .venv/.installed ## Run 500,000 ticks with disturbances; no tick lost, no memory grown
 	$(BIN)/python -m benchmarks.soak
+
+kills: .venv/.installed-test ## Kill the recorder 100 times; every bag is recovered
+	$(BIN)/python -m benchmarks.kills
+
+long-recording: .venv/.installed ## Record 5 minutes at 1 kHz; no message lost
+	$(BIN)/python -m benchmarks.long_recording
 
 format: .venv/.installed-test ## Format the code and fix what can be fixed
 	$(BIN)/ruff check --fix
