@@ -17,12 +17,14 @@ from benchmarks.realtime import measure_realtime  # noqa: E402
 from benchmarks.recorder import measure_recorder  # noqa: E402
 from benchmarks.replay import measure_replay  # noqa: E402
 from benchmarks.samcon import measure_samcon  # noqa: E402
+from benchmarks.search import measure_search  # noqa: E402
 from experiment.domain import own_domain  # noqa: E402
 
 _WIDTH = 100  # characters; enough for every table
 _MEASUREMENTS = {
     "lockstep": measure_lockstep,
     "laws": measure_control_laws,
+    "search": measure_search,
     "cost": measure_cost,
     "realtime": measure_realtime,
     "samcon": measure_samcon,

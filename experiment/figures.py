@@ -42,6 +42,17 @@ def prepare_directory(directory: Path, *, overwrite: bool) -> None:
         raise RunError(f"cannot write to {directory}: {error.strerror or error}") from error
 
 
+def figures_directory(run: Path, namespace: str, *, is_alone: bool) -> Path:
+    """Where a character's figures are: in a run's directory, or in a folder of its name there.
+
+    Args:
+        run: The directory of the run.
+        namespace: That of the character's topics, which ends in its name; or the name itself.
+        is_alone: Whether it is the only one, and has no name in its world.
+    """
+    return run if is_alone else run / namespace.rpartition("/")[2]
+
+
 def write_figures(directory: Path, summary: dict[str, object], series: FloatArray) -> None:
     """Write `summary.json`, and `measurements.csv` with a line of column names.
 

@@ -14,10 +14,10 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import CommandError, ConfigurationError, RecordingError, one_of
+from msgs_config.shared_parameters import PLANE
 from msgs_config.throw import Throw, natural_radius
 from msgs_config.tick_clock import TickClock
 from sim_node.aim import find_impact
-from sim_node.parameters import PLANE
 from sim_node.throwing import MOST_BALLS
 
 SIDES: Mapping[str, float | None] = {
@@ -33,6 +33,7 @@ _NEEDED = ("mass", "speed", "at", "target")
 _TEXTS = ("target", "from")
 _KEYS = (*_NEEDED, "from", "distance", "radius")
 _DISTANCE = 2.0  # m
+_SLOWEST = 1e-3  # m/s
 _EXAMPLE = "mass=2 speed=8 at=2.0 from=left target=chest"
 
 
@@ -63,6 +64,10 @@ class Aim:
         for name, value in least.items():
             if not (math.isfinite(value) and value > 0.0):
                 raise ConfigurationError(f"{name} is {value:g}; it must be above 0")
+        if self.speed < _SLOWEST:
+            raise ConfigurationError(
+                f"speed is {self.speed:g} m/s; it must be {_SLOWEST:g} m/s or more"
+            )
 
     @property
     def size(self) -> float:

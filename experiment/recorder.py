@@ -9,7 +9,7 @@ from rclpy.qos import QoSProfile
 
 from experiment.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
 from experiment.bags.writer import BagWriter
-from experiment.figures import BAG, write_figures
+from experiment.figures import BAG, figures_directory, write_figures
 from experiment.listener import HEARD, RunListener
 from experiment.recorder_inbox import Inbox
 from experiment.recorder_topics import NamedTopics, RecordedTopic, contract_topics, simulator_name
@@ -196,7 +196,8 @@ class RecorderNode(Node):
             try:
                 figures, series = listener.results()
                 lost = {"lost_messages": self._lost_messages(name)}
-                write_figures(self._directory / name, figures | lost, series)
+                directory = figures_directory(self._directory, name, is_alone=not name)
+                write_figures(directory, figures | lost, series)
             except RecordingError as error:
                 self._fail(f"{error}{of_it}")
             if listener.missing_ticks:

@@ -10,7 +10,7 @@ from experiment.bags.recording import Recording
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character, Loading
 from msgs_config.errors import RecordingError
-from sim_node.parameters import PLANE
+from msgs_config.shared_parameters import PLANE
 
 _RADIUS = 0.1  # m, of a ball of which it was not recorded
 _ROUNDING = 1e-9  # s: two distances are as good as equal

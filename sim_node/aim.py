@@ -11,7 +11,8 @@ from msgs_config.throw import Throw
 from sim_node.world import World, WorldSettings
 
 _CLOSE = 1e-6  # m that count as touching
-_MOST_STEPS = 1000
+_MOST_RADII = 20_000.0  # from the place where it is let go
+_LAST_STEPS = 1000  # nearer than a radius, until it touches
 
 
 @dataclass(frozen=True)
@@ -42,12 +43,18 @@ def find_impact(
         distance: How far from the centre of mass it comes, m.
 
     Raises:
-        ConfigurationError: the link does not exist, has no surface, or is in the ball already.
+        ConfigurationError: the link does not exist, has no surface, or is in the ball already; or
+            the ball comes from too far for its size, or past the link.
     """
     names = [one.name for one in character.links]
     if link not in names:
         raise ConfigurationError(one_of("link", link, names))
     row = names.index(link)
+    if not distance <= _MOST_RADII * radius:
+        raise ConfigurationError(
+            f"distance is {distance:g} m; a ball with a radius of {radius:.3g} m may come from "
+            f"{_MOST_RADII * radius:g} m at most"
+        )
     with World(WorldSettings(ground=False)) as world:
         body = world.add(character)
         body.set_state(position, np.zeros(character.layout.size))
@@ -64,11 +71,16 @@ def find_impact(
             )
         left, before = distance, set[str]()
         # the gap is how far the ball may go, at least, until it touches (sphere tracing)
-        for _ in range(_MOST_STEPS):
+        for _ in range(_LAST_STEPS + round(distance / radius)):
             if gaps[row] < _CLOSE:
                 break
             left -= min(gaps[row], radius)  # lest it jump over what is in the way
             world.balls.place(target + left * origin)
             gaps = world.balls.gaps(body.links)
             before |= {names[each] for each in np.flatnonzero(gaps < 0.0).tolist() if each != row}
+        else:
+            raise ConfigurationError(
+                f"a ball with a radius of {radius:.3g} m that comes from {distance:g} m away does "
+                f"not touch '{link}'; take another 'radius' or 'from', or come from nearer"
+            )
     return Impact(target, target + left * origin, tuple(sorted(before)))

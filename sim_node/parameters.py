@@ -10,7 +10,15 @@ from msgs_config.character import Character, Loading
 from msgs_config.character_loading import load_character
 from msgs_config.errors import CharacterError, ConfigurationError, LayoutError
 from msgs_config.parameters import Parameter, Values, resolve
-from msgs_config.shared_parameters import CHARACTER, GRAVITY, PLACEMENT, RATE, placed
+from msgs_config.shared_parameters import (
+    CHARACTER,
+    GRAVITY,
+    NO_GROUND,
+    PLACEMENT,
+    PLANE,
+    RATE,
+    placed,
+)
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from msgs_config.urdf_check import check_urdf
 from sim_node.actor import Role
@@ -18,7 +26,6 @@ from sim_node.simulation import SimulationSettings
 from sim_node.world import WorldSettings
 
 _LARGEST_COUNT = 2**62
-PLANE, _NOTHING = "plane", "none"
 _BEFORE = (CHARACTER.name, PLACEMENT.name)  # what the other parameters depend on
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
@@ -286,7 +293,7 @@ def make_settings(values: Values) -> SimulationSettings:
             link_friction=values.number("link_friction"),
             solver_iterations=values.integer("solver_iterations"),
             ground=terrain == PLANE,
-            terrain=None if terrain in (PLANE, _NOTHING) else _read_terrain(terrain),
+            terrain=None if terrain in (PLANE, NO_GROUND) else _read_terrain(terrain),
         ),
     )
 

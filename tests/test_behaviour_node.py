@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from sensor_msgs.msg import JointState
 from experiment.loop import ticks_in_process
 from experiment.plan import make_plan
 from msgs_config import topics
+from msgs_config.errors import ConfigurationError
 from msgs_config.messages import split_stamp
 from msgs_config.tick_clock import TickClock
 from msgs_config.wrench_messages import WrenchArrays, encode_wrenches
@@ -22,10 +24,10 @@ REST = list(HUMANOID.rest_position)
 CONTROLLER = topics.CONTROLLER_NODE
 
 
-def state(tick: int) -> JointState:
-    """The humanoid at rest."""
+def state(tick: int, *, first: bool = False) -> JointState:
+    """The humanoid at rest; the first state of an episode has no effort."""
     size = HUMANOID.layout.size
-    effort = [] if tick == 1 else [0.0] * size
+    effort = [] if first else [0.0] * size
     names = HUMANOID.layout.dof_names
     return joint_state(CLOCK.stamp_ns(tick), names, REST, [0.0] * size, effort)
 
@@ -38,19 +40,36 @@ class Ticks:
         self.modes = client.listen(topics.MODE.of(CONTROLLER))
         self._contacts = client.speak(topics.CONTACTS) if with_contacts else None
         self.tick = 0
+        self._first = 1
+
+    def begin_at(self, tick: int) -> None:
+        """Let the next state be an episode's first one, with this tick's stamp."""
+        self._first, self.tick = tick, tick - 1
+        self._client.torques.messages.clear()
+
+    def touch(self, force: float) -> bytes:
+        """The contacts of the present tick, in which a force pushes the chest."""
+        rows = [[force, 0.0, 0.0, 0.0, 0.0, 0.0]] if force else []
+        now_ns = CLOCK.stamp_ns(self.tick)
+        return encode_wrenches(WrenchArrays.of_rows(now_ns, ["chest"] * len(rows), rows, []))
+
+    def leave(self, force: float) -> None:
+        """A tick whose contacts are published, and whose state is not."""
+        self.tick += 1
+        assert self._contacts is not None
+        self._contacts.publish(self.touch(force))
 
     def next(self, force: float = 0.0, *, state_first: bool = False) -> JointState:
         """The torques that answer the next state, before which a force pushed the chest."""
         self.tick += 1
-        current = state(self.tick)
-        rows = [[force, 0.0, 0.0, 0.0, 0.0, 0.0]] if force else []
-        touched = WrenchArrays.of_rows(stamp_ns(current), ["chest"] * len(rows), rows, [])
+        current = state(self.tick, first=self.tick == self._first)
+        touched = self.touch(force)
 
         def send() -> None:
             if state_first:
                 self._client.states.publish(current)
             if self._contacts is not None:
-                self._contacts.publish(encode_wrenches(touched))
+                self._contacts.publish(touched)
             if not state_first:
                 self._client.states.publish(current)
 
@@ -59,6 +78,10 @@ class Ticks:
     def _answer(self, current: JointState) -> JointState | None:
         torques = self._client.torques.messages
         return next((m for m in torques if stamp_ns(m) == stamp_ns(current)), None)
+
+    def wait_told(self, expected: list[tuple[str, int]], before: int = 0) -> None:
+        """Wait until the modes published, without the first ones, are these."""
+        self._client.spin_until(lambda: self.told()[before:] == expected, f"modes {expected}")
 
     def told(self) -> list[tuple[str, int]]:
         """The modes published so far, and their ticks."""
@@ -88,6 +111,75 @@ def test_a_hit_counts_with_the_state_whose_contacts_hold_it(ticks: Ticks) -> Non
     assert names == ["TRACK", "REACT", "SEARCH", "BLEND"]
     found = json.loads(ticks.modes.last.data)
     assert found["distance"] < found["median_distance"]
+
+
+def test_a_simulator_that_is_started_again_finds_it_as_new(ticks: Ticks) -> None:
+    # Arrange: another one has been hit, and ended
+    for _ in range(20):
+        ticks.next()
+    ticks.next(force=2400.0)
+    ticks.wait_told([("TRACK", 1), ("REACT", 21)])
+
+    # Act: the first state has the stamp that the other one's had
+    ticks.begin_at(1)
+    ticks.next()
+    ticks.next()
+    ticks.next(force=1200.0, state_first=True)  # its contacts are waited for
+
+    # Assert
+    ticks.wait_told([("TRACK", 1), ("REACT", 3)], before=2)
+    assert json.loads(ticks.modes.last.data)["impulse"] == pytest.approx(5.0)
+
+
+def test_contacts_of_an_episode_that_was_reset_do_not_count_in_the_next(ticks: Ticks) -> None:
+    for _ in range(3):
+        ticks.next()
+    ticks.leave(force=2400.0)  # the last state of the old episode gets no answer
+
+    ticks.begin_at(ticks.tick + 1)
+    for _ in range(3):
+        ticks.next()
+    ticks.next(force=1200.0)
+
+    ticks.wait_told([("TRACK", 1), ("TRACK", 5), ("REACT", 8)])
+
+
+def test_a_contact_without_end_is_refused_in_a_line_and_ends_nothing(
+    processes: Processes, simulator: ControllerClient
+) -> None:
+    node = processes.controller("humanoid", behaviour="reactive")
+    ticks = Ticks(simulator)
+    ticks.next()
+
+    ticks.next(force=1e200)
+    ticks.next(force=1200.0)
+
+    ticks.wait_told([("TRACK", 1), ("REACT", 3)])
+    (said,) = [line for line in node.stderr.splitlines() if "contacts ignored" in line]
+    assert "1e+09 N" in said
+    assert node.exit_code is None
+
+
+def test_on_other_ground_than_the_plane_a_behaviour_that_tells_hits_ends_in_a_line(
+    processes: Processes, client: SimulatorClient, tmp_path: Path
+) -> None:
+    box = tmp_path / "box.urdf"
+    box.write_text(
+        '<robot name="box"><link name="box"><collision><geometry><box size="9 9 1"/></geometry>'
+        "</collision></link></robot>"
+    )
+    own = {"behaviour": "reactive"}
+    with pytest.raises(ConfigurationError, match=r"'terrain' is .*box\.urdf; it must be plane"):
+        make_plan("humanoid", 0.5, {"reference": "clip"}, {"terrain": str(box)}, own)
+    make_plan("humanoid", 0.5, {"reference": "clip"}, {"terrain": "none"}, own)
+    joints = ["root", *HUMANOID.layout.actuated_joint_names]
+
+    processes.simulator("humanoid", terrain=str(box), commanded_joints=joints)
+    node = processes.controller("humanoid", behaviour="reactive")
+
+    assert node.wait() == 1
+    (line,) = node.stderr.splitlines()
+    assert line.startswith("error: ") and "reactive" in line and "box.urdf" in line
 
 
 def test_without_a_behaviour_no_contacts_are_waited_for(

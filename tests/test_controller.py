@@ -10,6 +10,8 @@ from controller_node.controller import Controller
 from controller_node.dynamics import DynamicsModel
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
+from controller_node.references.trajectory import points_of_lists
+from controller_node.strength import strengths_of
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClockError
 from msgs_config.joint_layout import ROOT
@@ -259,3 +261,21 @@ def test_the_pendulum_settles_where_its_spring_carries_its_weight(law: str) -> N
 
     # Assert: 1 kg at half of 1 m, 50 N m/rad towards 0.5 rad
     assert 0.5 - angle == pytest.approx(0.5 * 9.81 * np.sin(angle) / 50.0, rel=1e-4)
+
+
+def test_an_episode_of_the_same_stamp_that_is_begun_has_nothing_of_the_one_before() -> None:
+    # Arrange
+    driver, (first, second, third) = walker(law="pid"), states(3)
+    before = [driver.answer(state, stamp(1))[0].tobytes() for state in (first, second)]
+    weak = strengths_of(HUMANOID, ("chest",), (0.5,), stamp(2))
+    driver.weaken(weak, episode_ns=stamp(1))
+    points = points_of_lists(["left_knee"], [0.5], [[-1.0]], [[]], [[]])
+    driver.follow(points, start_ns=stamp(3), now_ns=stamp(3), episode_ns=stamp(1))
+    driver.answer(third, stamp(1))
+
+    # Act
+    driver.begin_episode(stamp(1))
+
+    # Assert
+    again = [driver.answer(state, stamp(1))[0].tobytes() for state in (first, second)]
+    assert again == before

@@ -32,6 +32,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.throw import Throw, natural_radius
 from msgs_config.tick_clock import TickClock
+from sim_node.aim import find_impact
 from sim_node.parameters import make_role, make_settings
 from sim_node.simulation import Simulation
 
@@ -117,6 +118,18 @@ def test_a_ball_hits_its_target_at_its_time_from_its_side(
     assert np.arccos(came @ expected) < slack
 
 
+@pytest.mark.parametrize(("radius", "distance"), [(0.005, 8.0), (0.0078, 20.0), (0.1, 300.0)])
+def test_a_small_ball_from_far_away_is_aimed_at_the_surface(radius: float, distance: float) -> None:
+    position = np.array(HUMANOID.rest_position)
+    ahead = np.array((1.0, 0.0, 0.0))
+
+    far = find_impact(HUMANOID, position, "chest", ahead, radius, distance)
+    near = find_impact(HUMANOID, position, "chest", ahead, radius, 1.0)
+
+    assert far.centre == pytest.approx(near.centre, abs=1e-5)
+    assert far.before == near.before == ()
+
+
 def test_a_side_turns_with_the_character() -> None:
     turned = plan_of(placement=[1.0, 2.0, 0.0, np.pi / 2.0])
     aim = Aim(1.0, 6.1, 0.8, "neck", "front", radius=0.06)
@@ -180,6 +193,9 @@ GOOD = ["mass=2", "speed=8", "at=0.9", "target=chest"]
 WRONG: dict[str, tuple[str, list[str]]] = {
     "a link that is none": ("target=chset", ["'chset'", "did you mean 'chest'?"]),
     "no speed": ("speed=0", ["speed is 0; it must be above 0"]),
+    "hardly moving": ("speed=1e-309", ["speed is 1e-309 m/s; it must be 0.001 m/s or more"]),
+    "from another country": ("distance=2e5", ["distance is 200000 m", "from 1969.49 m at most"]),
+    "from another world": ("distance=1e300", ["distance is 1e+300 m", "at most"]),
     "backwards": ("speed=-3", ["speed is -3"]),
     "no mass": ("mass=0", ["mass is 0"]),
     "too heavy": ("mass=1e9 radius=0.1", ["mass is 1e+09; it must be 0.001 to 10000"]),

@@ -7,17 +7,29 @@ import pytest
 from physics import controller
 from struck import HUMANOID, LINKS, RATE_HZ, Run, Throw, driver, run
 
+from controller_node import parameters as for_controller
 from controller_node.behaviours.base import Mode, ModeReport
 from controller_node.behaviours.give_way import GiveWay, softened
+from controller_node.controller import Controller
 from controller_node.dynamics import DynamicsModel
+from controller_node.feedback import responding
+from controller_node.feedback_gains import FEATURES, OUTPUTS
+from controller_node.laws import GainArrays, Instant
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
+from controller_node.references.moved import Carry
+from controller_node.references.trajectory import points_of_lists
+from controller_node.strength import strengths_of
 from experiment.loop import ticks_in_process
 from experiment.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
+from msgs_config.parameters import resolve
+from msgs_config.stamped import StampedState
+from msgs_config.tick_clock import TickClock
 
 LAYOUT = HUMANOID.layout
+CLOCK = TickClock(RATE_HZ)
 WEIGHT = 9.81 * HUMANOID.mass
 HIT, SPEED = 480, 10.0  # tick, m/s
 FROM_FRONT = np.pi
@@ -70,13 +82,48 @@ def reports(whole: Run, mode: Mode) -> list[ModeReport]:
 # Before a hit
 
 
-@pytest.mark.parametrize("behaviour", ["reactive"])
-def test_without_a_hit_it_is_plain_tracking_to_the_bit(behaviour: str) -> None:
-    plain, reactive = unhit(), unhit(behaviour)
+def test_without_a_hit_it_is_plain_tracking_to_the_bit() -> None:
+    plain, reactive = unhit(), unhit("reactive")
 
     assert reactive.efforts.tobytes() == plain.efforts.tobytes()
     assert reactive.positions.tobytes() == plain.positions.tobytes()
     assert reactive.mode_names() == ["TRACK"]
+
+
+def test_an_active_ragdoll_is_plain_tracking_to_the_bit_until_its_torque_is_bounded() -> None:
+    plain, active = unhit(), unhit("active_ragdoll")
+    torques = np.linalg.norm(plain.efforts[:, 3:6], axis=1)
+    bounded = int(np.argmax(torques > 150.0))
+
+    assert bounded > 0 and torques[bounded] > 150.0
+    assert active.efforts[:bounded].tobytes() == plain.efforts[:bounded].tobytes()
+    assert np.linalg.norm(active.efforts[bounded, 3:6]) == pytest.approx(150.0)
+    assert active.mode_names() == ["TRACK"]
+
+
+@pytest.mark.parametrize("clip", ["getup_faceup", "getup_facedown", "roll", "backflip"])
+def test_what_lies_or_turns_over_as_its_clip_does_has_not_fallen(clip: str) -> None:
+    whole = run({"clip": clip, "behaviour": "reactive", "library": ["walk"]}, 4 * RATE_HZ)
+
+    assert whole.mode_names() == ["TRACK"]
+
+
+def test_what_falls_without_a_hit_goes_limp_and_lies_in_no_other_mode() -> None:
+    given = {"clip": "walk", "behaviour": "reactive", "root_assistance": False}
+    whole = run(given, 2 * RATE_HZ)
+
+    assert whole.mode_names() == ["TRACK", "LIMP", "SEARCH", "BLEND"]
+    assert whole.modes[1].phase.facts["why"] == "fallen"
+    assert whole.positions[whole.tick_of(whole.modes[1]), 2] > 0.1
+    assert {report.phase.facts["assistance"] for report in whole.modes} == {"none"}
+
+
+def test_a_mode_says_from_the_first_how_much_it_is_assisted() -> None:
+    assert unhit("tracking").modes[0].phase.facts == {"assistance": "full"}
+    told = [report.phase.facts["assistance"] for report in walk(20.0).modes]
+    assert told == ["full", 0.2, 0.2, "full", "full", "full"]
+    rising = recovers(1, "reactive").modes
+    assert "rising" in [report.phase.facts["assistance"] for report in rising]
 
 
 def test_until_the_hit_it_is_plain_tracking_to_the_bit_and_then_it_is_not() -> None:
@@ -146,6 +193,20 @@ def test_it_is_back_on_the_clip_two_seconds_after_20_newton_seconds() -> None:
     last = len(whole.references) - 1
     own = clip.sample(last / RATE_HZ).configuration.position
     assert whole.references[last].position == pytest.approx(own, abs=1e-6)  # time went on
+
+
+@pytest.mark.parametrize(("duration", "impulse"), [(0.1, 3.5), (0.05, 5.0), (0.01, 20.0)])
+def test_one_hit_has_one_reaction_however_short(duration: float, impulse: float) -> None:
+    given = {"clip": "walk", "behaviour": "reactive", "react.duration": duration}
+    if impulse > 10.0:
+        given["limp.threshold"] = 1e4  # of which it is a slight one
+    throw = Throw(SPEED, 240, direction=FROM_FRONT)
+
+    whole = run(given, 300, (throw,), mass=impulse / SPEED)
+
+    assert whole.mode_names() == ["TRACK", "REACT", "SEARCH", "BLEND"]
+    assert whole.tick_of(whole.modes[2]) - whole.tick_of(whole.modes[1]) >= RATE_HZ / 60
+    assert whole.modes[2].phase.facts["impulse"] == pytest.approx(impulse, rel=0.2)
 
 
 def test_the_response_grows_with_the_impulse() -> None:
@@ -239,7 +300,102 @@ def test_it_goes_on_from_where_it_got_up() -> None:
     assert speeds[back:].max() < 2.5
 
 
+def states_at(driver: Controller, tick: int, first: bool = False) -> StampedState:
+    """The state in which the driver's own reference begins, at a tick."""
+    start = driver._own_reference.sample(0.0)
+    effort = None if first else np.zeros(LAYOUT.size)
+    return StampedState(CLOCK.stamp_ns(tick), start.configuration.position, start.velocity, effort)
+
+
+def test_a_trajectory_leads_from_where_it_got_up_to_where_it_says() -> None:
+    # Arrange: as after it got up elsewhere, and faces another way
+    control, episode_ns = driver({"behaviour": "reactive"}), CLOCK.stamp_ns(1)
+    nothing = np.zeros((len(LINKS), 6))
+    control.answer(states_at(control, 1, first=True), episode_ns, nothing)
+    control._behaviour.carry = Carry(1.0, 3.0, -2.0)
+    _, carried = control.answer(states_at(control, 2), episode_ns, nothing)
+    goal = np.array(HUMANOID.rest_position)
+    goal[:2] = 7.0, 0.0
+    points = points_of_lists(LAYOUT.dof_names, [0.5], [goal.tolist()], [[]], [[]])
+
+    # Act
+    start = CLOCK.stamp_ns(3)
+    control.follow(points, start_ns=start, now_ns=start, episode_ns=episode_ns)
+    tracked = [
+        control.answer(states_at(control, tick), episode_ns, nothing)[1].position
+        for tick in range(3, 140)
+    ]
+
+    # Assert
+    assert np.linalg.norm(carried.position[:2] - (3.0, -2.0)) < 0.1
+    assert np.linalg.norm(tracked[0] - carried.position) < 0.05
+    assert tracked[-1] == pytest.approx(goal, abs=1e-9)
+
+
 # Parts
+
+
+def test_strengths_and_gains_of_zero_count_while_it_gives_way() -> None:
+    # Arrange
+    off = {"gains.left_knee.p": 0.0, "gains.left_knee.d": 0.0}
+    given = {"behaviour": "reactive", "strength.left_elbow": 0.5, **off}
+    control, episode_ns = driver(given), CLOCK.stamp_ns(1)
+    taken = strengths_of(LAYOUT, ("left_shoulder",), (0.0,), episode_ns)
+    used: list[GainArrays] = []
+    law = control._effort
+
+    def watched(instant: Instant, gains: GainArrays) -> FloatArray:
+        used.append(gains)
+        return law(instant, gains)
+
+    control._effort = watched  # type: ignore[method-assign]
+    hit = np.zeros((len(LINKS), 6))
+    hit[LINKS.index("neck"), 0] = 2000.0
+
+    # Act
+    control.weaken(taken, episode_ns=episode_ns)
+    control.answer(states_at(control, 1, first=True), episode_ns, 0.0 * hit)
+    control.answer(states_at(control, 2), episode_ns, hit)
+
+    # Assert
+    assert control.mode is not None and control.mode.phase.mode is Mode.REACT
+    heads = {joint.name: joint.start for joint in LAYOUT.joints}
+    soft = {name: used[1].stiffness[head] for name, head in heads.items()}
+    assert soft["left_elbow"] == pytest.approx(0.5 * soft["right_elbow"], rel=0.05)
+    assert soft["left_knee"] == soft["left_shoulder"] == 0.0
+    assert used[1].damping[heads["left_knee"]] == 0.0
+    assert soft["right_knee"] > 0.0 and soft["right_shoulder"] > 0.0
+
+
+def test_a_joint_without_gains_does_not_count_in_their_mean() -> None:
+    model = DynamicsModel(HUMANOID)
+    model.update(np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size))
+    off = {"gains.left_knee.p": 0.0, "gains.left_knee.d": 0.0}
+    gains, ones = driver(off).settings.gains, np.ones(len(LAYOUT.vector_starts))
+
+    scaled = GiveWay(HUMANOID, np.diag(model.mass_matrix())).gains(gains, ones, 1.0, 1.0)
+
+    heads = [joint.start for joint in LAYOUT.joints[1:] if joint.name != "left_knee"]
+    assert scaled.stiffness[LAYOUT.joint("left_knee").start] == 0.0
+    assert scaled.stiffness[heads].mean() == pytest.approx(gains.stiffness[heads].mean())
+
+
+def test_a_reference_with_feedback_is_refused_in_a_line() -> None:
+    gains = {f"{leg}.{OUTPUTS[0]}.{FEATURES[0]}": 0.5 for leg in ("stance", "swing")}
+    clip = ClipReference(LAYOUT, read_clip(HUMANOID, "walk"))
+    reference = responding(HUMANOID, clip, clip, gains)
+    parameters = for_controller.PARAMETERS + for_controller.character_parameters(HUMANOID)
+
+    def made(behaviour: str) -> Controller:
+        values = resolve(parameters, {"reference": "clip", "behaviour": behaviour})
+        return for_controller.make_controller(HUMANOID, reference, values)
+
+    made("tracking")
+    made("ragdoll")
+    for behaviour in ("reactive", "active_ragdoll"):
+        with pytest.raises(ConfigurationError, match="feedback") as refused:
+            made(behaviour)
+        assert "\n" not in str(refused.value)
 
 
 def test_gains_by_inertia_keep_their_mean_and_make_all_joints_swing_alike() -> None:

@@ -496,7 +496,7 @@ def test_a_configuration_of_somebody_else_is_refused(
         *said_states(pendulum.plan, pendulum.states),
     ]
 
-    with pytest.raises(MessageError, match="configuration"):
+    with pytest.raises(MessageError, match=r"recording .*bag: .*configuration"):
         read_recording(write_bag(tmp_path / "bag", messages))
 
 

@@ -19,7 +19,7 @@ from experiment.bags.definitions import read_definition
 from experiment.bags.reader import read_messages
 from experiment.bags.recover import recover
 from experiment.bags.writer import BagWriter
-from experiment.figures import read_figures, write_figures
+from experiment.figures import SUMMARY, read_figures, write_figures
 from experiment.listener import RunListener
 from msgs_config.errors import RecordingError
 from tests.bags import add_to, make_run
@@ -226,7 +226,66 @@ def test_an_sqlite_log_that_was_never_merged_is_read(tmp_path: Path) -> None:
     assert texts(tmp_path / "bag") == SAID
 
 
+def test_a_file_that_was_being_compressed_is_read_once(tmp_path: Path) -> None:
+    bag = killed(tmp_path)
+    (bag / "bag.mcap.zstd").write_bytes(b"begun")
+
+    recovered = recover(bag)
+
+    assert texts(bag) == SAID and recovered.contents.lost == []
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_topics_without_messages_are_kept(tmp_path: Path, storage: str) -> None:
+    writer = BagWriter(tmp_path / "alive" / "bag", storage=storage)
+    for topic in ("/a", "/silent"):
+        writer.add_topic(topic, String, QOS)
+    writer.write("/a", SAID[1].cdr, 1)
+    writer.flush()
+    shutil.copytree(tmp_path / "alive" / "bag", tmp_path / "bag")
+    writer.close()
+
+    recover(tmp_path / "bag")
+
+    assert list(read_messages(tmp_path / "bag", ["/silent"])) == []
+    assert len(list(read_messages(tmp_path / "bag", ["/a"]))) == 1
+
+
 # What is left alone
+
+
+def test_files_of_several_recordings_are_not_mixed(tmp_path: Path) -> None:
+    bag = killed(tmp_path)
+    shutil.copy(bag / "bag.mcap", bag / "other.mcap")
+
+    with pytest.raises(RecordingError, match=r"\(bag.mcap, other.mcap\) are not those of one rec"):
+        recover(bag)
+
+    (bag / "other.mcap").rename(bag / "bag_1.mcap")
+    assert recover(bag).contents.counts == {"/a": 40, "/b": 20}
+
+
+def test_a_bag_that_another_recorder_writes_is_left_to_it(tmp_path: Path) -> None:
+    """One that makes no claim, as ROS' own."""
+    bag = killed(tmp_path)
+    program = (
+        f"import time; file = open({str(bag / 'bag.mcap')!r}, 'ab'); print('open', flush=True)"
+    )
+    child = Process(["-c", f"{program}; time.sleep(60)"], tmp_path / "child")
+    try:
+        wait_until(lambda: "open" in child.stdout, "the file to be open")
+        with pytest.raises(
+            RecordingError, match=r"process \d+ is still writing to .*; end it first"
+        ):
+            recover(bag)
+        child.send(signal.SIGKILL)
+        child.wait()
+    finally:
+        child.end()
+
+    with (bag / "bag.mcap").open("rb"):  # who reads does no harm
+        recover(bag)
+    assert texts(bag) == SAID
 
 
 def snapshot(bag: Path) -> dict[str, tuple[int, bytes]]:
@@ -362,6 +421,17 @@ def test_each_of_several_characters_gets_figures_of_its_own(tmp_path: Path) -> N
     assert recovered.measured == [tmp_path / "run" / "left", tmp_path / "run" / "right"]
     ticks = [read_figures(directory)[0]["ticks"] for directory in recovered.measured]
     assert ticks == [60, 120]
+
+
+def test_figures_of_the_whole_run_are_kept(tmp_path: Path) -> None:
+    """A recorder whose disk is full measures on."""
+    run = run_directory(tmp_path)
+    (run / SUMMARY).write_text("of the whole run")
+
+    recovered = recover(run)
+
+    assert (recovered.measured, recovered.kept) == ([], [run])
+    assert (run / SUMMARY).read_text() == "of the whole run"
 
 
 def test_a_complete_bag_without_figures_gets_them(tmp_path: Path) -> None:

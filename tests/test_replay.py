@@ -6,7 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bags import CONFIGURATION, Made, add_to, make_run, said_configuration, write_bag
+from bags import (
+    CONFIGURATION,
+    Made,
+    add_to,
+    make_run,
+    said_configuration,
+    said_states,
+    write_bag,
+)
 from rclpy.serialization import serialize_message
 from rewriting import flipped
 from std_msgs.msg import String
@@ -22,7 +30,9 @@ from experiment.bags.writer import BagWriter
 from experiment.metrics import StateHash
 from experiment.replay.commands import check_commands
 from experiment.replay.comparison import Difference, differing, unit_of
+from experiment.replay.player_script import read_world
 from experiment.replay.replay import replay, tick_count
+from experiment.replay.world import common_rows, left_out
 from msgs_config import configuration
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import RecordingError
@@ -321,6 +331,16 @@ def test_in_real_time_a_command_is_held_until_it_is_too_old(
     assert other is not None and (other.tick, other.name) == (7, "hinge")
 
 
+def test_commands_that_never_acted_cannot_be_checked(walk: Recording) -> None:
+    assert difference_of(commanding(walk, TICKS, walk.effort[0])) is None  # for the last state
+    assert difference_of(commanding(walk, TICKS - 1, walk.effort[0])) is not None
+    late = np.vstack((np.zeros((1, walk.layout.size)), walk.effort[:-1]))
+    delayed = given(replace(walk, effort=late), command_delay_ticks=1)
+    assert difference_of(delayed) is None
+    assert difference_of(commanding(delayed, TICKS - 1, walk.effort[0])) is None
+    assert difference_of(commanding(delayed, TICKS - 2, walk.effort[0])) is not None
+
+
 # Worlds
 
 
@@ -346,6 +366,52 @@ def test_a_world_that_was_not_recorded_whole_cannot_be_built(tmp_path: Path) -> 
     assert recording.world == RecordedWorld("lab", "a", ("a", "b"))
     with pytest.raises(RecordingError, match="lacks b, in whose world a was"):
         replay([recording])
+
+
+def two_of_one_world(path: Path, left: slice, right: slice) -> Path:
+    """A bag of two pendulums that are said to be in one world, with some of their states."""
+    with BagWriter(path) as bag:
+        for name, rows in (("left", left), ("right", right)):
+            made = make_run("pendulum", 0.1)
+            said = said_configuration(made.plan, name, ("left", "right"))
+            add_to(bag, [said, *said_states(made.plan, made.states[rows])], name)
+    return path
+
+
+def test_a_state_more_of_one_character_is_left_out(tmp_path: Path) -> None:
+    bag = two_of_one_world(tmp_path / "bag", slice(0, 24), slice(0, 25))
+
+    assert common_rows(read_recordings(bag)) == ([0, 0], 24)
+    together, notes = read_world(bag)
+    assert [len(each.stamps_ns) for each in together] == [24, 24] and notes == []
+
+
+def test_a_character_that_ends_before_the_others_is_an_error(tmp_path: Path) -> None:
+    bag = two_of_one_world(tmp_path / "bag", slice(0, 23), slice(0, 25))
+
+    message = "of left ends at tick 23, that of right, in the same world, at tick 25"
+    with pytest.raises(RecordingError, match=message):
+        replay(read_recordings(bag))
+    with pytest.raises(RecordingError, match=message):
+        read_world(bag)
+
+
+def test_states_before_the_first_common_episode_are_told(pendulum: Recording) -> None:
+    effort = pendulum.effort.copy()
+    effort[9] = np.nan  # a reset
+    early, rows = replace(pendulum, name="early", effort=effort), slice(10, None)
+    late = replace(
+        pendulum,
+        name="late",
+        stamps_ns=pendulum.stamps_ns[rows],
+        effort=effort[rows],
+    )
+
+    begins, count = common_rows([early, late])
+
+    assert (begins, count) == ([10, 0], len(pendulum.stamps_ns) - 10)
+    (note,) = left_out([early, late], begins)
+    assert note.startswith("the first 10 states of early were left out")
 
 
 SLOPE = (

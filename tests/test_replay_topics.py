@@ -1,7 +1,9 @@
 """`replay --through-topics`: real nodes, and a bag in the place of one of them."""
 
+import json
 import os
 import re
+import shutil
 import signal
 import uuid
 from collections.abc import Callable, Iterator
@@ -16,9 +18,10 @@ import yaml
 from physics import DATA, character
 from rclpy.context import Context
 from ros import Client, Processes, SimulatorClient, wait_until, wrench_message
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from experiment.bags.reader import read_messages
+from experiment.bags.reader import RecordedMessage, read_messages
 from experiment.bags.recording import (
     CommandArrays,
     ControllerSettings,
@@ -27,14 +30,19 @@ from experiment.bags.recording import (
 )
 from experiment.bags.writer import BagWriter
 from experiment.cli import main
-from experiment.figures import read_figures
+from experiment.figures import SUMMARY, read_figures
 from experiment.replay.player import Watch
 from experiment.replay.player_files import write_character
-from experiment.replay.player_findings import CommandFindings, compare_commands
+from experiment.replay.player_findings import (
+    CommandFindings,
+    commanded,
+    compare_commands,
+    merged,
+)
 from experiment.replay.player_results import FoundStates, compare_found
 from experiment.replay.player_script import make_scripts
 from experiment.replay.player_steering import first_parameters, parameter_changes
-from experiment.replay.player_stream import read_stream
+from experiment.replay.player_stream import STEERING, read_stream
 from experiment.replay.through_topics import replay_commands, replay_states
 from msgs_config import topics
 from msgs_config.character_file import CHARACTERS_DIRECTORY, shipped_characters
@@ -92,6 +100,7 @@ def eventful(folder: Path, context: Context) -> Path:
     own.write_text(yaml.safe_dump(content))
     client = SimulatorClient(context)
     trajectories = client.speak(topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE))
+    strengths = client.speak(topics.STRENGTH.of(topics.CONTROLLER_NODE))
     node, simulator_node = topics.CONTROLLER_NODE, topics.SIM_NODE
 
     def push(link: str, *point: float) -> None:
@@ -124,6 +133,7 @@ def eventful(folder: Path, context: Context) -> Path:
         client.spin_until(
             lambda: trajectories.get_subscription_count() == 2, "who hears trajectories"
         )
+        client.spin_until(lambda: strengths.get_subscription_count() == 2, "who hears strengths")
         assert client.pause(True).success
         client.listen(topics.JOINT_STATES)  # is the fourth, without whom nothing begins
         client.spin_until(lambda: client.states.messages, "the first state")
@@ -131,6 +141,7 @@ def eventful(folder: Path, context: Context) -> Path:
         push("chest", 0.01, 0.02, -0.03)
         push("right_knee")
         change(gains__chest__p=700.0)
+        strengths.publish(a_strength("left_knee", 0.3))
         step(25)
         change(law="zero", gain_scale__p=0.8)
         trajectories.publish(a_step("left_elbow", 0.5))
@@ -141,6 +152,7 @@ def eventful(folder: Path, context: Context) -> Path:
         step(30)
         push("chest")
         trajectories.publish(a_step("right_elbow", 0.7))
+        strengths.publish(a_strength("chest", 0.5))
         change(law="stable_pd", gains__chest__p=900.0)
         assert client.pause(False).success
         assert simulator.wait() == 0
@@ -153,6 +165,11 @@ def a_step(dof: str, position: float) -> JointTrajectory:
     point = JointTrajectoryPoint(positions=[position])
     point.time_from_start.nanosec = 10**8
     return JointTrajectory(joint_names=[dof], points=[point])
+
+
+def a_strength(joint: str, share: float) -> JointState:
+    """Of a joint, from the next answered state on."""
+    return JointState(name=[joint], effort=[share])
 
 
 @pytest.fixture(scope="module")
@@ -315,6 +332,51 @@ def test_one_bit_of_one_command_is_found_with_its_tick_and_joint(
     assert 0.0 < abs(result.difference.apart) < 1e-12
 
 
+def renamed(pair: Path, target: Path, keep: Callable[[RecordedMessage], bool]) -> Path:
+    """A copy of two characters' run, below a namespace, with some of its messages."""
+    shutil.copytree(pair, target, ignore=shutil.ignore_patterns("bag"))
+    with BagWriter(target / "bag") as bag:
+        known = set[str]()
+        for message in filter(keep, read_messages(pair / "bag")):
+            own = message.topic.startswith(("/left/", "/right/"))
+            name = f"/lab{message.topic}" if own else message.topic
+            if name not in known:
+                known.add(name)
+                last = name.rpartition("/")[2]
+                topic = next(t for t in all_topics() if t.name.rpartition("/")[2] == last)
+                bag.add_topic(name, topic.message_type, topic.qos)
+            bag.write(name, message.raw, message.log_time_ns)
+    return target
+
+
+def test_a_state_more_of_one_character_is_no_difference_from_its_summary(
+    pair: Path, tmp_path: Path
+) -> None:
+    last_ns, decoder = read_recording(pair, "left").stamps_ns[-1], JointStateDecoder()
+
+    def keep(message: RecordedMessage) -> bool:
+        is_state = message.topic == "/left/joint_states"
+        return not (is_state and decoder.decode(message.raw).stamp_ns == last_ns)
+
+    run = renamed(pair, tmp_path / "run", keep)
+    (run / "left" / SUMMARY).unlink()  # of all its states
+
+    assert main(["replay", str(run)]) == 0
+
+
+def test_the_summaries_are_found_below_any_namespace(
+    pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = renamed(pair, tmp_path / "run", lambda message: True)
+    assert main(["replay", str(run)]) == 0
+    summary = json.loads((run / "right" / SUMMARY).read_text())
+    (run / "right" / SUMMARY).write_text(json.dumps({**summary, "state_hash": "another"}))
+
+    assert main(["replay", str(run)]) == 1
+
+    assert "in summary.json it is another" in capsys.readouterr().err
+
+
 # The bag in the simulator's place
 
 
@@ -332,7 +394,9 @@ def test_changed_gains_laws_and_trajectories_come_again(eventful: Path) -> None:
     recording = read_recording(eventful)
     changes = parameter_changes(recording)
     assert sum(map(len, changes.values())) == 5
-    assert len(read_stream(eventful, recording).trajectories) == 2
+    stream = read_stream(eventful, recording)
+    assert stream.steered == {topic.name for topic in STEERING}
+    assert sum(map(len, stream.steering.values())) == 4
 
     findings = by_states(eventful)
 
@@ -380,6 +444,25 @@ def test_a_controller_that_drives_less_is_told(walk: Path) -> None:
 
     assert not findings.identical and not findings.within(1e9)
     assert findings.lacking == tuple(f"root_{entry}" for entry in ("x", "y", "z", "rx", "ry", "rz"))
+
+
+def test_where_only_the_sign_of_zero_differs_the_largest_difference_is_that(walk: Path) -> None:
+    recording = read_recording(walk)
+    entry, rest = 7, recording.layout.dof_names[6:]  # nothing commands the root
+    sent = [
+        tuple(CommandArrays(rest, merged(recording.layout, each)[6:], 0) for each in [commands])
+        for commands in recording.commands
+    ]
+    sent[5][0].efforts[entry - 6] = 0.0
+    recording = replace(recording, commands=tuple(sent))
+    received = commanded(recording)
+    received[5, entry] = -0.0
+
+    findings = compare_commands(recording, received)
+
+    assert not findings.identical and findings.within(0.0)
+    assert findings.largest is not None and findings.largest == findings.first
+    assert findings.largest.dof_name == recording.layout.dof_names[entry]
 
 
 # A bag that begins in the middle of an episode
@@ -451,7 +534,7 @@ WRONG_OPTIONS: dict[str, tuple[list[str], str]] = {
     ),
     "no such character": (
         ["--through-topics", "simulator", "--character", "left"],
-        "unknown character 'left'",
+        "do not name 'left'",
     ),
 }
 

@@ -1,14 +1,20 @@
 """Where a floating base stands, which way it faces, and on which side it lies."""
 
+import math
+
 import numpy as np
 
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError
+from msgs_config.joint_layout import Configuration
 
 _UP = np.array((0.0, 0.0, 1.0))
 _FORWARD = np.array((1.0, 0.0, 0.0))
+_FALLEN_TILT = math.radians(60.0)  # from the target's upright
+_FALLEN_HEIGHT = 0.5  # of the target's root
+_FALLEN_DROP = 0.2  # of the rest pose's height, below the target's root: what lies cannot fall
 
 
 class Posture:
@@ -21,6 +27,7 @@ class Posture:
                 f"character '{character.name}' has a fixed base; a behaviour other than tracking "
                 "and ragdoll needs one that floats"
             )
+        self._drop = _FALLEN_DROP * (character.rest_position[2] - character.placement.z)
         rest = rotations.exp(np.array(character.rest_position[3:6]))
         # in the character's own world, which its placement may have turned
         self._upright = rotations.multiply(rotations.about_z(-character.placement.yaw), rest)
@@ -38,6 +45,13 @@ class Posture:
             rotations.rotate(self._from_upright(q), _UP) for q in (root_xyzw, reference_xyzw)
         )
         return float(np.arccos(np.clip(np.einsum("i,i->", up, wanted), -1.0, 1.0)))
+
+    def has_fallen(self, body: Configuration, target: Configuration) -> bool:
+        """Whether the root of a body is far below a target's, or far from as upright."""
+        height, wanted = float(body.position[2]), float(target.position[2])
+        if height < _FALLEN_HEIGHT * wanted and wanted - height > self._drop:
+            return True
+        return self.tilt(body.orientations_xyzw[0], target.orientations_xyzw[0]) > _FALLEN_TILT
 
     def faces_up(self, root_xyzw: FloatArray) -> bool:
         """Whether its front points up rather than down."""

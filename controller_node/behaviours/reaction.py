@@ -7,7 +7,6 @@ Source: Zordan, Majkowska, Chiu and Fast 2005, "Dynamic Response for Motion Capt
 What the control law tracks is continuous throughout: at each change it goes on as it moves.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -30,8 +29,6 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 
-_FALLEN_TILT = math.radians(60.0)  # from the target's upright
-_FALLEN_HEIGHT = 0.5  # of the target's root
 _SEVERE = 2.0 / 3.0  # of the threshold above which it goes limp: the full reaction
 _ONTO = 0.6  # of the blend's duration, until the motion that was found is reached
 _FIRM_AGAIN = 0.2  # s, in which the joints are as firm as before a hit
@@ -352,8 +349,5 @@ class Reaction:
         return self._kit.posture.faces_up(self._body(seen).configuration.orientations_xyzw[0])
 
     def _has_fallen(self, seen: Observation) -> bool:
-        """Whether the root is far below the target's, or far from as upright."""
         target = self._way.target(seen.time, seen.now).configuration
-        low = seen.position[2] < _FALLEN_HEIGHT * target.position[2]
-        turn = self._body(seen).configuration.orientations_xyzw[0]
-        return bool(low) or self._kit.posture.tilt(turn, target.orientations_xyzw[0]) > _FALLEN_TILT
+        return self._kit.posture.has_fallen(self._body(seen).configuration, target)

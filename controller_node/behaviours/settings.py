@@ -86,7 +86,7 @@ class ReactionSettings:
 
 
 def check_terrain(behaviour: str, terrain: object) -> None:
-    """Raise ConfigurationError if a behaviour cannot tell a hit from what a simulator's ground does.
+    """Raise ConfigurationError if a behaviour cannot tell hits from what a ground does.
 
     It knows the plane at z = 0 alone. `terrain` is the simulator's parameter, None if unknown.
     """

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -31,3 +32,33 @@ class Claim:
         if descriptor is not None:
             with suppress(OSError):
                 os.close(descriptor)
+
+
+def writer_of(files: Collection[Path]) -> int | None:
+    """The number of a process that has one of some files open to write, None if there is none.
+
+    What other users' processes have open is seen by the superuser alone.
+    """
+    wanted = {(status.st_dev, status.st_ino) for status in map(os.stat, files)}
+    return next((number for number in _processes() if _writes(number, wanted)), None)
+
+
+def _processes() -> Iterator[int]:
+    return (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdecimal())
+
+
+def _writes(process: int, wanted: Collection[tuple[int, int]]) -> bool:
+    with suppress(OSError):  # it has ended, or is another user's
+        for descriptor in Path(f"/proc/{process}/fd").iterdir():
+            with suppress(OSError):  # it was closed meanwhile
+                status = descriptor.stat()
+                if (status.st_dev, status.st_ino) in wanted and _is_writable(descriptor):
+                    return True
+    return False
+
+
+def _is_writable(descriptor: Path) -> bool:
+    """Whether an entry of /proc/PID/fd was opened to write; see proc(5)."""
+    lines = (descriptor.parents[1] / "fdinfo" / descriptor.name).read_text().splitlines()
+    flags = next(int(line.split()[1], 8) for line in lines if line.startswith("flags:"))
+    return flags & os.O_ACCMODE != os.O_RDONLY

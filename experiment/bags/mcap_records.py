@@ -82,6 +82,10 @@ class McapRecords:
                 yield from self._record(kind, body, whole=len(body) == length)
         self.fraction = 1.0
 
+    def channels(self) -> list[Channel]:
+        """The topics that were announced, as far as the file was read."""
+        return list(self._channels.values())
+
     def _read_summary(self, file: BinaryIO, size: int) -> None:
         """Take topics from a completed file's end, where they are told again."""
         if size < len(_MAGIC) + _TAIL.size:

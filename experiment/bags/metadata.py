@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from experiment.bags.storage import SUFFIXES, ZSTD, reason
+from experiment.figures import BAG
 from msgs_config.errors import RecordingError, one_of
 
 METADATA = "metadata.yaml"
@@ -68,11 +69,17 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
     return BagMetadata(files, names, mode)
 
 
+def recover_hint(bag: Path, does: str) -> str:
+    """A sentence on the command `recover`, of the run that a bag lies in, if it does."""
+    run = bag.parent if bag.name == BAG else bag
+    return f"'actuated_characters recover {run}' {does}"
+
+
 def _missing(bag: Path) -> str:
     """Why there is no metadata file, and what would help."""
     if not bag.is_dir():
         return "there is no such directory"
     suffixes = set(SUFFIXES.values())
     if any(file.suffix in suffixes for file in bag.iterdir()):  # as a killed recorder leaves it
-        return f"it has no {METADATA}; 'actuated_characters recover {bag}' makes one"
+        return f"it has no {METADATA}; {recover_hint(bag, 'makes one')}"
     return f"it has no {METADATA}"

@@ -3,7 +3,7 @@
 import heapq
 import shutil
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
 from functools import cache
 from importlib import import_module
@@ -17,8 +17,8 @@ from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # the one
 from rosbags.rosbag2.storage_mcap import McapReader
 
 from experiment.bags.mcap_records import McapRecords
-from experiment.bags.metadata import CDR, FILE, MESSAGE, BagMetadata, read_metadata
-from experiment.bags.storage import SQLITE3, SUFFIXES, check_sqlite_path, reason
+from experiment.bags.metadata import CDR, FILE, MESSAGE, BagMetadata, read_metadata, recover_hint
+from experiment.bags.storage import SQLITE3, SUFFIXES, ZSTD_MAGIC, check_sqlite_path, reason
 from msgs_config.errors import RecordingError, one_of
 
 _ZSTD_SUFFIX = ".zstd"
@@ -66,7 +66,14 @@ def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator
         except RecordingError:
             raise
         except Exception as error:  # of a damaged file rosbags and its libraries raise anything
-            raise RecordingError(f"cannot read recording {path}: {reason(error)}") from error
+            raise RecordingError(
+                f"cannot read recording {path}: {reason(error)}{_hint(path)}"
+            ) from error
+
+
+def _hint(path: Path) -> str:
+    """What may help with a bag that cannot be read; of a file alone it would not."""
+    return "" if path.is_file() else f"; {recover_hint(path, 'keeps what is whole of it')}"
 
 
 def _messages(
@@ -75,7 +82,9 @@ def _messages(
     metadata = BagMetadata((path,), (), "") if path.is_file() else read_metadata(path)
     readers = [_open(path, file, metadata, stack) for file in metadata.files]
     _check_topics(topics, readers, metadata)
-    unpack = zstd.decompress if metadata.compression_mode == MESSAGE else bytes
+    unpack: Callable[[bytes], bytes] = _unpacked if path.is_file() else bytes
+    if metadata.compression_mode == MESSAGE:
+        unpack = zstd.decompress
     streams = [_in_order(reader, topics) for reader in readers]
     if len(streams) == 1:
         merged = streams[0]
@@ -99,7 +108,7 @@ def _open(path: Path, file: Path, metadata: BagMetadata, stack: ExitStack) -> Re
             if journal.is_file() and journal.stat().st_size > 0:  # what rosbags would not look at
                 raise RecordingError(
                     f"cannot read recording {path}: {file.name} was never closed, a journal lies "
-                    f"beside it; 'actuated_characters recover {path}' makes it whole"
+                    f"beside it; {recover_hint(path, 'makes it whole')}"
                 )
     reader: Reader = stack.enter_context(Reader(file))
     for connection in reader.connections:
@@ -111,6 +120,12 @@ def _open(path: Path, file: Path, metadata: BagMetadata, stack: ExitStack) -> Re
                 f"{extension.serialization_format}, not as {CDR}"
             )
     return reader
+
+
+def _unpacked(raw: bytes) -> bytes:
+    """A message of a file without metadata, which would say whether each is compressed."""
+    unpacked: bytes = zstd.decompress(raw) if raw.startswith(ZSTD_MAGIC) else raw
+    return unpacked
 
 
 def _decompressed(file: Path, directory: Path) -> Path:

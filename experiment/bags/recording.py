@@ -25,7 +25,7 @@ from experiment.figures import BAG
 from msgs_config import topics
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character
-from msgs_config.errors import RecordingError, one_of
+from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.joint_layout import JointLayout
 from msgs_config.throw import Throw
 from msgs_config.throw_messages import BallStates
@@ -129,6 +129,10 @@ def read_recording(path: Path, character: str | None = None) -> Recording:
             )
         return recordings[0]
     if character not in names:
+        if names == [""]:
+            raise RecordingError(
+                f"recording {path} has one character, which has no name; do not name '{character}'"
+            )
         raise RecordingError(f"recording {path}: {one_of('character', character, names)}")
     return recordings[names.index(character)]
 
@@ -191,9 +195,9 @@ def _named(bag: Path, namespace: str) -> Iterator[None]:
     """Say of which recording an error is."""
     try:
         yield
-    except RecordingError as error:
+    except ActuatedCharactersError as error:
         where = f"{bag}, '{namespace}'" if namespace else f"{bag}"
-        raise RecordingError(f"recording {where}: {error}") from error
+        raise type(error)(f"recording {where}: {error}") from error
 
 
 def _read(bag: Path) -> tuple[list[Track], dict[str, WorldTrack]]:
@@ -209,13 +213,13 @@ def _read(bag: Path) -> tuple[list[Track], dict[str, WorldTrack]]:
         if place is None:
             continue
         track, name = place
-        if isinstance(track, WorldTrack):
-            track.take(name, message.raw)
-            continue
         try:
-            track.take(name, message.raw, message.log_time_ns)
-        except RecordingError:
-            with _named(bag, track.namespace):
+            if isinstance(track, WorldTrack):
+                track.take(name, message.raw)
+            else:
+                track.take(name, message.raw, message.log_time_ns)
+        except ActuatedCharactersError:
+            with _named(bag, "" if isinstance(track, WorldTrack) else track.namespace):
                 raise
     return list(tracks.values()), worlds
 

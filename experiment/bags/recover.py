@@ -1,18 +1,23 @@
 """Makes a complete recording of what a killed recorder, a full disk or a broken copy has left."""
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from experiment.bags.claim import Claim
+from std_msgs.msg import String
+
+from experiment.bags.claim import Claim, writer_of
 from experiment.bags.metadata import METADATA
 from experiment.bags.reader import read_messages
-from experiment.bags.rewriting import Contents, Progress, rewrite
+from experiment.bags.rewriting import Contents, Progress, rewrite, storage_files
 from experiment.bags.storage import reason
-from experiment.figures import BAG, SUMMARY, write_figures
+from experiment.figures import BAG, SUMMARY, figures_directory, write_figures
 from experiment.listener import CONFIGURATION, HEARD, RunListener
 from msgs_config import topics
+from msgs_config.configuration import parse_world
 from msgs_config.errors import ActuatedCharactersError, RecordingError
+from msgs_config.messages import decode
 
 _DAMAGED, _SCRATCH, _COPIES = ".damaged", ".recovering", ".copies"
 _REPORT_PERIOD = 1000  # messages
@@ -26,6 +31,7 @@ class Recovered:
     contents: Contents
     damaged: Path | None  # the original; None where the bag was complete and nothing was done
     measured: list[Path] = field(default_factory=list)  # directories with figures made anew
+    kept: list[Path] = field(default_factory=list)  # with the recorder's own, of the whole run
     unmeasured: str = ""  # why there are none, in a run's directory
 
 
@@ -33,8 +39,8 @@ def recover(path: Path, progress: Progress | None = None) -> Recovered:
     """Make a bag complete that is not, in its place; the original stays beside it as `.damaged`.
 
     Every message that is whole is kept, with its type's definition and its publishers' quality of
-    service. A run's directory gets its figures anew. A bag that is complete is not touched. Being
-    killed itself does no harm: the next call goes on.
+    service. A run's directory gets the figures that it lacks. A bag that is complete is not
+    touched. Being killed itself does no harm: the next call goes on.
 
     Args:
         path: A run's directory, or a bag: the directory that its files lie in.
@@ -58,7 +64,7 @@ def _recover(path: Path, report: Progress) -> Recovered:
         bag = bag.resolve()
     _finish_swap(bag)
     recovered = _recover_bag(bag, report)
-    if is_run and (recovered.damaged is not None or not (path / SUMMARY).exists()):
+    if is_run:
         _measure(path, recovered, report)
     return recovered
 
@@ -75,6 +81,7 @@ def _recover_bag(bag: Path, report: Progress) -> Recovered:
         raise RecordingError(f"{damaged} is in the way: what an earlier recovery kept; move it")
     claim = _claim(bag)
     try:
+        _check_unwritten(bag)
         shutil.rmtree(scratch, ignore_errors=True)  # of a recovery that was killed
         copies = scratch / (bag.name + _COPIES)
         copies.mkdir(parents=True)
@@ -93,6 +100,13 @@ def _claim(bag: Path) -> Claim:
         return Claim(bag)
     except BlockingIOError as error:
         raise RecordingError(f"a recorder is still at work on {bag}; end it first") from error
+
+
+def _check_unwritten(bag: Path) -> None:
+    """Refuse what another recorder writes, which makes no claim."""
+    writer = writer_of(storage_files(bag))
+    if writer is not None:
+        raise RecordingError(f"process {writer} is still writing to {bag}; end it first")
 
 
 def _scratch(bag: Path) -> Path:
@@ -120,22 +134,41 @@ def _whole_contents(bag: Path, report: Progress) -> Contents | None:
 
 
 def _measure(directory: Path, recovered: Recovered, report: Progress) -> None:
-    """Make the figures of each character in a bag, as its recorder would have made them."""
+    """Make the figures of each character in a bag, as its recorder would have made them.
+
+    Those that are there stay: a recorder whose disk is full measures on, to the run's end.
+    """
     suffix = f"/{CONFIGURATION}"
     namespaces = [
         name.removesuffix(suffix) for name in recovered.contents.counts if name.endswith(suffix)
     ]
     try:
-        listeners = {each: RunListener(f"{each}/{topics.SIM_NODE}"[1:]) for each in namespaces}
-        _listen(recovered, listeners, report)
+        places = _places(directory, recovered.bag, namespaces)
+        made = {each: place for each, place in places.items() if not (place / SUMMARY).exists()}
+        if recovered.damaged is not None:
+            recovered.kept = [place for each, place in places.items() if each not in made]
+        listeners = {each: RunListener(f"{each}/{topics.SIM_NODE}"[1:]) for each in made}
+        if listeners:
+            _listen(recovered, listeners, report)
         for namespace, listener in listeners.items():
-            own = directory / Path(namespace).name if len(namespaces) > 1 else directory
-            write_figures(own, *listener.results())
-            recovered.measured.append(own)
-        if not namespaces:
+            write_figures(made[namespace], *listener.results())
+            recovered.measured.append(made[namespace])
+        if not namespaces and not (directory / SUMMARY).exists():
             recovered.unmeasured = f"it has no '{CONFIGURATION}'"
     except ActuatedCharactersError as error:
         recovered.unmeasured = str(error)
+
+
+def _places(directory: Path, bag: Path, namespaces: Sequence[str]) -> dict[str, Path]:
+    """Where the figures of the characters in some namespaces are."""
+    names = dict.fromkeys(namespaces, "")
+    if len(namespaces) == 1:
+        message = next(read_messages(bag, [f"{namespaces[0]}/{CONFIGURATION}"]))
+        names[namespaces[0]] = parse_world(decode(message.raw, String).data).name
+    return {
+        each: figures_directory(directory, each, is_alone=len(namespaces) == 1 and not name)
+        for each, name in names.items()
+    }
 
 
 def _listen(recovered: Recovered, listeners: dict[str, RunListener], report: Progress) -> None:

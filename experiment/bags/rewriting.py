@@ -14,6 +14,7 @@ from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # the one
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from experiment.bags.definitions import MessageDefinition, read_definition
+from experiment.bags.metadata import METADATA
 from experiment.bags.salvage import McapSalvage, Salvage, SqliteSalvage, StoredMessage, StoredTopic
 from experiment.bags.storage import NONE, SQLITE3, SUFFIXES, ZSTD, BagFiles, reason
 from experiment.bags.writer import LATEST_NS
@@ -26,6 +27,7 @@ _ZSTD_SUFFIX = ".zstd"
 _JOURNALS = ("-journal", "-wal")  # of SQLite, beside its file: what is not, or not yet, in it
 _UNKNOWN_HASH = "INVALID"  # as ROS 2 calls it
 _REPORT_PERIOD = 1000  # messages
+_MOST_NAMED = 3  # files in an error
 
 
 @dataclass
@@ -54,9 +56,10 @@ def rewrite(damaged: Path, new: Path, scratch: Path, report: Progress) -> Conten
     Raises:
         RecordingError: there is nothing that can be read, or the new bag cannot be written.
     """
-    files = _storage_files(damaged)
+    files = storage_files(damaged)
     contents = Contents()
-    messages = _salvaged(files, scratch, contents, report)
+    announced: list[StoredTopic] = []
+    messages = _salvaged(files, scratch, contents, announced, report)
     first = next(messages, None)
     if first is None:
         lost = f" (unreadable: {'; '.join(contents.lost)})" if contents.lost else ""
@@ -67,6 +70,8 @@ def rewrite(damaged: Path, new: Path, scratch: Path, report: Progress) -> Conten
         _keep(first, bag, connections, contents)
         for message in messages:
             _keep(message, bag, connections, contents)
+        for topic in announced:  # without messages, but a reader may ask for it
+            _connect(topic, bag, connections)
     finally:
         bag.close()
     return contents
@@ -78,19 +83,26 @@ def _keep(
     connections: dict[tuple[str, str], Connection],
     contents: Contents,
 ) -> None:
-    topic = message.topic
+    connection = _connect(message.topic, bag, connections)
+    bag.write(connection, message.raw, message.log_time_ns)
+    contents.add(message.topic.name, message.log_time_ns)
+
+
+def _connect(
+    topic: StoredTopic, bag: BagFiles, connections: dict[tuple[str, str], Connection]
+) -> Connection:
+    """The topic in the new bag, announced there if it was not yet."""
     key = (topic.name, topic.type_name)
     if key not in connections:
         connections[key] = bag.add(topic.name, _definition(topic), _offered(topic))
-    bag.write(connections[key], message.raw, message.log_time_ns)
-    contents.add(topic.name, message.log_time_ns)
+    return connections[key]
 
 
-def _storage_files(bag: Path) -> list[Path]:
+def storage_files(bag: Path) -> list[Path]:
     """The files of a bag in the order in which they were written: `_2` comes before `_10`.
 
     Raises:
-        RecordingError: there are none, or of different storages.
+        RecordingError: there are none, or of different storages or recordings.
     """
     present = {file for file in bag.iterdir() if _storage_of(file)}
     copies = {file.with_name(file.name + _ZSTD_SUFFIX) for file in present}
@@ -100,9 +112,27 @@ def _storage_files(bag: Path) -> list[Path]:
         raise RecordingError(f"nothing to recover in {bag}: it has no {names} file")
     if len({_storage_of(file) for file in found}) > 1:
         raise RecordingError(f"cannot recover {bag}: it has files of different storages")
-    return sorted(
+    files = sorted(
         found, key=lambda file: [int(number) for number in re.findall("[0-9]+", file.name)]
     )
+    if not (bag / METADATA).is_file():
+        _check_names(bag, files)
+    return files
+
+
+def _check_names(bag: Path, files: list[Path]) -> None:
+    """Refuse files that no recorder has given one name: NAME_0, NAME_1 and so on.
+
+    Raises:
+        RecordingError: they are of several recordings.
+    """
+    stems = [file.name.removesuffix(_ZSTD_SUFFIX).rpartition(".")[0] for file in files]
+    if len(stems) > 1 and len({re.sub("_[0-9]+$", "", stem) for stem in stems}) > 1:
+        names = ", ".join(file.name for file in files[:_MOST_NAMED])
+        raise RecordingError(
+            f"cannot recover {bag}: its files ({names}{', ...' * (len(files) > _MOST_NAMED)}) are "
+            "not those of one recording, NAME_0, NAME_1 and so on; give each a directory of its own"
+        )
 
 
 def _storage_of(file: Path) -> str:
@@ -112,9 +142,13 @@ def _storage_of(file: Path) -> str:
 
 
 def _salvaged(
-    files: list[Path], scratch: Path, contents: Contents, report: Progress
+    files: list[Path],
+    scratch: Path,
+    contents: Contents,
+    announced: list[StoredTopic],
+    report: Progress,
 ) -> Iterator[StoredMessage]:
-    """The messages of all files, one after the other."""
+    """The messages of all files, one after the other; what was announced is added."""
     for number, file in enumerate(files):
         salvage = _open(file, scratch, contents)
         try:
@@ -127,6 +161,7 @@ def _salvaged(
                     contents.lost.append(f"{file.name}: a message of an impossible time")
         except RecordingError as error:  # another file may be sound
             contents.lost.append(str(error))
+        announced += salvage.topics
         if salvage.damage:
             contents.lost.append(f"{file.name}: {salvage.damage}")
 

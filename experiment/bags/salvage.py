@@ -10,10 +10,8 @@ from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # the one
 
 from experiment.bags.mcap_records import Channel, McapRecords
 from experiment.bags.metadata import CDR
-from experiment.bags.storage import reason
+from experiment.bags.storage import ZSTD_MAGIC, reason
 from msgs_config.errors import RecordingError
-
-_ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # no message begins so: CDR begins with a zero
 
 
 class StoredTopic(NamedTuple):
@@ -40,6 +38,11 @@ class Salvage(Protocol):
 
     def messages(self) -> Iterator[StoredMessage]:
         """What can be read, in the file's order."""
+        ...
+
+    @property
+    def topics(self) -> list[StoredTopic]:
+        """What the file announces, as far as it was read: with messages or without."""
         ...
 
     @property
@@ -78,6 +81,11 @@ class McapSalvage:
             yield StoredMessage(topics[channel], log_time_ns, raw, was_compressed)
 
     @property
+    def topics(self) -> list[StoredTopic]:
+        """What the file announces."""
+        return [_topic_of(each) for each in self._records.channels() if each.serialization == CDR]
+
+    @property
     def damage(self) -> str:
         """What could not be read."""
         return _damage((self._records.unreadable_bytes, "bytes"), (self._lost_messages, "messages"))
@@ -110,6 +118,7 @@ class SqliteSalvage:
         self._file = file
         self._lost_rows = 0
         self._end = ""  # why it was reached too early
+        self.topics: list[StoredTopic] = []
         self.fraction = 0.0
 
     @property
@@ -128,6 +137,7 @@ class SqliteSalvage:
                 connection.text_factory = lambda text: text.decode(errors="replace")
                 connection.execute("PRAGMA writable_schema=ON")  # else a cut file is refused whole
                 topics = self._topics(connection)
+                self.topics = list(topics.values())
                 yield from self._rows(connection, topics)
         except (sqlite3.Error, ValueError) as error:
             raise RecordingError(f"{self._file.name} cannot be read: {reason(error)}") from error
@@ -169,7 +179,7 @@ class SqliteSalvage:
 
 def _unpacked(packed: bytes) -> bytes | None:
     """A message as it was serialised, also where rosbag2 compressed each; None if it is damaged."""
-    if not packed.startswith(_ZSTD_MAGIC):
+    if not packed.startswith(ZSTD_MAGIC):
         return packed
     try:
         raw: bytes = zstd.decompress(packed)

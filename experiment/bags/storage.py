@@ -24,6 +24,7 @@ from msgs_config.errors import ConfigurationError, RecordingError, one_of
 MCAP, SQLITE3 = "mcap", "sqlite3"
 NONE, ZSTD = "none", "zstd"
 STORAGES, COMPRESSIONS = (MCAP, SQLITE3), (NONE, ZSTD)
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # no message begins so: CDR begins with a zero
 SUFFIXES = {MCAP: ".mcap", SQLITE3: ".db3"}
 
 _PLUGINS = {MCAP: StoragePlugin.MCAP, SQLITE3: StoragePlugin.SQLITE3}

@@ -26,7 +26,7 @@ def add_recover(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
             "Make a complete bag of all that reached the disk before a recorder was killed, the "
             "disk was full, or a copy broke off: at most the last second of a run is missing. The "
             "new bag takes the old one's place, which is kept beside it as BAG.damaged. In a run's "
-            "directory the figures are made anew. A bag that is complete is not touched."
+            "directory the figures that it lacks are made. A bag that is complete is not touched."
         ),
         epilog="example: actuated_characters recover runs/demo",
     )
@@ -65,6 +65,8 @@ def _tell(recovered: "Recovered") -> None:
         print(f"the damaged bag: {recovered.damaged}")
     for directory in recovered.measured:
         print(f"figures: {directory}")
+    for directory in recovered.kept:
+        print(f"figures: {directory}, as they were: of the whole run, the bag is a part of it")
     if recovered.unmeasured:
         print(f"no figures: {recovered.unmeasured}")
 

@@ -38,8 +38,9 @@ def add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--tolerance",
         type=float,
         metavar="X",
-        help="let positions and velocities differ by so much (rad, m, rad/s, m/s): for a bag from "
-        "another machine, whose last bits may be other ones",
+        help="let positions and velocities differ by so much (rad, m, rad/s, m/s; with "
+        "--through-topics simulator commands, N m or N): for a bag from another machine, whose "
+        "last bits may be other ones",
     )
     add_through_topics(parser)
 
@@ -95,16 +96,26 @@ def _verdict(
 
 
 def _check_summaries(bag: Path, recordings: "Sequence[Recording]", result: "ReplayResult") -> None:
-    """Compare the hashes with those that the recorder has written beside the bag, if it has."""
-    for recording in recordings:
-        below = recording.name if len(recordings) > 1 else ""
-        written = _written_hash(bag / below)
-        found = result.state_hashes[recording.name]
-        if written is not None and written != found and not recording.skipped_states:
-            raise ReplayError(
-                f"{bag}: all states of the bag came again, but they are not those of the run: "
-                f"their hash is {found}, and in summary.json it is {written}"
-            )
+    """Compare the hashes with those that the recorder has written beside the bag, if it has.
+
+    They are of all that was heard: what was not replayed whole cannot be compared with them.
+    """
+    from experiment.figures import figures_directory
+    from experiment.replay.world import common_rows, worlds
+
+    for together in worlds(recordings):
+        rows, count = common_rows(together)
+        for recording, row in zip(together, rows, strict=True):
+            if row or count < len(recording.stamps_ns) or recording.skipped_states:
+                continue
+            is_alone = len(recordings) == 1 and not recording.world.name
+            written = _written_hash(figures_directory(bag, recording.name, is_alone=is_alone))
+            found = result.state_hashes[recording.name]
+            if written not in (None, found):
+                raise ReplayError(
+                    f"{bag}: all states of the bag came again, but they are not those of the run: "
+                    f"their hash is {found}, and in summary.json it is {written}"
+                )
 
 
 def _written_hash(directory: Path) -> str | None:

@@ -2,7 +2,8 @@
 
 What was applied is a pure function of what was commanded (clipped, delayed, held), so the two tell
 the same thing twice, and a bit that is wrong in either one shows, even where the engine's rounding
-would hide it. What a limit has cut away of a command has left no trace, and does not show.
+would hide it. What never acted has left no trace, and does not show: what a limit has cut away of
+a command, and the commands for an episode's last states, after which no tick came.
 """
 
 from collections.abc import Iterator, Sequence

@@ -47,7 +47,7 @@ class CommandPlayer(Node):
         values = resolve(PARAMETERS, given_parameters(self))
         declare(self, PARAMETERS, values)
         self._file = Path(values.text("states"))
-        world = read_world(Path(values.text("recording")), values.integer("world"))
+        world, _ = read_world(Path(values.text("recording")), values.integer("world"))
         self._resetting = self.create_client(Trigger, f"{topics.SIM_NODE}/reset")
         self._thrower = _Thrower(self, world[0])
         self._parts = [_Part(self, *each) for each in zip(world, make_scripts(world), strict=True)]

@@ -16,7 +16,13 @@ from experiment.bags.recording import CommandArrays, read_recording
 from experiment.replay.player import PATIENCE, Ticks, Watch
 from experiment.replay.player_findings import commanded, merged
 from experiment.replay.player_steering import parameter_changes
-from experiment.replay.player_stream import AROUND, RecordedTick, read_stream, read_ticks
+from experiment.replay.player_stream import (
+    AROUND,
+    STEERING,
+    RecordedTick,
+    read_stream,
+    read_ticks,
+)
 from msgs_config import topics
 from msgs_config.arrays import BoolArray
 from msgs_config.errors import MessageError, RecordingError, RunError
@@ -31,7 +37,11 @@ PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
     Parameter("character", "", "whose states, where there are several"),
     Parameter("commands", "commands.npz", "where the commands go that answer them"),
-    Parameter("steers", True, "send the parameters and trajectories that the controller got then"),
+    Parameter(
+        "steers",
+        True,
+        "send what steered the controller then: parameters, trajectories and strengths",
+    ),
     Parameter(
         "fixed", [], "parameters of controller_node that are not changed as they were", texts=True
     ),
@@ -39,7 +49,7 @@ PARAMETERS = [
 ]
 
 _REPUBLISH_PERIOD = 0.5  # s, as the simulator's
-_ACKNOWLEDGED = Duration(seconds=10)  # until the controller has a trajectory
+_ACKNOWLEDGED = Duration(seconds=10)  # until the controller has a trajectory or strengths
 
 
 class StatePlayer(Node):
@@ -72,14 +82,17 @@ class StatePlayer(Node):
         self._open_topics()
 
     def _open_topics(self) -> None:
-        controller = topics.CONTROLLER_NODE
         self._configuration = topics.create_publisher(self, topics.CONFIGURATION)
         self._episode = topics.create_publisher(self, topics.EPISODE)
         self._clock_topic = topics.create_publisher(self, topics.CLOCK)
         self._around = {topic.name: topics.create_publisher(self, topic) for topic in AROUND}
-        self._trajectory = topics.create_publisher(self, topics.JOINT_TRAJECTORY.of(controller))
+        self._steering = {
+            topic.name: topics.create_publisher(self, topic)
+            for topic in STEERING
+            if self._steers and topic.name in self._stream.steered
+        }
         self._setting = self.create_client(
-            SetParametersAtomically, f"{controller}/set_parameters_atomically"
+            SetParametersAtomically, f"{topics.CONTROLLER_NODE}/set_parameters_atomically"
         )
         self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
         self._state = topics.create_publisher(self, topics.JOINT_STATES)
@@ -113,9 +126,7 @@ class StatePlayer(Node):
 
     def _is_heard(self) -> bool:
         """Whether there is a controller, and all that it is sent will reach it."""
-        publishers = [self._state]
-        if self._steers and self._stream.trajectories:
-            publishers.append(self._trajectory)
+        publishers = [self._state, *self._steering.values()]
         if self._changes and not self._setting.service_is_ready():
             return False
         answers = self.count_publishers(topics.JOINT_TORQUES.name)
@@ -128,7 +139,7 @@ class StatePlayer(Node):
         if self._runs_on and not wanted.any() and not begins:
             return  # the controller never saw it: it took the newest one
         if self._steers:
-            self._send_trajectories(row)
+            self._send_steering(row)
         stamp_ns = int(self._recording.stamps_ns[row])
         if begins:
             self._episode.publish(self._stream.episodes[row])
@@ -189,11 +200,12 @@ class StatePlayer(Node):
                 return CommandArrays(command.names, command.effort, 0)
         return None
 
-    def _send_trajectories(self, row: int) -> None:
-        for trajectory in self._stream.trajectories.get(row, ()):
-            self._trajectory.publish(trajectory)
-            if not self._trajectory.wait_for_all_acked(_ACKNOWLEDGED):
-                raise RunError("controller_node did not acknowledge a trajectory")
+    def _send_steering(self, row: int) -> None:
+        for name, message in self._stream.steering.get(row, ()):
+            publisher = self._steering[name]
+            publisher.publish(message)
+            if not publisher.wait_for_all_acked(_ACKNOWLEDGED):
+                raise RunError(f"controller_node did not acknowledge a message on '{name}'")
 
     def _set(self, change: dict[str, Any]) -> None:
         """Change parameters of the controller, as they were changed then."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from experiment.bags.recording import CommandArrays, Recording, read_recordings
-from experiment.replay.world import common_rows, worlds
+from experiment.replay.world import common_rows, left_out, worlds
 from msgs_config.errors import CommandError, LayoutError, RecordingError
 from msgs_config.wrench_messages import WrenchArrays
 from sim_node.lockstep import LockstepBarrier, Verdict
@@ -30,15 +30,18 @@ class Script:
         return len(self.commands)
 
 
-def read_world(path: Path, number: int = 0) -> list[Recording]:
+def read_world(path: Path, number: int = 0) -> tuple[list[Recording], list[str]]:
     """The recordings of one of a bag's worlds, cut to the states that all of them have.
+
+    With notes on what was left out.
 
     Raises:
         ActuatedCharactersError: the bag cannot be read, or its worlds are not whole.
     """
     together = worlds(read_recordings(path))[number]
     rows, count = common_rows(together)
-    return [_cut(each, slice(row, row + count)) for each, row in zip(together, rows, strict=True)]
+    cut = [_cut(each, slice(row, row + count)) for each, row in zip(together, rows, strict=True)]
+    return cut, left_out(together, rows)
 
 
 def _cut(recording: Recording, rows: slice) -> Recording:

@@ -4,8 +4,10 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
@@ -21,10 +23,17 @@ AROUND = (topics.CONTACTS, topics.APPLIED_WRENCH, topics.ODOM)
 """What the simulator publishes of a tick before its state, for who listens."""
 
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
-_SENT = topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE)
-_TAKEN = topics.ACTIVE_TRAJECTORY.of(topics.CONTROLLER_NODE)
+STEERING = tuple(
+    topic.of(topics.CONTROLLER_NODE) for topic in (topics.JOINT_TRAJECTORY, topics.STRENGTH)
+)
+"""What a controller is told while it works."""
 
-_Trajectory = tuple[int, JointTrajectory]
+_TAKEN = tuple(  # what it says of each that it took
+    topic.of(topics.CONTROLLER_NODE) for topic in (topics.ACTIVE_TRAJECTORY, topics.ACTIVE_STRENGTH)
+)
+
+Steering: TypeAlias = "JointTrajectory | JointState"
+_Published: TypeAlias = tuple[int, Steering]
 """When it was published, ns of wall time, and the message."""
 
 
@@ -34,7 +43,12 @@ class Stream:
 
     configuration: bytes = b""  # the simulator's, before all states
     episodes: dict[int, bytes] = field(default_factory=dict)
-    trajectories: dict[int, list[JointTrajectory]] = field(default_factory=dict)
+    steering: dict[int, list[tuple[str, Steering]]] = field(default_factory=dict)  # topic, message
+
+    @property
+    def steered(self) -> set[str]:
+        """The names of the topics of `STEERING` that there is anything for."""
+        return {name for messages in self.steering.values() for name, _ in messages}
 
 
 @dataclass
@@ -78,32 +92,34 @@ def _raw_stamp_ns(raw: bytes) -> int:
 def read_stream(path: Path, recording: Recording) -> Stream:
     """Read what goes with a recording's states.
 
-    The trajectories are those that its controller took, each with the stamp that it began at; of
-    an older bag, which does not say it, those that were sent.
+    The trajectories and strengths are those that its controller took, each with the stamp that it
+    began at; of an older bag, which does not say it, those that were sent.
 
     Raises:
         RecordingError: the bag cannot be read.
     """
-    stream, taken, sent = Stream(), list[_Trajectory](), list[_Trajectory]()
-    kept = {_name(recording, _SENT): sent, _name(recording, _TAKEN): taken}
+    stream, kept = Stream(), dict[str, list[_Published]]()
+    types = {_name(recording, topic): topic.message_type for topic in (*STEERING, *_TAKEN)}
     for message in read_messages(find_bag(path)):
         if message.topic == _name(recording, _CONFIGURATION):
             stream.configuration = message.raw
         elif message.topic == _name(recording, topics.EPISODE):
             row = int(np.searchsorted(recording.stamps_ns, _stamp_ns(message.decode())))
             stream.episodes[row] = message.raw
-        elif message.topic in kept:
-            trajectory = decode(message.raw, JointTrajectory)
-            kept[message.topic].append((message.log_time_ns, trajectory))
-    for published_ns, trajectory in taken or sent:
-        before = _row(recording, published_ns, _stamp_ns(trajectory.header))
-        if before is not None:
-            stream.trajectories.setdefault(before, []).append(trajectory)
+        elif message.topic in types:
+            content = decode(message.raw, types[message.topic])
+            kept.setdefault(message.topic, []).append((message.log_time_ns, content))
+    for sent, taken in zip(STEERING, _TAKEN, strict=True):
+        told = kept.get(_name(recording, taken)) or kept.get(_name(recording, sent), [])
+        for published_ns, content in told:
+            before = _row(recording, published_ns, _stamp_ns(content.header))
+            if before is not None:
+                stream.steering.setdefault(before, []).append((sent.name, content))
     return stream
 
 
 def _row(recording: Recording, published_ns: int, start_ns: int) -> int | None:
-    """The state before whose answer a trajectory came; None if there is none.
+    """The state before whose answer a message came; None if there is none.
 
     The controller published what it took before that answer, but two topics of a bag that another
     recorder has written may be out of order: it came before it began, too.

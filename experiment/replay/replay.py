@@ -16,7 +16,7 @@ from experiment.replay.comparison import (
 )
 from experiment.replay.completeness import check_pushes, check_throws, first_uncommanded
 from experiment.replay.tolerance import compare_within
-from experiment.replay.world import common_rows, make_simulation, pushes_of, worlds
+from experiment.replay.world import common_rows, left_out, make_simulation, pushes_of, worlds
 from msgs_config.arrays import IntArray
 from msgs_config.errors import SimulationError
 from msgs_config.stamped import StampedState
@@ -110,7 +110,8 @@ class _WorldReplay:
     def run(self, progress: Progress, done: int) -> ReplayResult:
         """Replay all ticks, or until something differs; `done` is what was done before."""
         ticks = len(self._stamps_ns) - 1
-        notes = [
+        notes = left_out(self._together, [part.first for part in self._parts])
+        notes += [
             note
             for part in self._parts
             for note in check_pushes(part.recording, range(part.first, part.first + ticks))

@@ -57,7 +57,7 @@ def replay_commands(
         RecordingError: the bag cannot be read, or its world not be built anew.
         RunError: a process failed, and not because of what differed.
     """
-    together = read_world(path, world)
+    together, notes = read_world(path, world)
     scripts = make_scripts(together)
     applies = scripts[0].applies
     failure: RunError | None = None
@@ -73,7 +73,7 @@ def replay_commands(
         except RunError as error:
             failure = error
         found = _found_states(player, file, len(together))
-    notes = [_APPLIED] if applies else []
+    notes += [_APPLIED] if applies else []
     result = compare_found(together, found, tolerance, notes) if found else None
     if failure is not None and (result is None or result.identical):
         raise failure

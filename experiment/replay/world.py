@@ -11,6 +11,7 @@ from msgs_config.arrays import IntArray
 from msgs_config.character import Character
 from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.parameters import Values, resolve
+from msgs_config.shared_parameters import RATE
 from msgs_config.tick_clock import TickClock
 from msgs_config.wrench_messages import WrenchArrays
 from sim_node.actor import Role
@@ -19,6 +20,7 @@ from sim_node.pushes import Push
 from sim_node.simulation import Simulation, SimulationSettings
 
 _GROUNDS = ("plane", "none")
+_MOST_BEHIND = 1  # states by which a recorder that is stopped may have more of one than of another
 
 
 def worlds(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
@@ -119,7 +121,8 @@ def common_rows(together: Sequence[Recording]) -> tuple[list[int], int]:
     have one state more of one than of another.
 
     Raises:
-        RecordingError: there is no episode whose first state all have, or the resets differ.
+        RecordingError: there is no episode whose first state all have, the resets differ, or one
+            of them ends before the others.
     """
     begins = [set(_begin_stamps(recording).tolist()) for recording in together]
     common = set.intersection(*begins)
@@ -127,13 +130,34 @@ def common_rows(together: Sequence[Recording]) -> tuple[list[int], int]:
         raise RecordingError("the characters of one world have no episode in common")
     first_ns = min(common)
     rows = [int(np.searchsorted(recording.stamps_ns, first_ns)) for recording in together]
-    pairs = list(zip(together, rows, strict=True))
-    count = min(len(recording.stamps_ns) - row for recording, row in pairs)
+    counts = [len(each.stamps_ns) - row for each, row in zip(together, rows, strict=True)]
+    count = min(counts)
+    if max(counts) - count > _MOST_BEHIND:
+        short, whole = together[counts.index(count)], together[counts.index(max(counts))]
+        raise RecordingError(
+            f"the recording of {short.name} ends at {_last_tick(short)}, that of {whole.name}, in "
+            f"the same world, at {_last_tick(whole)}: they cannot be simulated together"
+        )
     last_ns = int(together[0].stamps_ns[rows[0] + count - 1])
     resets = [{stamp for stamp in each if first_ns <= stamp <= last_ns} for each in begins]
     if any(each != resets[0] for each in resets):
         raise RecordingError("the characters of one world were reset at different ticks")
     return rows, count
+
+
+def _last_tick(recording: Recording) -> str:
+    last_ns = int(recording.stamps_ns[-1])
+    return f"tick {TickClock(int(recording.parameters[RATE.name])).tick(last_ns)}"
+
+
+def left_out(together: Sequence[Recording], rows: Sequence[int]) -> list[str]:
+    """Notes on the first states of characters that begin later; see `common_rows`."""
+    return [
+        f"the first {row} states of {recording.name} were left out: the others of its world have "
+        "no episode that begins so early"
+        for recording, row in zip(together, rows, strict=True)
+        if row
+    ]
 
 
 def _begin_stamps(recording: Recording) -> IntArray:

@@ -1,0 +1,39 @@
+"""The search for a motion to go on with: how long it takes over the whole library of the humanoid.
+
+A reaction does it in one tick, which is 4 ms at 240 Hz; in lockstep the simulator waits.
+"""
+
+import time
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from controller_node.behaviours.library import MotionLibrary
+from controller_node.references.clip import ClipReference
+from controller_node.references.clip_file import read_clip
+from msgs_config.character_loading import load_character
+
+_STATES = 30  # of a walk, each looked for once
+_LASTING = 0.5  # s, the default of `blend.duration`
+
+
+def measure_search(console: Console) -> None:
+    """Measure and print the table."""
+    console.print("search of the library: humanoid ...")
+    humanoid = load_character("humanoid")
+    library = MotionLibrary(humanoid, [], _LASTING)
+    walk = ClipReference(humanoid.layout, read_clip(humanoid, "walk"))
+    durations = []
+    for number in range(_STATES):
+        state = walk.sample(number / _STATES)
+        started = time.perf_counter()
+        library.nearest(library.predicted(state.configuration.position, state.velocity))
+        durations.append(1e3 * (time.perf_counter() - started))
+    table = Table(title="one search of the whole library (ms)", title_justify="left")
+    for column in ("moments", "the first", "median", "longest of the others"):
+        table.add_column(column, justify="right")
+    first, others = durations[0], durations[1:]
+    numbers = (first, float(np.median(others)), max(others))
+    table.add_row(str(len(library)), *(f"{number:.1f}" for number in numbers))
+    console.print(table)
