@@ -113,7 +113,8 @@ def storage_files(bag: Path) -> list[Path]:
     if len({_storage_of(file) for file in found}) > 1:
         raise RecordingError(f"cannot recover {bag}: it has files of different storages")
     files = sorted(
-        found, key=lambda file: [int(number) for number in re.findall("[0-9]+", file.name)]
+        found,
+        key=lambda file: ([int(number) for number in re.findall("[0-9]+", file.name)], file.name),
     )
     if not (bag / METADATA).is_file():
         _check_names(bag, files)
