@@ -312,7 +312,7 @@ def test_a_mistake_is_one_line(
         (["--video", "--fps", "0"], "0 frames a second"),
         (["--video", "--workers", "0"], "0 processes; it must be 1 or more"),
         (["--video", "--contacts"], "no contacts to mark"),
-        (["--character", "left"], "unknown character 'left'"),
+        (["--character", "left"], "do not name 'left'"),
     ],
 )
 def test_what_does_not_go_together_is_one_line(
