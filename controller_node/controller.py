@@ -35,6 +35,16 @@ class Settings:
     strengths: FloatArray | None = None  # (b,) shares of the gains that count; None: all of them
 
 
+@dataclass(frozen=True)
+class _Drive:
+    """How firmly it is driven, as long as nothing changes."""
+
+    said: FloatArray  # (b,) the strengths that messages say
+    gains: GainArrays  # weakened by all strengths
+    strengths: FloatArray  # (b,) all of them
+    assisted: bool  # whether the gains drive a floating base
+
+
 def check_reference(reference: Reference, behaviour: BehaviourChoice) -> None:
     """Raise ConfigurationError if a behaviour cannot follow a reference."""
     if behaviour.needs_contacts and isinstance(reference, RespondingReference):
@@ -86,6 +96,7 @@ class Controller:
         self._law: Law = make_law(settings.law, self._plant)
         self.check(settings)
         self._settings = settings
+        self._drive: _Drive | None = None
         self._next: tuple[float, ReferenceState] | None = None
         self._behaviour = self._choice.make()
         self._strengths = StrengthSchedule(self.layout)
@@ -109,6 +120,7 @@ class Controller:
         if settings.law != self._settings.law:
             self._law = make_law(settings.law, self._plant)
         self._settings = settings
+        self._drive = None
 
     def check(self, settings: Settings) -> None:
         """Raise ConfigurationError if settings cannot be taken."""
@@ -212,7 +224,7 @@ class Controller:
         self._next = next_time, upcoming
         if contacts is None and self.needs_contacts:
             raise ConfigurationError("the behaviour needs the contacts of each state's tick")
-        gains, strengths = self._gains_at(state.stamp_ns)
+        drive = self._drive_at(state.stamp_ns)
         directive = self._behaviour.advance(
             Observation(
                 time=time,
@@ -222,10 +234,10 @@ class Controller:
                 contacts=self._no_contacts if contacts is None else contacts,
                 now=now,
                 upcoming=upcoming,
-                gains=gains,
+                gains=drive.gains,
                 whole_gains=self._settings.gains,
-                strengths=strengths,
-                assisted=self._is_assisted(gains),
+                strengths=drive.strengths,
+                assisted=drive.assisted,
             )
         )
         self._report(directive.phase, state.stamp_ns)
@@ -243,19 +255,19 @@ class Controller:
             state.stamp_ns, desired.configuration.position, desired.velocity
         )
 
-    def _gains_at(self, stamp_ns: int) -> tuple[GainArrays, FloatArray]:
-        """The gains in force at a stamp, and the strengths (b,) that they have been weakened by."""
-        gains, strengths = self._settings.gains, self._strengths.at(stamp_ns)
-        own = self._settings.strengths
-        if own is None:
-            return weakened(self.layout, gains, strengths), strengths
-        both = weakened(self.layout, weakened(self.layout, gains, own), strengths)
-        return both, own * strengths
-
-    def _is_assisted(self, gains: GainArrays) -> bool:
-        """Whether gains drive a floating base."""
-        driven = gains.stiffness[:6].any() or gains.damping[:6].any()
-        return self.layout.has_floating_base and bool(driven)
+    def _drive_at(self, stamp_ns: int) -> _Drive:
+        """What drives it at a stamp: worked out anew where the settings or the strengths change."""
+        said = self._strengths.at(stamp_ns)
+        if self._drive is None or self._drive.said is not said:
+            gains, own = self._settings.gains, self._settings.strengths
+            strengths = said if own is None else own * said
+            if own is not None:
+                gains = weakened(self.layout, gains, own)
+            gains = weakened(self.layout, gains, said)
+            root = gains.stiffness[:6].any() or gains.damping[:6].any()
+            assisted = self.layout.has_floating_base and bool(root)
+            self._drive = _Drive(said, gains, strengths, assisted)
+        return self._drive
 
     def _report(self, phase: Phase, stamp_ns: int) -> None:
         """Keep since which state a phase lasts."""

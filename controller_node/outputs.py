@@ -1,11 +1,9 @@
 """What the controller publishes."""
 
 import json
-import time
 from dataclasses import dataclass
 
 import numpy as np
-from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -80,10 +78,7 @@ class Outputs:
 
     def flush(self, seconds: float) -> None:
         """Wait until every subscriber has what was published, at the most `seconds`."""
-        deadline = time.monotonic() + seconds
-        for publisher in (self._torques, self._references, self._wrenches):
-            left = max(deadline - time.monotonic(), 0.0)
-            publisher.wait_for_all_acked(Duration(seconds=left))
+        topics.flush((self._torques, self._references, self._wrenches), seconds)
 
     def publish_configuration(self, text: str) -> None:
         """Publish what the controller is and has in force, as JSON."""

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.duration import Duration
 from rclpy.node import Node
 
-from msgs_config.topics import DIAGNOSTICS, create_publisher
+from msgs_config.topics import DIAGNOSTICS, create_publisher, flush
 
 DIAGNOSTICS_PERIOD = 1.0  # s of wall time
 
@@ -43,4 +42,4 @@ class DiagnosticsPublisher:
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has the last report, at most `seconds`; whether it has."""
-        return bool(self._publisher.wait_for_all_acked(Duration(seconds=max(seconds, 0.0))))
+        return flush([self._publisher], seconds)

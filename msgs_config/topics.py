@@ -1,10 +1,13 @@
 """Names, message types and quality of service of every topic."""
 
+import time
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -87,6 +90,15 @@ def create_publisher(node: Node, topic: Topic) -> Publisher:
         topic.qos,
         # each default callback is one thing more that the executor looks at in each turn
         event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+    )
+
+
+def flush(publishers: Iterable[Publisher], seconds: float) -> bool:
+    """Wait until every subscriber has all that was published, at the most `seconds`; whether so."""
+    deadline = time.monotonic() + seconds
+    return all(
+        publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+        for publisher in publishers
     )
 
 

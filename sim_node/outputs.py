@@ -1,9 +1,6 @@
 """What the simulator publishes of one character, tick by tick."""
 
-import time
-
 from builtin_interfaces.msg import Time
-from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import Header, String
@@ -107,13 +104,8 @@ class Outputs:
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has the last tick, at the most `seconds`; whether it has."""
-        deadline = time.monotonic() + seconds
-        publishers = (self._states, self._contacts, self._wrenches, *self._display.publishers)
-        waits = (max(deadline - time.monotonic(), 0.0) for _ in publishers)
-        return all(
-            publisher.wait_for_all_acked(Duration(seconds=wait))
-            for publisher, wait in zip(publishers, waits, strict=True)
-        )
+        own = (self._states, self._contacts, self._wrenches)
+        return topics.flush((*own, *self._display.publishers), seconds)
 
     def _applied(self, stamp_ns: int) -> WrenchArrays:
         return WrenchArrays.of_rows(

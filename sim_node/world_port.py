@@ -1,6 +1,5 @@
 """What concerns a world and none of its characters: balls that are thrown into it."""
 
-from rclpy.duration import Duration
 from rclpy.node import Node
 
 from msgs_config import topics
@@ -57,10 +56,7 @@ class WorldPort:
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has all that was said, at the most `seconds`; whether so."""
-        return all(
-            publisher.wait_for_all_acked(Duration(seconds=seconds))
-            for publisher in (self._applied, self._thrown)
-        )
+        return topics.flush((self._applied, self._thrown), seconds)
 
     def _use(self, raw: bytes, first_tick: FirstTick) -> None:
         stamp_ns, throw = self._codec.decode(raw)

@@ -522,7 +522,7 @@ WRONG_OPTIONS: dict[str, tuple[list[str], str]] = {
     "no start of no use": (["--through-topics", "--no-start"], "--through-topics simulator"),
     "another node's setting": (
         ["--through-topics", "simulator", "--set", "sim_node.rate:=3"],
-        "write it as controller_node.NAME:=VALUE",
+        "unknown node 'sim_node'",
     ),
     "the recording's own": (
         ["--through-topics", "simulator", "--set", "controller_node.rate:=3"],

@@ -6,15 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
-
+from experiment.commands.progress import progress_bar
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # they take a second to import
@@ -130,7 +122,7 @@ def _render_strip(options: argparse.Namespace) -> None:
     recordings = _read(options)
     _check_output(output, ".png")
     count = times if isinstance(times, int) else len(times)
-    with _progress_bar(recordings[0].character.name, count) as bar:
+    with progress_bar(recordings[0].character.name, count, "pictures") as bar:
         picture = strip(
             recordings,
             times,
@@ -164,7 +156,7 @@ def _render_film(options: argparse.Namespace) -> None:
     )
     check_video(settings.size, settings.fps)
     movie = Movie(_read(options), settings)
-    with _progress_bar(output.name, len(movie)) as bar:
+    with progress_bar(output.name, len(movie), "pictures") as bar:
         movie.save(output, lambda done: bar.update(bar.task_ids[0], completed=done))
     print(output)
 
@@ -208,16 +200,3 @@ def _check_output(output: Path, suffix: str) -> None:
         raise ConfigurationError(f"--output {output}: {reason}")
     if not os.access(output if output.exists() else output.absolute().parent, os.W_OK):
         raise ConfigurationError(f"--output {output}: no permission to write there")
-
-
-def _progress_bar(description: str, count: int) -> Progress:
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("pictures"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
-    bar.add_task(description, total=count)
-    return bar

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
+from experiment.commands.progress import progress_bar
 from experiment.commands.replay_topics import add_through_topics, replay_through_topics
+from experiment.commands.replay_verdict import verdict
 from msgs_config.errors import ConfigurationError, ReplayError
 
 if TYPE_CHECKING:  # they take a second to import
@@ -58,7 +57,7 @@ def _replay(options: argparse.Namespace) -> None:
 
     started = time.monotonic()
     recordings = read_recordings(options.bag)
-    with _progress_bar(options.bag.name, tick_count(recordings)) as bar:
+    with progress_bar(options.bag.name, tick_count(recordings), "ticks", transient=True) as bar:
         result = replay(
             recordings,
             tolerance=tolerance,
@@ -70,29 +69,9 @@ def _replay(options: argparse.Namespace) -> None:
         raise ReplayError(f"{options.bag}: {result.difference}")
     if tolerance is None:
         _check_summaries(options.bag, recordings, result)
-    print(_verdict(recordings, result, tolerance, time.monotonic() - started))
-
-
-def _verdict(
-    recordings: "Sequence[Recording]",
-    result: "ReplayResult",
-    tolerance: float | None,
-    wall_time: float,
-) -> str:
-    """What the replay has shown, in one line."""
-    names = (f"{r.name} ({r.character.name})" if r.name else r.character.name for r in recordings)
-    episodes = f"{result.episodes} episode{'s' * (result.episodes != 1)}"
-    head = f"{result.states} states of {' and '.join(names)}, {episodes}"
-    speed = max(float(recording.times[-1]) for recording in recordings) / wall_time
-    tail = f"{speed:.3g} times real time"
-    if tolerance is None:
-        hashes = ", ".join(
-            f"of {name} {digest}" if name else digest
-            for name, digest in result.state_hashes.items()
-        )
-        return f"identical: {head}, state hash {hashes}; {tail}"
-    largest = ", ".join(f"{value:.3g} {unit}" for unit, value in sorted(result.largest.items()))
-    return f"within {tolerance:g}: {head}, largest differences {largest}; {tail}"
+    simulated = max(float(recording.times[-1]) for recording in recordings)
+    speed = simulated / (time.monotonic() - started)
+    print(verdict(recordings, result, tolerance, f"{speed:.3g} times real time"))
 
 
 def _check_summaries(bag: Path, recordings: "Sequence[Recording]", result: "ReplayResult") -> None:
@@ -126,16 +105,3 @@ def _written_hash(directory: Path) -> str | None:
         return str(content["state_hash"])
     except (OSError, ValueError, KeyError, TypeError):  # a bag alone, or of another recorder
         return None
-
-
-def _progress_bar(description: str, count: int) -> Progress:
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("ticks"),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    bar.add_task(description, total=count)
-    return bar

@@ -3,27 +3,27 @@
 import argparse
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import yaml
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
+from experiment.commands.progress import progress_bar
+from experiment.commands.replay_verdict import named, verdict
+from experiment.commands.settings import node_settings
 from msgs_config.errors import ConfigurationError, ReplayError
 
 if TYPE_CHECKING:  # they take a second to import
     from experiment.bags.recording import Recording
-    from experiment.replay.comparison import ReplayResult
     from experiment.replay.player_findings import CommandFindings
     from experiment.replay.player_processes import Progress as Count
     from experiment.replay.player_processes import Tell
 
 _CONTROLLER, _SIMULATOR = "controller", "simulator"
-_SET = "controller_node."
+_NODE = "controller_node"
 
 
 def add_through_topics(parser: argparse.ArgumentParser) -> None:
@@ -94,40 +94,15 @@ def _replay_commands(options: argparse.Namespace) -> None:
             print(f"note: {note}")
         if result.difference is not None:
             raise ReplayError(f"{options.bag}: {result.difference}")
-        print(_verdict(together, result, options.tolerance, time.monotonic() - started))
-
-
-def _verdict(
-    together: "Sequence[Recording]",
-    result: "ReplayResult",
-    tolerance: float | None,
-    wall_time: float,
-) -> str:
-    """What a replay has shown, in one line."""
-    names = " and ".join(_named(recording) for recording in together)
-    episodes = f"{result.episodes} episode{'s' * (result.episodes != 1)}"
-    head = f"{result.states} states of {names}, {episodes}"
-    tail = f"through topics in {wall_time:.1f} s"
-    if tolerance is None:
-        hashes = ", ".join(
-            f"of {name} {digest}" if name else digest
-            for name, digest in result.state_hashes.items()
-        )
-        return f"identical: {head}, state hash {hashes}; {tail}"
-    largest = ", ".join(f"{value:.3g} {unit}" for unit, value in sorted(result.largest.items()))
-    return f"within {tolerance:g}: {head}, largest differences {largest}; {tail}"
-
-
-def _named(recording: "Recording") -> str:
-    character = recording.character.name
-    return f"{recording.name} ({character})" if recording.name else character
+        tail = f"through topics in {time.monotonic() - started:.1f} s"
+        print(verdict(together, result, options.tolerance, tail))
 
 
 def _replay_states(options: argparse.Namespace) -> None:
     from experiment.bags.recording import read_recording, read_recordings
     from experiment.replay.through_topics import replay_states
 
-    settings = _settings(options.set)
+    settings = node_settings(options.set, [_NODE])[_NODE]
     if options.no_start and settings:
         raise ConfigurationError("--set is for the controller that --no-start does not start")
     if options.no_start or options.character is not None:
@@ -151,7 +126,7 @@ def _replay_states(options: argparse.Namespace) -> None:
 
 def _tell(options: argparse.Namespace, recording: "Recording", findings: "CommandFindings") -> None:
     """Print what was found. Raises ReplayError if commands differ that should not."""
-    answers = f"the commands that answer {findings.states} states of {_named(recording)}"
+    answers = f"the commands that answer {findings.states} states of {named(recording)}"
     if findings.identical:
         print(f"identical: {answers}")
         return
@@ -178,34 +153,12 @@ def _table(findings: "CommandFindings") -> Table:
     return table
 
 
-def _settings(texts: Sequence[str]) -> dict[str, object]:
-    """What `--set controller_node.NAME:=VALUE` says; values are YAML."""
-    settings: dict[str, object] = {}
-    for text in texts:
-        name, assigns, value = text.partition(":=")
-        if not (assigns and name.startswith(_SET) and len(name) > len(_SET)):
-            raise ConfigurationError(f"--set {text}: write it as {_SET}NAME:=VALUE")
-        try:
-            settings[name.removeprefix(_SET)] = yaml.safe_load(value)
-        except (yaml.YAMLError, ValueError, RecursionError) as error:
-            raise ConfigurationError(f"--set {text}: the value is not valid YAML") from error
-    return settings
-
-
 @contextmanager
 def _progress_bar(bag: Path, states: int) -> Iterator[tuple["Count", "Tell"]]:
     """A progress bar: what is told how far it is, and what is told what it waits for."""
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("states"),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    task = bar.add_task(bag.name, total=states)
+    bar = progress_bar(bag.name, states, "states", transient=True)
     with bar:
         yield (
-            lambda count: bar.update(task, completed=count),
+            lambda count: bar.update(bar.task_ids[0], completed=count),
             lambda line: bar.console.print(line, markup=False, highlight=False, soft_wrap=True),
         )

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import yaml
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from experiment.commands.progress import progress_bar
+from experiment.commands.settings import node_settings
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -131,7 +131,7 @@ def _run(options: argparse.Namespace) -> None:
     from experiment.figures import plot_figures, prepare_directory
     from experiment.planned_throw import plan_throws
 
-    settings = _settings(options.set)
+    settings = node_settings(options.set, _NODES)
     _set_behaviour(options.behaviour, settings["controller_node"])
     plan = _checked_plan(options, settings["sim_node"], settings["controller_node"])
     pushes = [_push(text, plan) for text in options.push]
@@ -142,7 +142,7 @@ def _run(options: argparse.Namespace) -> None:
     prepare_directory(directory, overwrite=options.overwrite)
     for note in (*plan.notes, *in_the_way):
         print(note)
-    with _progress_bar(f"{plan.character.name}: {motion}", plan.ticks) as bar:
+    with progress_bar(f"{plan.character.name}: {motion}", plan.ticks, "ticks") as bar:
 
         def progress(ticks: int) -> None:
             bar.update(bar.task_ids[0], completed=min(ticks, plan.ticks))
@@ -252,23 +252,6 @@ def _push(text: str, plan: "Plan") -> "PlannedPush":
     return planned_push(plan, found[1], (x, y, z), time)
 
 
-def _settings(texts: Sequence[str]) -> dict[str, dict[str, object]]:
-    """What `--set NODE.NAME:=VALUE` says, by node; values are YAML."""
-    settings: dict[str, dict[str, object]] = {node: {} for node in _NODES}
-    for text in texts:
-        name, assigns, value = text.partition(":=")
-        node, dot, parameter = name.partition(".")
-        if not (assigns and dot and parameter):
-            raise ConfigurationError(f"--set {text}: write it as NODE.NAME:=VALUE")
-        if node not in settings:
-            raise ConfigurationError(f"--set {text}: {one_of('node', node, list(_NODES))}")
-        try:
-            settings[node][parameter] = yaml.safe_load(value)
-        except (yaml.YAMLError, ValueError, RecursionError) as error:
-            raise ConfigurationError(f"--set {text}: the value is not valid YAML") from error
-    return settings
-
-
 def _set_behaviour(behaviour: str | None, controller: dict[str, object]) -> None:
     """Set what `--behaviour` says. Raises ConfigurationError if `--set` says another one."""
     if behaviour is None:
@@ -278,19 +261,6 @@ def _set_behaviour(behaviour: str | None, controller: dict[str, object]) -> None
             f"--behaviour is {behaviour}, and --set controller_node.behaviour is "
             f"{controller['behaviour']}; give one of them"
         )
-
-
-def _progress_bar(description: str, ticks: int) -> Progress:
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.completed:.0f}/{task.total:.0f} ticks"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
-    bar.add_task(description, total=ticks)
-    return bar
 
 
 def _report(directory: Path) -> None:

@@ -1,0 +1,19 @@
+"""The progress bar of the sub-commands that count what they have done."""
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+
+def progress_bar(description: str, total: int, unit: str, *, transient: bool = False) -> Progress:
+    """A bar on standard error with one task, of so many units; a transient one leaves no trace."""
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=transient,
+    )
+    bar.add_task(description, total=total)
+    return bar
