@@ -75,7 +75,7 @@ setup(
         "console_scripts": [
             "sim_node = sim_node.main:main",
             "controller_node = controller_node.main:main",
-            "recorder = experiment.recorder_main:main",
+            "recorder = experiment.recorder.main:main",
             "actuated_characters = experiment.cli:main",
         ],
     },

@@ -17,7 +17,7 @@ from experiment.processes import Child, Children
 from msgs_config import topics
 
 _PATIENCE = 120.0  # s for a whole run
-_MODULES = {topics.RECORDER_NODE: "experiment.recorder_main"}
+_MODULES = {topics.RECORDER_NODE: "experiment.recorder.main"}
 
 
 class Nodes:

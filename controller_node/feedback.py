@@ -54,6 +54,7 @@ class _Wanted:
     swings: tuple[float, float]  # how much each leg swings, the rest of it stands
     cosine: float  # of the root's heading
     sine: float
+    shares: FloatArray  # (2, 2, 1): how much each leg stands; how much it swings
     arm: tuple[float, float]  # of the centre of mass from the foot that stands, m
 
     def ahead_and_left(self, x: float, y: float) -> tuple[float, float]:
@@ -76,11 +77,11 @@ class Feedback:
         self._model = DynamicsModel(character)
         names = [link.name for link in character.links]
         self._feet = np.array([names.index(foot) for foot in character.feet])
-        self._entries = [_leg(character, int(foot)) for foot in self._feet]
+        self._entries = np.array([_leg(character, int(foot)) for foot in self._feet])  # (2, 7)
         matrices = np.stack((gains.stance, gains.swing))
         self._gains = np.concatenate((gains.stance[:, :-1], gains.swing[:, :-1]))
-        self._side_gains = matrices[:, :, -1]
-        self._sides = self._sides_at(np.array(character.rest_position))
+        sides = self._sides_at(np.array(character.rest_position))
+        self._of_sides = np.multiply.outer(sides, matrices[:, :, -1]).swapaxes(0, 1)  # (2, 2, 7)
         self._motion = motion
         self._known = lru_cache(maxsize=_KNOWN_TICKS)(self._of_motion)
 
@@ -105,11 +106,10 @@ class Feedback:
             )
         )
         outputs = rotations.apply(self._gains, features).reshape(2, -1)
+        stance, swing = outputs[:, np.newaxis] + self._of_sides
+        wish = wanted.shares[0] * stance + wanted.shares[1] * swing
         response = np.zeros(self._layout.size)
-        for entries, share, side in zip(self._entries, wanted.swings, self._sides, strict=True):
-            stance, swing = outputs + side * self._side_gains
-            wish = (1.0 - share) * stance + share * swing
-            response[entries] = np.minimum(np.maximum(wish, -_LARGEST), _LARGEST)
+        response[self._entries] = np.minimum(np.maximum(wish, -_LARGEST), _LARGEST)
         return response
 
     def _sides_at(self, position: FloatArray) -> list[float]:
@@ -126,7 +126,9 @@ class Feedback:
         share = min(max(0.5 + 0.5 * lift / _LIFTED, 0.0), 1.0)
         heading = float(rotations.yaw(np.array(balance.root_xyzw)))
         cosine, sine = math.cos(heading), math.sin(heading)
-        plain = _Wanted(balance, (share, 1.0 - share), cosine, sine, (0.0, 0.0))
+        swings = (share, 1.0 - share)
+        shares = np.array(([1.0 - swing for swing in swings], swings))[..., np.newaxis]
+        plain = _Wanted(balance, swings, cosine, sine, shares, (0.0, 0.0))
         arm = plain.ahead_and_left(*_arm(balance, plain.swings))
         return replace(plain, arm=arm)
 

@@ -1,6 +1,7 @@
 """What the controller publishes."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.joint_layout import JointLayout
 from msgs_config.messages import DoublesEncoder, JointStateEncoder, split_stamp
 from msgs_config.stamped import StampedReference, StampedState
+from msgs_config.topics import Outgoing
 from msgs_config.wrench_messages import WORLD
 
 
@@ -66,15 +68,20 @@ class Outputs:
     def publish(self, answer: Answer) -> None:
         """Publish an answer, the torques first: the simulator goes on while the rest is made."""
         self._torques.publish(answer.torques)
+        topics.publish_together(self._beside_torques(answer))
+
+    def _beside_torques(self, answer: Answer) -> Iterator[Outgoing]:
+        """What the simulator does not wait for, if anybody listens."""
         if self._references.get_subscription_count():
             reference = answer.reference
-            self._references.publish(
+            yield (
+                self._references,
                 self._reference_encoder.encode(
                     reference.stamp_ns, reference.position, reference.velocity
-                )
+                ),
             )
         if self._wrenches.get_subscription_count():
-            self._wrenches.publish(self._net_wrench(answer))
+            yield self._wrenches, self._net_wrench(answer)
 
     def flush(self, seconds: float) -> None:
         """Wait until every subscriber has what was published, at the most `seconds`."""

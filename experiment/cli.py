@@ -125,7 +125,7 @@ def _parameters(options: argparse.Namespace) -> None:
 
 def _parameters_of(node: str, character_name: str) -> list[Parameter]:
     from controller_node import parameters as controller
-    from experiment import recorder
+    from experiment.recorder import node as recorder
     from msgs_config.character_loading import load_character
     from sim_node import parameters as simulator
 

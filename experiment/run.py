@@ -59,7 +59,7 @@ def run_over_topics(
             "write_bag": write_bag,
             "progress_period": 0.1,
         }
-        recorder = start("recorder", "experiment.recorder_main", listening)
+        recorder = start("recorder", "experiment.recorder.main", listening)
         # both must be there before the first answer, lest a tick go unrecorded
         both = ("-p", "wait_for_subscribers:=2")
         all_three = ("-p", f"wait_for_subscribers:={3 if pushes or throws else 2}")

@@ -24,6 +24,7 @@ from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 
 CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+_STAMP = 4  # after the encapsulation header
 _NAMES_START = 12  # after the encapsulation header and the stamp
 _MAX_KEPT_SENDERS = 16
 _ENTRY_BYTES = {JointState: (8, 8, 8), MultiDOFJointState: (56, 48, 48)}
@@ -44,6 +45,11 @@ class JointArrays:
 def split_stamp(stamp_ns: int) -> tuple[int, int]:
     """Seconds and nanoseconds of a stamp."""
     return divmod(stamp_ns, NANOSECONDS_PER_SECOND)
+
+
+def with_stamp(raw: bytes, stamp_ns: int) -> bytes:
+    """A serialised little-endian message that begins with a stamp, with another one instead."""
+    return raw[:_STAMP] + struct.pack("<iI", *split_stamp(stamp_ns)) + raw[_NAMES_START:]
 
 
 def padding(length: int, alignment: int) -> int:

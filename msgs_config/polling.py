@@ -78,9 +78,11 @@ def _received(raw: bytes, info: dict[str, int]) -> Received:
 class Spinner:
     """Gives a loop's idle moments to other processes and to the node's executor."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, service_period: float = _SERVICE_PERIOD) -> None:
+        """`service_period` is the time in s between turns of the executor in a busy loop."""
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
+        self._service_period = service_period
         self._busy_until = 0.0
         self._next_service = 0.0
 
@@ -112,7 +114,7 @@ class Spinner:
         """Give the executor its turn if it is due, without waiting for anything."""
         now = time.monotonic()
         if now > self._next_service:
-            self._next_service = now + _SERVICE_PERIOD
+            self._next_service = now + self._service_period
             self.serve_pending()
 
     def serve_pending(self) -> None:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
@@ -17,6 +18,9 @@ from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import Header, String
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
+
+Outgoing: TypeAlias = tuple[Publisher, bytes]
+"""A serialised message and what it is to be published on."""
 
 _DEEP_HISTORY = 5000
 """With a small history a recorder that pauses for a moment loses messages."""
@@ -91,6 +95,16 @@ def create_publisher(node: Node, topic: Topic) -> Publisher:
         # each default callback is one thing more that the executor looks at in each turn
         event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
     )
+
+
+def publish_together(messages: Iterable[Outgoing]) -> None:
+    """Publish serialised messages in a row.
+
+    The first wakes up who sleeps, which takes longer than all else; of messages with work between
+    them each would find its subscribers asleep again.
+    """
+    for publisher, raw in list(messages):  # all are made before the first is published
+        publisher.publish(raw)
 
 
 def flush(publishers: Iterable[Publisher], seconds: float) -> bool:

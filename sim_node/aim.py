@@ -58,7 +58,7 @@ def find_impact(
     with World(WorldSettings(ground=False)) as world:
         body = world.add(character)
         body.set_state(position, np.zeros(character.layout.size))
-        target = body.links.centres()[row]
+        target = np.array(body.links.centres()[row])
         far = target + distance * origin
         x, y, z = far.tolist()
         world.balls.add(Throw(1.0, radius, (x, y, z), (0.0, 0.0, 0.0)))

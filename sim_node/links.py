@@ -97,12 +97,12 @@ class Links:
                     physicsClientId=self._client,
                 )
 
-    def centres(self) -> FloatArray:
-        """Centres of mass (links, 3) in the world, m."""
-        return np.array([state[0] for state in self._states()])
+    def centres(self) -> list[Sequence[float]]:
+        """Centres of mass (links, 3) in the world, m; plain numbers, of which few are used."""
+        return [state[0] for state in self._states()]
 
     def contact_wrenches(
-        self, touched: TouchedLinks, centres: FloatArray
+        self, touched: TouchedLinks, centres: Sequence[Sequence[float]]
     ) -> tuple[FloatArray, BoolArray]:
         """Net contact wrench (links, 6) of what touches, world axes; and which links do.
 
@@ -112,10 +112,9 @@ class Links:
         """
         sums = [[0.0] * 6 for _ in self._numbers]  # plain numbers: of few contacts it is faster
         touching = np.zeros(len(self._numbers), dtype=np.bool_)
-        origins = centres.tolist()
         for number, (fx, fy, fz), (px, py, pz) in touched.get(self._body, ()):
             row = self._row[number]
-            cx, cy, cz = origins[row]
+            cx, cy, cz = centres[row]
             x, y, z = px - cx, py - cy, pz - cz
             total = sums[row]
             total[0] += fx

@@ -1,6 +1,7 @@
 """`sim_node`: the simulation at one end of the topics, with whoever commands it at the other."""
 
 import time
+from collections.abc import Iterator
 
 import numpy as np
 from rclpy.node import Node
@@ -14,6 +15,7 @@ from msgs_config.parameters import Values
 from msgs_config.polling import Spinner
 from msgs_config.process import StopSignal
 from msgs_config.tick_clock import FIRST_TICK
+from msgs_config.topics import Outgoing
 from msgs_config.warnings import Warnings
 from sim_node.back_pressure import BackPressure
 from sim_node.lockstep import LockstepBarrier, Verdict
@@ -192,14 +194,18 @@ class SimNode(Node):
         for port in self._ports:
             port.open()
         self._patience.restart(time.monotonic())
-        self._clock_topic.publish(encode_clock(self._simulation.stamp_ns))
-        self._world_port.publish()
-        for port in self._ports:
-            port.outputs.publish_before()
-        for port in self._ports:
-            port.outputs.publish_state()
+        topics.publish_together(self._messages())
         for port in self._ports:
             port.outputs.publish_display(self._simulation.tick)
+
+    def _messages(self) -> Iterator[Outgoing]:
+        """What is published of a tick before anybody can answer it, the states last."""
+        yield self._clock_topic, encode_clock(self._simulation.stamp_ns)
+        yield from self._world_port.messages()
+        for port in self._ports:
+            yield from port.outputs.before_state()
+        for port in self._ports:
+            yield port.outputs.state()
 
     def _advance(self) -> None:
         simulation = self._simulation

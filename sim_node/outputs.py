@@ -1,17 +1,21 @@
 """What the simulator publishes of one character, tick by tick."""
 
+from collections.abc import Iterator
+
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import Header, String
 
 from msgs_config import topics
-from msgs_config.messages import JointStateEncoder, split_stamp
+from msgs_config.messages import JointStateEncoder, split_stamp, with_stamp
 from msgs_config.robot_description import robot_description
-from msgs_config.topics import Topic
-from msgs_config.wrench_messages import WrenchArrays, encode_wrenches, select
+from msgs_config.topics import Outgoing, Topic
+from msgs_config.wrench_messages import ContactEncoder, WrenchArrays, encode_wrenches
 from sim_node.actor import Actor
 from sim_node.display import Display
+
+_NO_WRENCHES = encode_wrenches(WrenchArrays.of_rows(0, [], [], []))
 
 
 class Outputs:
@@ -24,6 +28,7 @@ class Outputs:
         self._display_ticks = display_ticks
         self._encoder = JointStateEncoder(actor.layout.dof_names)
         self._links = [link.name for link in actor.character.links]
+        self._contact_encoder = ContactEncoder(self._links)
 
         def offer(topic: Topic) -> Publisher:
             return topics.create_publisher(node, topic.under(namespace))
@@ -60,22 +65,21 @@ class Outputs:
         stamp = Time(sec=seconds, nanosec=nanoseconds)
         self._episode.publish(Header(stamp=stamp, frame_id=str(number)))
 
-    def publish_before(self) -> None:
-        """Publish what a controller may wait for beside a tick's state, which comes after it."""
-        actor, stamp_ns = self._actor, self._actor.state.stamp_ns
-        if actor.contacts is not None:
-            self._publish_contacts()
+    def before_state(self) -> Iterator[Outgoing]:
+        """What a controller may wait for beside a tick's state, which comes after it."""
+        if self._actor.contacts is not None and self.wants_contacts:
+            yield self._contacts, self._encode_contacts()
         if self._wrenches.get_subscription_count():
-            self._wrenches.publish(encode_wrenches(self._applied(stamp_ns)))
+            yield self._wrenches, self._encode_applied()
 
-    def publish_state(self) -> None:
-        """Publish the state of a tick."""
+    def state(self) -> Outgoing:
+        """The state of a tick."""
         state = self._actor.state
         effort = () if state.effort is None else (state.effort,)
         self._last_state = self._encoder.encode(
             state.stamp_ns, state.position, state.velocity, *effort
         )
-        self._states.publish(self._last_state)
+        return self._states, self._last_state
 
     def publish_display(self, tick: int) -> None:
         """Publish what shows a tick's state; made while the controller works on that."""
@@ -90,27 +94,32 @@ class Outputs:
         """
         self._display.publish_markers()
         if with_state:
-            self._publish_contacts()
+            if self.wants_contacts:
+                self._contacts.publish(self._encode_contacts())
             self._states.publish(self._last_state)
-
-    def _publish_contacts(self) -> None:
-        """Publish what touched, if anybody listens; nothing if nobody did while it happened."""
-        if self.wants_contacts:
-            contacts, stamp_ns = self._actor.contacts, self._actor.state.stamp_ns
-            touching = WrenchArrays.of_rows(stamp_ns, [], [], [])
-            if contacts is not None:
-                touching = select(stamp_ns, self._links, contacts.wrenches, contacts.touching)
-            self._contacts.publish(encode_wrenches(touching))
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has the last tick, at the most `seconds`; whether it has."""
         own = (self._states, self._contacts, self._wrenches)
         return topics.flush((*own, *self._display.publishers), seconds)
 
-    def _applied(self, stamp_ns: int) -> WrenchArrays:
-        return WrenchArrays.of_rows(
-            stamp_ns,
-            [self._links[push.link] for push in self._actor.pushes],
-            [push.wrench for push in self._actor.pushes],
-            [push.point for push in self._actor.pushes],
+    def _encode_contacts(self) -> bytes:
+        """What touched; nothing if nobody listened while it happened."""
+        contacts, stamp_ns = self._actor.contacts, self._actor.state.stamp_ns
+        if contacts is None:
+            return with_stamp(_NO_WRENCHES, stamp_ns)
+        return self._contact_encoder.encode(stamp_ns, contacts.wrenches, contacts.touching)
+
+    def _encode_applied(self) -> bytes:
+        """What pushed during the tick."""
+        pushes, stamp_ns = self._actor.pushes, self._actor.state.stamp_ns
+        if not pushes:
+            return with_stamp(_NO_WRENCHES, stamp_ns)
+        return encode_wrenches(
+            WrenchArrays.of_rows(
+                stamp_ns,
+                [self._links[push.link] for push in pushes],
+                [push.wrench for push in pushes],
+                [push.point for push in pushes],
+            )
         )

@@ -1,10 +1,13 @@
 """What concerns a world and none of its characters: balls that are thrown into it."""
 
+from collections.abc import Iterator
+
 from rclpy.node import Node
 
 from msgs_config import topics
 from msgs_config.throw import Throw
 from msgs_config.throw_messages import BallStates, ThrowCodec, ball_names, encode_balls
+from msgs_config.topics import Outgoing
 from msgs_config.warnings import Warnings
 from sim_node.inbox import FirstTick, StampedInbox
 from sim_node.simulation import Simulation
@@ -40,19 +43,19 @@ class WorldPort:
         self._schedule.clear()
         self._inbox.forget()
 
-    def publish(self) -> None:
-        """Publish what was thrown in the tick before, and where the balls are, if there are any."""
+    def messages(self) -> Iterator[Outgoing]:
+        """What was thrown in the tick before, and where the balls are, if there are any."""
         simulation = self._simulation
         if not simulation.balls:
             return
         if simulation.stamp_ns != self._told_ns:  # after a pause a tick begins again
             self._told_ns = simulation.stamp_ns
             for throw in simulation.throws:
-                self._applied.publish(self._codec.encode(simulation.stamp_ns, throw))
+                yield self._applied, self._codec.encode(simulation.stamp_ns, throw)
         if self._thrown.get_subscription_count():
             names = ball_names(len(simulation.balls))
             balls = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
-            self._thrown.publish(encode_balls(balls))
+            yield self._thrown, encode_balls(balls)
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has all that was said, at the most `seconds`; whether so."""

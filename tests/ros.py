@@ -48,7 +48,7 @@ DDS_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 MODULES = {
     topics.SIM_NODE: "sim_node.main",
     topics.CONTROLLER_NODE: "controller_node.main",
-    topics.RECORDER_NODE: "experiment.recorder_main",
+    topics.RECORDER_NODE: "experiment.recorder.main",
 }
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 _MIDDLEWARE_SAYS = "sequence size exceeds remaining buffer"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiment.camera_path import followed_path, smoothed
+from experiment.render.camera_path import followed_path, smoothed
 
 
 @given(

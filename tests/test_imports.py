@@ -121,11 +121,11 @@ KNOW_NO_ROS = [
     "experiment.bags.metadata",
     "experiment.bags.salvage",
     "experiment.bags.storage",
-    "experiment.camera_path",
-    "experiment.captions",
     "experiment.equation",
-    "experiment.video",
-    "experiment.loss_count",
+    "experiment.recorder.loss_count",
+    "experiment.render.camera_path",
+    "experiment.render.captions",
+    "experiment.render.video",
     "experiment.report.decimation",
     "experiment.report.page",
     "experiment.report.timing",
@@ -174,7 +174,8 @@ KNOW_NO_ENGINE = [
     "experiment.bags.metadata",
     "experiment.bags.salvage",
     "experiment.bags.storage",
-    "experiment.loss_count",
+    "experiment.recorder.loss_count",
+    "experiment.render.camera_path",
     "experiment.report.decimation",
     "experiment.report.page",
     "experiment.report.timing",
@@ -183,7 +184,6 @@ KNOW_NO_ENGINE = [
     "experiment.studies.tracking",
     "experiment.studies.second_order",
     "experiment.studies.euler",
-    "experiment.camera_path",
 ]
 
 SOURCES = sorted(

@@ -16,7 +16,7 @@ import pytest
 import yaml
 
 from controller_node import parameters as for_controller
-from experiment import recorder as for_recorder
+from experiment.recorder import node as for_recorder
 from msgs_config.character_loading import load_character
 from sim_node import parameters as for_simulator
 

@@ -634,7 +634,7 @@ def test_the_torque_of_a_standing_humanoids_contacts_is_about_each_foots_centre_
     # Assert
     for row in np.flatnonzero(touching):
         (fx, fy, fz), (tx, ty, _) = wrenches[row, :3], wrenches[row, 3:]
-        height = centres[row, 2]
+        height = centres[row][2]
         ahead, aside = (-ty - height * fx) / fz, (tx - height * fy) / fz
         assert abs(ahead) < half_length + 1e-3
         assert abs(aside) < half_width + 1e-3

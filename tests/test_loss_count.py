@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiment.loss_count import LossCount
+from experiment.recorder.loss_count import LossCount
 
 
 def lost(numbers: Iterable[int | None], publishers: int = 1) -> int:

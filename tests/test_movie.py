@@ -12,7 +12,7 @@ from physics import DATA, character
 
 from experiment.bags.recording import RecordedWorld, Recording
 from experiment.bags.tracks import ControllerSettings
-from experiment.movie import (
+from experiment.render.movie import (
     GhostPlace,
     Movie,
     MovieSettings,
@@ -20,7 +20,7 @@ from experiment.movie import (
     caption,
     picture_rows,
 )
-from experiment.scene import make_scene, nearest_rows
+from experiment.render.scene import make_scene, nearest_rows
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character import Character, Placement
 from msgs_config.errors import CharacterError, ConfigurationError, RecordingError, RunError

@@ -21,7 +21,7 @@ from rosbags.highlevel import AnyReader
 from std_msgs.msg import Header
 
 from experiment.bags.reader import read_messages
-from experiment.recorder import RecorderNode
+from experiment.recorder.node import RecorderNode
 from msgs_config import topics
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.tick_clock import TickClock

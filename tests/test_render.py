@@ -14,8 +14,8 @@ from ros import Processes, wait_until
 
 from experiment.bags.recording import Recording, read_recording
 from experiment.cli import main
-from experiment.movie import Movie, MovieSettings
-from experiment.render import pose_strip, render_still, save_png, strip
+from experiment.render.movie import Movie, MovieSettings
+from experiment.render.stills import pose_strip, render_still, save_png, strip
 from msgs_config.arrays import BoolArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from sim_node.camera import Camera, Picture

@@ -526,7 +526,7 @@ def test_no_process_outlives_a_run_that_is_killed(processes: Processes, tmp_path
     [
         ("sim_node", "sim_node.main"),
         ("controller_node", "controller_node.main"),
-        ("recorder", "experiment.recorder_main"),
+        ("recorder", "experiment.recorder.main"),
     ],
 )
 def test_a_node_that_is_killed_ends_the_run_and_is_named(

@@ -8,6 +8,7 @@ from in_process import InProcessLaboratory
 from physics import character
 
 from experiment.bags.recording import ModeChange, Recording
+from experiment.render.scene import make_scene
 from experiment.report.reactions import (
     ModeSpan,
     mode_line,
@@ -15,7 +16,6 @@ from experiment.report.reactions import (
     throw_marks,
     thrown_line,
 )
-from experiment.scene import make_scene
 from experiment.studies.study import Case
 from msgs_config.throw import Throw
 from msgs_config.throw_messages import BallStates, ball_names, decode_balls, encode_balls

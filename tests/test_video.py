@@ -8,7 +8,7 @@ import av
 import numpy as np
 import pytest
 
-from experiment.video import check_video, write_video
+from experiment.render.video import check_video, write_video
 from msgs_config.errors import ConfigurationError, RecordingError
 from sim_node.camera import Picture
 

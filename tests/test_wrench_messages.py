@@ -2,6 +2,7 @@
 
 import random
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,8 +15,14 @@ from sensor_msgs.msg import JointState, MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import MessageError
-from msgs_config.messages import JointStateEncoder
-from msgs_config.wrench_messages import WrenchArrays, decode_wrenches, encode_wrenches, select
+from msgs_config.messages import JointStateEncoder, with_stamp
+from msgs_config.wrench_messages import (
+    ContactEncoder,
+    WrenchArrays,
+    decode_wrenches,
+    encode_wrenches,
+    select,
+)
 
 PROPERTY = settings(max_examples=150, deadline=None)
 SECOND = 10**9
@@ -156,6 +163,30 @@ def test_where_nothing_touches_the_selection_is_an_empty_message() -> None:
     assert decoded.links == ()
     assert decoded.wrenches.shape == (0, 6)
     assert decoded.points.shape == (0, 3)
+
+
+@PROPERTY
+@given(st.data())
+def test_the_contacts_of_a_character_are_the_message_of_what_was_selected(
+    data: st.DataObject,
+) -> None:
+    links = ["left_ankle", "chest", "größer", "r"]
+    encoder = ContactEncoder(links)
+    for stamp_ns in (0, 3 * SECOND + 7, 5 * SECOND):  # heads are kept from one to the next
+        wrenches = data.draw(arrays(float, (4, 6), elements=numbers))
+        touching = data.draw(arrays(np.bool_, 4))
+
+        raw = encoder.encode(stamp_ns, wrenches, touching)
+
+        assert raw == encode_wrenches(select(stamp_ns, links, wrenches, touching))
+
+
+def test_a_message_with_another_stamp_is_the_same_otherwise() -> None:
+    wrenches = WrenchArrays.of_rows(1, ["a"], [np.arange(6.0)], [(1.0, 2.0, 3.0)])
+
+    raw = with_stamp(encode_wrenches(wrenches), 7 * SECOND + 5)
+
+    assert raw == encode_wrenches(replace(wrenches, stamp_ns=7 * SECOND + 5))
 
 
 # In

@@ -116,7 +116,7 @@ def _render_strip(options: argparse.Namespace) -> None:
     times = count if options.times is None else _times(options.times)
     size = None if options.size is None else _size(options.size)
     from experiment.figures import STRIP
-    from experiment.render import save_png, strip
+    from experiment.render.stills import save_png, strip
 
     output = options.output or _place(options.run) / STRIP
     recordings = _read(options)
@@ -139,8 +139,8 @@ def _render_film(options: argparse.Namespace) -> None:
     size = None if options.size is None else _size(options.size)
     ghost = "over" if options.reference else options.ghost
     from experiment.figures import VIDEO
-    from experiment.movie import MOVIE_SIZE, GhostPlace, Movie, MovieSettings
-    from experiment.video import check_video
+    from experiment.render.movie import MOVIE_SIZE, GhostPlace, Movie, MovieSettings
+    from experiment.render.video import check_video
 
     output = options.output or _place(options.run) / VIDEO
     _check_output(output, _MOVIE)

@@ -184,7 +184,7 @@ def _checked_plan(
 
 def _check_excludable(name: str) -> None:
     """Raise ConfigurationError unless the recorder may do without a topic."""
-    from experiment.recorder_topics import EXCLUDABLE
+    from experiment.recorder.topics import EXCLUDABLE
 
     if name not in EXCLUDABLE and name.removeprefix("/") not in EXCLUDABLE:
         raise ConfigurationError(one_of("topic to --exclude:", name, EXCLUDABLE))

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.image import imsave
 
 from experiment.bags.recording import Recording
-from experiment.render import strip
+from experiment.render.stills import strip
 from experiment.report import charts
 from experiment.report.changes import gains, law, live_changes
 from experiment.report.charts import Marks

@@ -16,8 +16,6 @@ from msgs_config.joint_layout import Configuration
 from sim_node.parameters import make_role, make_settings
 from sim_node.simulation import Simulation, Snapshot
 
-_NO_STATES = Configuration(np.zeros(0), np.zeros(0))
-
 
 @dataclass(frozen=True)
 class Branch:
@@ -40,35 +38,48 @@ class Expansion:
     features: FloatArray  # (s, 1 + l, f) at the windows' ends; NaN after a divergence, and the end
 
 
+@dataclass(frozen=True)
+class _Table:
+    """The motion itself at the times of a window."""
+
+    index: dict[float, int]  # of each time
+    first: ReferenceState
+    states: ReferenceState  # (t, n) rows
+
+    @classmethod
+    def of(cls, motion: Reference, times: tuple[float, ...]) -> "_Table":
+        """The motion at times in s."""
+        states = [motion.sample(time) for time in times]
+        table = ReferenceState(
+            Configuration(
+                np.array([state.configuration.position for state in states]),
+                np.array([state.configuration.orientations_xyzw for state in states]),
+            ),
+            np.array([state.velocity for state in states]),
+            np.array([state.acceleration for state in states]),
+        )
+        return cls({time: row for row, time in enumerate(times)}, states[0], table)
+
+
 class Trial:
     """The reference of a window that is being tried: the motion with one offset."""
 
     def __init__(self, motion: Reference) -> None:
         self._motion = motion
-        self._times: tuple[float, ...] = ()
+        self._known: dict[tuple[float, ...], _Table] = {}  # by a window's times, for all samples
         self._index: dict[float, int] = {}
-        self._states: list[ReferenceState] = []
-        self._table = ReferenceState(_NO_STATES, np.zeros(0), np.zeros(0))
+        self._sampled: list[ReferenceState] = []
 
     def set(self, times: tuple[float, ...], before: Offset | None, offset: Offset) -> None:
         """Have an offset at times in s but the first one, which has that of the window before.
 
         All times are worked out at once: `Offset` gives each of them the same doubles so.
         """
-        if times != self._times:
-            self._times, self._index = times, {time: row for row, time in enumerate(times)}
-            samples = [self._motion.sample(time) for time in times]
-            self._states = samples[:1]
-            self._table = ReferenceState(
-                Configuration(
-                    np.array([state.configuration.position for state in samples]),
-                    np.array([state.configuration.orientations_xyzw for state in samples]),
-                ),
-                np.array([state.velocity for state in samples]),
-                np.array([state.acceleration for state in samples]),
-            )
-        first = self._states[0] if before is None else before.applied(self._states[0])
-        table = offset.applied(self._table)
+        known = self._known.get(times)
+        if known is None:
+            known = self._known[times] = _Table.of(self._motion, times)
+        first = known.first if before is None else before.applied(known.first)
+        table = offset.applied(known.states)
         rows = zip(
             table.configuration.position,
             table.configuration.orientations_xyzw,
@@ -77,7 +88,7 @@ class Trial:
             strict=True,
         )
         states = [ReferenceState(Configuration(p, q), v, a) for p, q, v, a in rows]
-        self._sampled = [first, *states[1:]]
+        self._index, self._sampled = known.index, [first, *states[1:]]
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state at one of the times, as `CorrectedReference` has it."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiment.bags.recording import Recording
-from experiment.render import strip
+from experiment.render.stills import strip
 from experiment.studies.plots import label, make_panels, show_pictures
 from experiment.studies.study import Case, Findings, Laboratory
 from experiment.studies.tracking import errors_by_joint, fall_time

@@ -8,7 +8,7 @@ import numpy as np
 
 from experiment.bags.recording import Recording
 from experiment.planned_push import PlannedPush
-from experiment.render import pose_strip
+from experiment.render.stills import pose_strip
 from experiment.studies.study import Case, Findings, Laboratory, Outcome
 from msgs_config import rotations
 from msgs_config.arrays import BoolArray

@@ -8,7 +8,7 @@ import numpy as np
 
 from controller_node.dynamics import DynamicsModel
 from controller_node.references.clip_file import available_clips, read_clip
-from experiment.render import strip
+from experiment.render.stills import strip
 from experiment.studies.plots import label, make_panels, show_pictures
 from experiment.studies.study import Case, Findings, Laboratory, Outcome
 from experiment.studies.tracking import errors_by_joint

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiment.planned_push import PlannedPush
-from experiment.render import pose_strip
+from experiment.render.stills import pose_strip
 from experiment.studies.plots import label, make_panels
 from experiment.studies.replay import effort_table, errors_of, same_states
 from experiment.studies.study import Case, Cell, Findings, Laboratory, Outcome

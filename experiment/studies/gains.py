@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiment.bags.recording import Recording
-from experiment.render import strip
+from experiment.render.stills import strip
 from experiment.studies.plots import THEORY, label, make_panels, show_pictures
 from experiment.studies.study import Case, Cell, Findings, Laboratory, Outcome
 from experiment.studies.tracking import (

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiment.bags.recording import Recording
-from experiment.render import strip
+from experiment.render.stills import strip
 from experiment.report.charts import Marks
 from experiment.report.measures import distances, vectors_of
 from experiment.report.reactions import mode_spans

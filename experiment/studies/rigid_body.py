@@ -288,7 +288,7 @@ def _draw_spin(free: Observed, finer: Observed) -> "Figure":
     """A free spin about the middle axis: it tumbles, and its angular momentum stays."""
     from matplotlib.figure import Figure
 
-    from experiment.render import pose_strip
+    from experiment.render.stills import pose_strip
 
     figure = Figure(figsize=(11.0, 6.0), layout="constrained")
     grid = figure.add_gridspec(2, 3, height_ratios=(0.4, 1.0))

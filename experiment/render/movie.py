@@ -12,12 +12,12 @@ from typing import TypeAlias
 import numpy as np
 
 from experiment.bags.recording import Recording
-from experiment.camera_path import followed_path
-from experiment.drawing import Set, Shot, draw
-from experiment.marks import Marks
-from experiment.render import Progress, check_size
-from experiment.scene import Scene, make_scene, nearest_rows
-from experiment.video import check_video, write_video
+from experiment.render.camera_path import followed_path
+from experiment.render.drawing import Set, Shot, draw
+from experiment.render.marks import Marks
+from experiment.render.scene import Scene, make_scene, nearest_rows
+from experiment.render.stills import Progress, check_size
+from experiment.render.video import check_video, write_video
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Vector

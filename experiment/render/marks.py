@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from experiment.bags.recording import Wrenches
-from experiment.scene import Scene
+from experiment.render.scene import Scene
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.wrench_messages import WrenchArrays
 from sim_node.camera import LinkForce

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
 
-from experiment.loss_count import LossCount
-from experiment.recorder_topics import RecordedTopic
+from experiment.recorder.loss_count import LossCount
+from experiment.recorder.topics import RecordedTopic
 from msgs_config.polling import DirectSubscription
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.image import imsave
 
 from experiment.bags.recording import Recording
-from experiment.captions import captioned
-from experiment.scene import make_scene, nearest_rows
+from experiment.render.captions import captioned
+from experiment.render.scene import make_scene, nearest_rows
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, RecordingError

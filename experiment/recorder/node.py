@@ -1,5 +1,6 @@
 """`recorder`: writes what goes over the topics into a bag, and measures it."""
 
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,8 @@ from experiment.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
 from experiment.bags.writer import BagWriter
 from experiment.figures import BAG, figures_directory, write_figures
 from experiment.listener import HEARD, RunListener
-from experiment.recorder_inbox import Inbox
-from experiment.recorder_topics import NamedTopics, RecordedTopic, contract_topics, simulator_name
+from experiment.recorder.inbox import Inbox
+from experiment.recorder.topics import NamedTopics, RecordedTopic, contract_topics, simulator_name
 from msgs_config import topics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.node_parameters import declare, given_parameters
@@ -42,6 +43,7 @@ PARAMETERS = [
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
 _DRAIN_PERIOD = 0.004  # s between looks at the topics: one waking up for many messages
+_SERVICE_PERIOD = 0.1  # s between turns of the executor, which looks at each of many topics
 _FLUSH_PERIOD = 0.5  # s: what was published longer ago outlives even a kill of the recorder
 _SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
 
@@ -92,7 +94,7 @@ class RecorderNode(Node):
         Raises:
             RecordingError: ticks were missing, or the bag could not be written.
         """
-        spinner = Spinner(self)
+        spinner = Spinner(self, _SERVICE_PERIOD)
         due = {self._search: 0.0, self._flush: 0.0, self._tell_progress: 0.0}
         try:
             while not stop:
@@ -151,6 +153,7 @@ class RecorderNode(Node):
         batch.sort(key=lambda message: message[0])
         for published_ns, recorded, raw in batch:
             self._keep(recorded, raw, published_ns)
+            os.sched_yield()  # who works in the loop goes first
         return len(batch)
 
     def _keep(self, recorded: RecordedTopic, raw: bytes, published_ns: int) -> None:

@@ -9,7 +9,7 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-from experiment.captions import write_on
+from experiment.render.captions import write_on
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character import Character, Loading, Vector
 from msgs_config.errors import ActuatedCharactersError, RunError

@@ -1,0 +1,1 @@
+"""Recordings and poses as pictures, and as films."""
