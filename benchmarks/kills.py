@@ -7,6 +7,7 @@ at least.
 
 import argparse
 import os
+import re
 import shutil
 import signal
 import struct
@@ -40,11 +41,12 @@ from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock  # noqa: E4
 
 _KINDS = [(storage, compression) for storage in STORAGES for compression in COMPRESSIONS]
 _RATE = 500  # Hz: in real time a machine that cannot keep up loses messages, killed or not
-_LONGEST = 3.0  # s that a recorder lives, from when it has begun to listen
+_LONGEST = 3.0  # s that a recorder lives, from when it has heard a state
 _PATIENCE = 60.0  # s for its start
 _POLL_PERIOD = 0.002  # s
 _MOST_LOST = 1.0  # s before a recorder's last word that may be lost
 _STATES = f"/{topics.JOINT_STATES.name}"
+_FIRST_STATE = re.compile(r"^tick [1-9]\d*$", re.MULTILINE)
 _STAMP = struct.Struct("<4xiI")  # of the header that a message begins with: CDR, little-endian
 
 
@@ -111,23 +113,27 @@ def _kill_one(nodes: Nodes, run: Path, kind: tuple[str, str], life: float, found
 
 
 def _kill(recorder: Child, life: float) -> tuple[str, float]:
-    """Kill a recorder so many s after its first word.
+    """Kill a recorder so many s after it has said that it heard a state.
 
     Returns:
         All that it said, and the wall time of its last word, s: on a busy machine it may have had
         no turn since.
     """
-    said, spoke_at, deadline = "", 0.0, time.monotonic() + _PATIENCE
+    said, spoke_at, listens = "", 0.0, False
+    deadline = time.monotonic() + _PATIENCE
     while time.monotonic() < deadline:
         if word := recorder.read_output():
-            deadline = deadline if said else time.monotonic() + life
             said, spoke_at = said + word, time.time()
+            if not listens and _FIRST_STATE.search(said):
+                listens, deadline = True, time.monotonic() + life
         if recorder.exit_code is not None:
             raise RuntimeError(f"the recorder ended by itself: {recorder.last_words()}")
         time.sleep(_POLL_PERIOD)
     os.kill(recorder.pid, signal.SIGKILL)
     while recorder.exit_code is None:
         time.sleep(_POLL_PERIOD)
+    if not listens:
+        raise RuntimeError(f"the recorder heard no state within {_PATIENCE:g} s")
     said += recorder.read_output()
     recorder.end()
     return said, spoke_at
