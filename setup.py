@@ -51,6 +51,8 @@ setup(
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-rclpy[fastrtps]>=7.1.6,<7.2",
         ],
+        # `actuated_characters reconstruct --fit N`: CMA-ES, in Python alone (0.3 MB, BSD-3).
+        "fit": ["cma>=4.0,<5"],
         # `actuated_characters reconstruct --cluster ADDRESS`, on several machines.
         "cluster": ["dask[distributed]>=2024.8"],
         # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
@@ -59,6 +61,7 @@ setup(
         # The linters are held to one minor version: a new one may have new rules.
         "test": [
             "av>=14,<19",
+            "cma>=4.0,<5",
             "hypothesis>=6.98,<7",
             "mcap>=1.2,<2",
             "mcap-ros2-support>=0.5.5,<0.7",

@@ -46,7 +46,7 @@ def measure_samcon(console: Console) -> None:
 
 def _speed(workers: int) -> Speed:
     settings = preset("humanoid", "walk", samples=_SAMPLES, lookahead=0)
-    problem = Problem("humanoid", "walk", _DURATION, settings.window, feedback=settings.feedback)
+    problem = Problem.of("humanoid", "walk", _DURATION, settings)
     with tempfile.TemporaryDirectory() as directory:
         output = Path(directory) / "walk.json"
         found = reconstruct(Job(problem, 1, settings, output, workers))

@@ -81,7 +81,7 @@ def main() -> int:
 def _attempt(clip: str, seed: int, samples: int, workers: int) -> Attempt:
     settings = preset("humanoid", clip, samples=samples, seed=seed)
     duration = duration_of("humanoid", clip, CYCLES.get(clip, 1))
-    problem = Problem("humanoid", clip, duration, settings.window, feedback=settings.feedback)
+    problem = Problem.of("humanoid", clip, duration, settings)
     with tempfile.TemporaryDirectory() as directory:
         output = Path(directory) / "motion.json"
         try:

@@ -2,6 +2,8 @@
 
 import argparse
 import os
+import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +19,8 @@ if TYPE_CHECKING:  # it takes a second to import
     from experiment.samcon.search import Progress as SearchProgress
 
 _SUFFIX = ".json"
+_CHARACTER = "humanoid"
+_SIMULATOR: dict[str, object] = {"rate": 240, "command_delay_ticks": 0}  # a run's own
 
 
 def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -32,7 +36,7 @@ def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParse
         epilog="example: actuated_characters reconstruct --clip walk --cycles 4 --output walk.json",
     )
     command.set_defaults(command=_reconstruct)
-    command.add_argument("--character", default="humanoid", help="name (%(default)s)")
+    command.add_argument("--character", default=_CHARACTER, help="name (%(default)s)")
     command.add_argument("--clip", default="walk", help="name of a clip, or a file (%(default)s)")
     command.add_argument(
         "--cycles", type=int, default=1, metavar="N", help="of the clip, one after another (1)"
@@ -56,6 +60,9 @@ def _add_search(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--open-loop", action="store_true", help="without the balance feedback of the preset"
     )
+    command.add_argument(
+        "--fit", type=int, default=0, metavar="N", help="fit the feedback first, in N runs (0)"
+    )
     command.add_argument("--rate", type=int, default=240, metavar="HZ", help="control rate (240)")
     command.add_argument(
         "--delay-ticks", type=int, default=0, metavar="D", help="by which commands come late (0)"
@@ -75,7 +82,7 @@ def _reconstruct(options: argparse.Namespace) -> None:
     bar = Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
-        TextColumn("window {task.completed:.0f}/{task.total:.0f}"),
+        TextColumn("{task.completed:.0f}/{task.total:.0f}"),
         TextColumn("{task.fields[state]}", markup=False),
         TimeRemainingColumn(),
         console=Console(stderr=True),
@@ -88,8 +95,24 @@ def _reconstruct(options: argparse.Namespace) -> None:
         bar.update(task, completed=progress.window, total=windows, state=state)
 
     with bar:
+        if options.fit:
+            job = _fitted(job, options.fit, bar)
         found = reconstruct(job, report)
     _report(job, found)
+
+
+def _fitted(job: "Job", runs: int, bar: Progress) -> "Job":
+    """The job with a feedback that has been fitted to its motion."""
+    from experiment.samcon.fitting import fitted
+
+    task = bar.add_task("feedback", total=runs, state="begins")
+
+    def report(done: int, least: float) -> None:
+        bar.update(task, completed=min(done, runs), state=f"mean cost of a window {least:.3g}")
+
+    gains = fitted(job.problem, job.settings, runs, job.workers, report)
+    problem = replace(job.problem, feedback=gains)
+    return replace(job, problem=problem, settings=replace(job.settings, feedback=gains))
 
 
 def _job(options: argparse.Namespace) -> "Job":
@@ -114,6 +137,10 @@ def _job(options: argparse.Namespace) -> "Job":
     if workers < 1:
         raise ConfigurationError(f"--workers is {workers}; it must be 1 or more")
     given = {name: getattr(options, name) for name in ("samples", "kept", "window", "seed")}
+    if options.open_loop and options.fit:
+        raise ConfigurationError("--fit is of the feedback, and --open-loop is without")
+    if options.fit < 0:
+        raise ConfigurationError(f"--fit is {options.fit}; it must be 0 or more")
     if options.open_loop:
         given["feedback"] = {}
     settings = preset(
@@ -121,13 +148,12 @@ def _job(options: argparse.Namespace) -> "Job":
         options.clip,
         **{name: value for name, value in given.items() if value is not None},
     )
-    problem = Problem(
+    problem = Problem.of(
         options.character,
         options.clip,
         duration_of(options.character, options.clip, options.cycles),
-        settings.window,
+        settings,
         {"rate": options.rate, "command_delay_ticks": options.delay_ticks},
-        feedback=settings.feedback,
     )
     return Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
 
@@ -148,4 +174,22 @@ def _report(job: "Job", found: "Reconstruction") -> None:
     table = Table(title=escape(str(job.output)), title_justify="left", show_header=False)
     for name, value in rows.items():
         table.add_row(name, value)
-    Console().print(table)
+    console = Console()
+    console.print(table)
+    console.print("play it over topics:", _play_command(job), soft_wrap=True, markup=False)
+
+
+def _play_command(job: "Job") -> str:
+    """How to have the file played: with the same parameters as it was found with."""
+    parameters: dict[str, object] = {"controller_node.root_assistance": "false"}
+    for name, value in job.problem.controller.items():
+        parameters[f"controller_node.{name}"] = value
+    for name, value in job.problem.simulator.items():
+        if value != _SIMULATOR[name]:
+            parameters[f"sim_node.{name}"] = value
+    options = [f"--set {name}:={value}" for name, value in parameters.items()]
+    duration = f"{job.problem.duration:.6f}"
+    command = f"actuated_characters run --clip {shlex.quote(str(job.output))} --duration {duration}"
+    if job.problem.character != _CHARACTER:
+        options.insert(0, f"--character {shlex.quote(job.problem.character)}")
+    return " ".join((command, *options))

@@ -1,7 +1,8 @@
 """The cost of states against the motion: rows of features in, one number a row out.
 
 The terms are those of Liu et al. 2010, "Sampling-based Contact-rich Motion Control", section 4.2,
-and one of the centre of mass's place and velocity, without which the motion drifts.
+and ours: of the centre of mass's place and velocity, without which the motion drifts, and of the
+angular momentum, which a jump keeps until it lands.
 """
 
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ class Terms:
     balance: FloatArray  # heights of the character
     centre: FloatArray  # m
     ahead: FloatArray  # m, of the centre of mass a moment later, if it went on as it moves
+    momentum: FloatArray  # kg m^2/s, of the angular momentum about the centre of mass
     lost: FloatArray  # 1 where a bound is crossed, else 0
 
     def cost(self, weights: Weights) -> FloatArray:
@@ -39,6 +41,7 @@ class Terms:
             + weights.balance * self.balance
             + weights.centre * self.centre
             + weights.ahead * self.ahead
+            + weights.momentum * self.momentum
         )
         return np.where(self.lost == 0.0, total, np.inf)
 
@@ -63,6 +66,7 @@ def terms(
     arms = centre[:, np.newaxis, :2] - points[..., :2]
     right_arms = right_centre[:, np.newaxis, :2] - right_points[..., :2]
     off = np.linalg.norm(centre - right_centre, axis=1)
+    momenta = states[:, 2 * size + 6 : 2 * size + 9] - desired[2 * size + 6 : 2 * size + 9]
     spin = np.zeros(len(states))
     tilt = np.zeros(len(states))
     fallen = np.zeros(len(states), dtype=np.bool_)
@@ -79,6 +83,7 @@ def terms(
         ahead=np.linalg.norm(
             centre - right_centre + _AHEAD * (centre_velocity - right_velocity), axis=1
         ),
+        momentum=np.linalg.norm(momenta, axis=1),
         lost=np.where(sound & ~fallen, 0.0, 1.0),
     )
 
@@ -86,5 +91,5 @@ def terms(
 def _parts(size: int, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Centre of mass (s, 3), its velocity (s, 3), and the end effectors (s, e, 3)."""
     start = 2 * size
-    points = rows[:, start + 6 :].reshape(len(rows), -1, 3)
+    points = rows[:, start + 9 :].reshape(len(rows), -1, 3)
     return rows[:, start : start + 3], rows[:, start + 3 : start + 6], points

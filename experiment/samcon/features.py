@@ -3,6 +3,7 @@
 import numpy as np
 
 from controller_node.dynamics import DynamicsModel
+from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character
 
@@ -12,20 +13,36 @@ class Features:
 
     def __init__(self, character: Character) -> None:
         self._size = character.layout.size
+        self._floating = character.layout.has_floating_base
         self._model = DynamicsModel(character)
         self._links = end_effectors(character)
 
     @property
     def width(self) -> int:
         """Length of a row."""
-        return 2 * self._size + 6 + 3 * len(self._links)
+        return 2 * self._size + 9 + 3 * len(self._links)
 
     def row(self, position: FloatArray, velocity: FloatArray) -> FloatArray:
-        """The features (f,) of a state: m, rad, m/s, rad/s."""
+        """The features (f,) of a state: m, rad, m/s, rad/s, and kg m^2/s of momentum."""
         self._model.update(position, velocity)
         points, _ = self._model.link_frames(self._links)
         centre, moving = self._model.centre_of_mass(), self._model.centre_of_mass_velocity()
-        return np.concatenate((position, velocity, centre, moving, points.ravel()))
+        spin = self._angular_momentum(position, velocity, centre)
+        return np.concatenate((position, velocity, centre, moving, spin, points.ravel()))
+
+    def _angular_momentum(
+        self, position: FloatArray, velocity: FloatArray, centre: FloatArray
+    ) -> FloatArray:
+        """The angular momentum (3,) about the centre of mass, world axes; zero of a fixed base.
+
+        The generalised momentum of the root's rotation is the one about the root's origin, in the
+        base frame (Featherstone 2008, section 9.6).
+        """
+        if not self._floating:
+            return np.zeros(3)
+        momentum = rotations.apply(self._model.mass_matrix()[:6], velocity)
+        about_root = rotations.rotate(rotations.exp(position[3:6]), momentum[3:])
+        return about_root - np.cross(centre - position[:3], momentum[:3])
 
 
 def end_effectors(character: Character) -> IntArray:

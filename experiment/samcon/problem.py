@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from experiment.plan import Plan, make_plan
+from experiment.samcon.settings import Settings
 from msgs_config.arrays import IntArray
 from msgs_config.tick_clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 
@@ -22,6 +23,28 @@ class Problem:
     simulator: Mapping[str, object] = field(default_factory=dict)
     controller: Mapping[str, object] = field(default_factory=dict)
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name
+    feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
+
+    @classmethod
+    def of(
+        cls,
+        character: str,
+        clip: str,
+        duration: float,
+        settings: Settings,
+        simulator: Mapping[str, object] | None = None,
+    ) -> "Problem":
+        """A motion over a time in s, with what a search's settings say of how it is run."""
+        return cls(
+            character,
+            clip,
+            duration,
+            settings.window,
+            simulator or {},
+            settings.gains,
+            settings.feedback,
+            settings.feedforward,
+        )
 
     def plan(self, clip: str | None = None) -> Plan:
         """The run, of the motion itself or of another clip; the root is not driven.

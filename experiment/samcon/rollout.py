@@ -1,20 +1,27 @@
 """Simulates samples: the same simulation and the same controller as a run, window by window."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.controller import Controller
 from controller_node.feedback import responding
 from controller_node.parameters import make_controller
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.corrected import Offset
+from experiment.samcon import cost
 from experiment.samcon.features import Features
+from experiment.samcon.feedforward import Feedforward
 from experiment.samcon.problem import Problem, Windows
+from experiment.samcon.settings import Bounds
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.joint_layout import Configuration
 from sim_node.parameters import make_role, make_settings
 from sim_node.simulation import Simulation, Snapshot
+
+_LARGEST_PLAIN = 0.8  # rad or m
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,7 @@ class Branch:
     before: FloatArray  # (n,) offset of the window before the path, zeros if there is none
     samples: FloatArray  # (s, n) offsets to try in the window after the path
     lookahead: int = 0  # windows without a correction that are simulated after that, to look
+    bounds: Bounds | None = None  # beyond which a sample is not followed any further
 
 
 @dataclass(frozen=True)
@@ -110,9 +118,16 @@ class Rollout:
         self.windows = Windows(plan.ticks, plan.simulator.integer("rate"), problem.window)
         self.features = Features(plan.character)
         self._trial = Trial(plan.reference)
-        reference = responding(plan.character, self._trial, plan.reference, problem.feedback)
-        self._controller = make_controller(plan.character, reference, plan.controller)
-        self._nothing = Offset(self.layout, np.zeros(self.layout.size))
+        self._controller = self._responding(problem.feedback)
+        self._feedforward = Feedforward(
+            plan.character,
+            plan.reference,
+            self._controller.settings.gains,
+            self._controller.clock.period_s,
+        )
+        self.height = float(self.desired(0)[2]) if self.layout.has_floating_base else 1.0  # m
+        self._share = problem.feedforward
+        self._plain: dict[int, FloatArray] = {}
         self._simulation = self._fresh()
         self._episode_ns = self._simulation.actors[0].state.stamp_ns
 
@@ -120,11 +135,30 @@ class Rollout:
         """End the engine."""
         self._simulation.close()
 
+    def respond(self, gains: Mapping[str, float]) -> None:
+        """Have other gains of the feedback, by name, than the problem's."""
+        self._controller = self._responding(gains)
+
+    def _responding(self, gains: Mapping[str, float]) -> Controller:
+        plan = self.plan
+        reference = responding(plan.character, self._trial, plan.reference, gains)
+        return make_controller(plan.character, reference, plan.controller)
+
     def desired(self, window: int) -> FloatArray:
         """The features (f,) of the motion at a window's end."""
         end = self.windows.time(int(self.windows.bounds[window + 1]))
         state = self.plan.reference.sample(end)
         return self.features.row(state.configuration.position, state.velocity)
+
+    def plain(self, window: int) -> FloatArray:
+        """The offset (n,) of a window without a correction: zero, or the inverse dynamics' one."""
+        if window not in self._plain:
+            offset = np.zeros(self.layout.size)
+            if self._share:
+                found = self._feedforward.offset(self.windows.times(window))
+                offset = np.clip(self._share * found, -_LARGEST_PLAIN, _LARGEST_PLAIN)
+            self._plain[window] = offset
+        return self._plain[window]
 
     def expand(self, branch: Branch) -> Expansion:
         """Try a branch's samples."""
@@ -143,11 +177,18 @@ class Rollout:
         rows = np.full((len(branch.samples), 1 + branch.lookahead, self.features.width), np.nan)
         for row, sample in zip(rows, branch.samples, strict=True):
             simulation.restore(saved)
-            self._try(window, before, Offset(self.layout, sample), row)
+            self._try(window, before, Offset(self.layout, sample), row, branch.bounds)
         simulation.forget(saved)
         return Expansion(snapshot, start, rows)
 
-    def _try(self, window: int, before: Offset | None, offset: Offset, rows: FloatArray) -> None:
+    def _try(
+        self,
+        window: int,
+        before: Offset | None,
+        offset: Offset,
+        rows: FloatArray,
+        bounds: Bounds | None,
+    ) -> None:
         """Fill in the features (1 + l, f) that an offset leads to, as far as it goes well."""
         for row in rows[: len(self.windows) - window]:
             try:
@@ -155,7 +196,15 @@ class Rollout:
             except SimulationError:
                 return
             row[:] = self._features()
-            window, before, offset = window + 1, offset, self._nothing
+            if bounds is not None and self._is_lost(window, row, bounds):
+                return
+            window, before = window + 1, offset
+            if window < len(self.windows):
+                offset = Offset(self.layout, self.plain(window))
+
+    def _is_lost(self, window: int, row: FloatArray, bounds: Bounds) -> bool:
+        rows, desired = row[np.newaxis], self.desired(window)
+        return bool(cost.terms(self.layout, self.height, rows, desired, bounds).lost[0])
 
     def _features(self) -> FloatArray:
         state = self._simulation.actors[0].state

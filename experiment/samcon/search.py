@@ -135,7 +135,6 @@ class _Steps:
         for name, widths in settings.noise.items():
             self._noise[layout.joint(name).entries] = widths
         self._corrected: IntArray = np.flatnonzero(self._noise)
-        self._height = float(rollout.desired(0)[2]) if layout.has_floating_base else 1.0
         self.last_costs: tuple[float, ...] = ()
 
     def next_level(self, progress: Progress) -> list[Node]:
@@ -146,9 +145,9 @@ class _Steps:
         refined = int(settings.refined * settings.samples)
         broad = max(settings.samples - refined, 1)
         owners = np.arange(broad) * len(parents) // broad
-        offsets = self._drawn(rng, broad)
+        offsets = self._drawn(rng, broad) + self._rollout.plain(window)
         plain = np.flatnonzero(np.diff(owners, prepend=-1))
-        offsets[plain] = 0.0  # each goes on without a correction, too
+        offsets[plain] = self._rollout.plain(window)  # each goes on without a correction, too
         samples = self._tried(window, parents, owners, offsets)
         elite = chosen(samples.costs, max(int(_ELITE * broad), 1), 0.0)
         if refined and elite:
@@ -174,8 +173,15 @@ class _Steps:
         """
         sound = [int(index) for index in plain if np.isfinite(samples.costs[index])]
         sound.sort(key=lambda index: (samples.costs[index], index))
-        never = [i for i in sound if not parents[samples.owners[i]].offsets.any()]
+        never = [i for i in sound if self._is_plain(parents[samples.owners[i]])]
         return sound[: max(int(_PLAIN * self._settings.kept), 1)] + never
+
+    def _is_plain(self, node: Node) -> bool:
+        """Whether nothing on the way to a node was a correction."""
+        return all(
+            np.array_equal(step.offset, self._rollout.plain(window))
+            for window, step in enumerate(node.path)
+        )
 
     def _tried(
         self, window: int, parents: Sequence[Node], owners: IntArray, offsets: FloatArray
@@ -222,6 +228,6 @@ class _Steps:
         sound = np.all(np.isfinite(ends), axis=1)
         desired = rollout.desired(window)
         found = cost.terms(
-            rollout.layout, self._height, np.nan_to_num(ends), desired, settings.bounds
+            rollout.layout, rollout.height, np.nan_to_num(ends), desired, settings.bounds
         ).cost(settings.weights)
         return np.where(sound, found, np.inf)

@@ -23,6 +23,7 @@ class Weights:
     balance: float = 60.0  # a height of the character, of the centre of mass above each of them
     centre: float = 60.0  # a m of the centre of mass
     ahead: float = 30.0  # a m of where it gets to as it moves
+    momentum: float = 0.0  # a kg m^2/s of angular momentum
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class Settings:
     # largest offset of each joint that is corrected, rad or m, one number a degree of freedom
     noise: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name; none: without
+    feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
+    gains: Mapping[str, float] = field(default_factory=dict)  # of the controller, by parameter
     weights: Weights = Weights()
     bounds: Bounds = Bounds()
 
@@ -91,6 +94,7 @@ def settings_from(content: Mapping[str, Any]) -> Settings:
         if isinstance(values.get(name), Mapping):
             values[name] = replace(kind(), **values[name])
     values["feedback"] = checked_gains(values.get("feedback", {}))
+    values["gains"] = {name: float(gain) for name, gain in values.get("gains", {}).items()}
     settings = Settings(**values)
     for name, least, most in (
         ("samples", 1, 1_000_000),
@@ -102,6 +106,8 @@ def settings_from(content: Mapping[str, Any]) -> Settings:
             raise ConfigurationError(
                 f"{name} is {getattr(settings, name)}; it must be {least} to {most}"
             )
+    if not 0.0 <= settings.feedforward <= 10.0:
+        raise ConfigurationError(f"feedforward is {settings.feedforward}; it must be 0 to 10")
     if not 0.0 < settings.window <= 10.0:
         raise ConfigurationError(f"window is {settings.window} s; it must be above 0, at most 10 s")
     return settings
