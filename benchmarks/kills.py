@@ -3,6 +3,10 @@
 A humanoid is simulated in real time all the while. Each recorder joins it, says what it has
 flushed, and is killed; what it recorded must come back whole, without a gap, up to what was flushed
 at least.
+
+A recorder that is killed while it holds the lock of its port in shared memory leaves that port
+unusable. Fast DDS makes another for the next process, of which those that were there before do not
+learn: that process hears nothing. Such deaf ones are counted, and another recorder is started.
 """
 
 import argparse
@@ -42,7 +46,8 @@ from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock  # noqa: E4
 _KINDS = [(storage, compression) for storage in STORAGES for compression in COMPRESSIONS]
 _RATE = 500  # Hz: in real time a machine that cannot keep up loses messages, killed or not
 _LONGEST = 3.0  # s that a recorder lives, from when it has heard a state
-_PATIENCE = 60.0  # s for its start
+_PATIENCE = 30.0  # s for its start; longer than Fast DDS remembers the dead
+_MOST_DEAF = 3  # recorders in a row
 _POLL_PERIOD = 0.002  # s
 _MOST_LOST = 1.0  # s before a recorder's last word that may be lost
 _STATES = f"/{topics.JOINT_STATES.name}"
@@ -55,6 +60,7 @@ class _Found:
     """What became of the recorders of one kind."""
 
     recovered: int = 0
+    deaf: int = 0  # heard nothing, and had nothing to lose
     too_early: int = 0  # killed before anything was flushed, and nothing was there
     ticks: int = 0
     most_lost: float = 0.0  # s between the last message that was kept and the last word
@@ -74,9 +80,13 @@ def kill_recorders(count: int, seed: int, console: Console) -> dict[tuple[str, s
         for number in range(count):
             kind = _KINDS[number % len(_KINDS)]
             run = Path(scratch) / "run"
-            shutil.rmtree(run, ignore_errors=True)
             try:
-                _kill_one(nodes, run, kind, rng.uniform(0.0, _LONGEST), found[kind])
+                for _ in range(_MOST_DEAF):
+                    shutil.rmtree(run, ignore_errors=True)
+                    if _kill_one(nodes, run, kind, rng.uniform(0.0, _LONGEST), found[kind]):
+                        break
+                else:
+                    raise RuntimeError(f"{_MOST_DEAF} recorders in a row heard nothing")
             except Exception as error:  # a reader of others raises what it likes
                 found[kind].problems.append(f"{type(error).__name__}: {error}")
             if number % 10 == 9:
@@ -84,11 +94,15 @@ def kill_recorders(count: int, seed: int, console: Console) -> dict[tuple[str, s
     return found
 
 
-def _kill_one(nodes: Nodes, run: Path, kind: tuple[str, str], life: float, found: _Found) -> None:
+def _kill_one(nodes: Nodes, run: Path, kind: tuple[str, str], life: float, found: _Found) -> bool:
+    """Start a recorder, kill it and recover what it leaves; False if it was a deaf one."""
     storage, compression = kind
     parameters = {"directory": str(run), "storage": storage, "compression": compression}
     recorder = nodes.start(topics.RECORDER_NODE, {**parameters, "progress_period": 0.1})
     said, spoke_at = _kill(recorder, life)
+    if not _FIRST_STATE.search(said):
+        found.deaf += 1
+        return False
     complete = said[: said.rfind("\n") + 1].splitlines()
     flushed = [int(line.split()[1]) for line in complete if line.startswith("flushed ")]
     last_flushed = max(flushed, default=0)
@@ -98,7 +112,7 @@ def _kill_one(nodes: Nodes, run: Path, kind: tuple[str, str], life: float, found
         if last_flushed or "no message reached the disk" not in str(error):
             raise
         found.too_early += 1
-        return
+        return True
     if recovered.damaged is None:
         raise RuntimeError("the bag of a killed recorder is complete")
     _check(run / BAG, recovered.contents.counts, last_flushed, found)
@@ -110,10 +124,11 @@ def _kill_one(nodes: Nodes, run: Path, kind: tuple[str, str], life: float, found
         found.most_lost = max(found.most_lost, lost)
         if lost > _MOST_LOST:
             raise RuntimeError(f"the last {lost:.2f} s are lost")
+    return True
 
 
 def _kill(recorder: Child, life: float) -> tuple[str, float]:
-    """Kill a recorder so many s after it has said that it heard a state.
+    """Kill a recorder so many s after it has said that it heard a state, or if it never does.
 
     Returns:
         All that it said, and the wall time of its last word, s: on a busy machine it may have had
@@ -132,8 +147,6 @@ def _kill(recorder: Child, life: float) -> tuple[str, float]:
     os.kill(recorder.pid, signal.SIGKILL)
     while recorder.exit_code is None:
         time.sleep(_POLL_PERIOD)
-    if not listens:
-        raise RuntimeError(f"the recorder heard no state within {_PATIENCE:g} s")
     said += recorder.read_output()
     recorder.end()
     return said, spoke_at
@@ -175,7 +188,15 @@ def _check(bag: Path, counts: Counter[str], last_flushed: int, found: _Found) ->
 
 def _table(found: dict[tuple[str, str], _Found]) -> Table:
     table = Table(title="recorders killed", title_justify="left")
-    for column in ("storage", "compression", "recovered", "too early", "states", "lost, at most"):
+    for column in (
+        "storage",
+        "compression",
+        "recovered",
+        "too early",
+        "deaf",
+        "states",
+        "lost, at most",
+    ):
         table.add_column(column)
     for (storage, compression), each in found.items():
         table.add_row(
@@ -183,6 +204,7 @@ def _table(found: dict[tuple[str, str], _Found]) -> Table:
             compression,
             str(each.recovered),
             str(each.too_early),
+            str(each.deaf),
             str(each.ticks),
             f"{each.most_lost:.2f} s",
         )

@@ -110,21 +110,23 @@ class Links:
         of mass when the engine's step began. A contact between two links of the body counts on
         both, in opposite directions.
         """
-        sums = [[0.0] * 6 for _ in self._numbers]  # plain numbers: of few contacts it is faster
-        touching = np.zeros(len(self._numbers), dtype=np.bool_)
+        sums: dict[int, list[float]] = {}  # by row; plain numbers: of few contacts it is faster
         for number, (fx, fy, fz), (px, py, pz) in touched.get(self._body, ()):
             row = self._row[number]
             cx, cy, cz = centres[row]
             x, y, z = px - cx, py - cy, pz - cz
-            total = sums[row]
+            total = sums.setdefault(row, [0.0] * 6)
             total[0] += fx
             total[1] += fy
             total[2] += fz
             total[3] += y * fz - z * fy
             total[4] += z * fx - x * fz
             total[5] += x * fy - y * fx
-            touching[row] = True
-        return np.array(sums), touching
+        wrenches = np.zeros((len(self._numbers), 6))
+        touching = np.zeros(len(self._numbers), dtype=np.bool_)
+        for row, total in sums.items():
+            wrenches[row], touching[row] = total, True
+        return wrenches, touching
 
     def gaps(self, body: int) -> FloatArray:
         """How far (links,) its surfaces are from another body's, m; inf where there is none."""

@@ -6,6 +6,7 @@ process that stands still is what a busy machine makes of it.
 
 import itertools
 import json
+import os
 import re
 import signal
 import time
@@ -192,6 +193,16 @@ def test_a_recorder_that_stands_still_holds_the_simulation_and_loses_nothing(
     assert simulator.wait() == recorder.wait() == 0
     assert summary_of(tmp_path / "run")["ticks"] == LONG
     assert summary_of(tmp_path / "run")["lost_messages"] == {}
+
+
+def test_no_thread_of_a_recorder_interrupts_who_works(processes: Processes, tmp_path: Path) -> None:
+    recorder = processes.node(topics.RECORDER_NODE, directory="run")
+    wait_until((tmp_path / "run" / "bag").is_dir, "a recorder")
+
+    threads = [int(thread) for thread in os.listdir(f"/proc/{recorder.pid}/task")]
+
+    assert len(threads) > 1  # those of the middleware as well
+    assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_BATCH}
 
 
 def test_messages_that_were_lost_are_counted_by_topic_and_said(

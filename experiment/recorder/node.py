@@ -42,7 +42,7 @@ PARAMETERS = [
     Parameter("exclude", [], "names of topics of the contract not to record", texts=True),
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
-_DRAIN_PERIOD = 0.004  # s between looks at the topics: one waking up for many messages
+_DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
 _SERVICE_PERIOD = 0.1  # s between turns of the executor, which looks at each of many topics
 _FLUSH_PERIOD = 0.5  # s: what was published longer ago outlives even a kill of the recorder
 _SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
