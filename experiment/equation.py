@@ -65,11 +65,7 @@ class EquationOfMotion:
     """The equation of one character's ticks."""
 
     def __init__(self, character: Character, gravity: float, rate_hz: int) -> None:
-        """For a gravity in m/s^2 along -z, and `rate_hz` ticks of one engine step a second.
-
-        Raises:
-            ConfigurationError: a soft limit of the character is unstable at that rate.
-        """
+        """For a gravity in m/s^2 along -z, and `rate_hz` ticks of one engine step a second."""
         self._layout = character.layout
         self._period = 1.0 / rate_hz
         self._model = DynamicsModel(character, gravity)

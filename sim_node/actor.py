@@ -10,6 +10,7 @@ from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, SimulationError
 from msgs_config.stamped import StampedState
+from sim_node.balls import Balls
 from sim_node.contacts import TouchedLinks
 from sim_node.mobility import make_passive_forces
 from sim_node.pushes import Push
@@ -88,6 +89,7 @@ class Actor:
         zero = np.zeros(self.layout.size)
         self._delayed = deque([zero] * self._delay_ticks)
         self._body = world.add(self.character)
+        self._balls = world.balls
         self._body.set_state(self._position, self._velocity)
         self.contacts = self._no_contacts()
         self.pushes = ()
@@ -149,6 +151,11 @@ class Actor:
     def link_frames(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""
         return self._body.links.frames()
+
+    @property
+    def balls(self) -> Balls:
+        """The balls of the world that it is in."""
+        return self._balls
 
     def base_frame(self) -> tuple[FloatArray, FloatArray]:
         """Origin (3,) in m and orientation xyzw (4,) of the base link in the world."""

@@ -10,6 +10,7 @@ from std_msgs.msg import Header
 from msgs_config import rotations, topics
 from msgs_config.arrays import FloatArray
 from msgs_config.messages import DoublesEncoder, split_stamp
+from msgs_config.throw import Throw
 from msgs_config.wrench_messages import WORLD
 from sim_node.actor import Actor
 from sim_node.markers import MarkerEncoder
@@ -36,6 +37,7 @@ class Display:
         if TFMessage is not None:
             self._transforms = node.create_publisher(TFMessage, "/tf", topics.STREAM_QOS)
         self._odometry_encoder = DoublesEncoder(WORLD, self._base)
+        self._throws: tuple[Throw, ...] = ()  # whose balls are shown
         self._markers = MarkerEncoder(actor.character)
 
     @property
@@ -60,10 +62,22 @@ class Display:
             self._transforms.publish(TFMessage(transforms=[transform]))
 
     def publish_markers(self) -> None:
-        """Publish the shapes where they are now, if anybody listens."""
-        if self._visualization.get_subscription_count():
-            frames = self._actor.link_frames()
-            self._visualization.publish(self._markers.encode(self._actor.state.stamp_ns, *frames))
+        """Publish the shapes and the world's balls where they are now, if anybody listens."""
+        if not self._visualization.get_subscription_count():
+            return
+        balls = self._actor.balls
+        if balls.throws != self._throws:
+            gone = max(len(self._throws) - len(balls.throws), 0)
+            self._markers = MarkerEncoder(self._actor.character, balls.throws, gone)
+            self._throws = balls.throws
+        origins, turns = self._actor.link_frames()
+        if balls.throws:
+            motion = balls.motion()
+            origins = np.concatenate((origins, motion[:, :3]))
+            turns = np.concatenate((turns, motion[:, 3:7]))
+        self._visualization.publish(
+            self._markers.encode(self._actor.state.stamp_ns, origins, turns)
+        )
 
     def _header(self) -> Header:
         seconds, nanoseconds = split_stamp(self._actor.state.stamp_ns)

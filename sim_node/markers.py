@@ -1,10 +1,10 @@
-"""The shapes of a character as `visualization_msgs/MarkerArray`: only poses and stamps change.
+"""Shapes of a character and balls as `visualization_msgs/MarkerArray`: only poses, stamps change.
 
 A message is filled and serialised once, with numbers in it that are found again among the bytes.
 """
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character, Shape, ShapeType
 from msgs_config.messages import split_stamp
+from msgs_config.throw import Throw
 from msgs_config.wrench_messages import WORLD
 
 _TYPES = {
@@ -27,14 +28,21 @@ _TYPES = {
 }
 _POSE = 7  # doubles: position and orientation, xyzw
 _FIND_POSE = -7.125e250  # times 1, 2, 3 and so on
+_BALL_RGBA = (0.85, 0.25, 0.15, 1.0)
 _FIND_SECONDS = -1_987_654_321
 
 
 class MarkerEncoder:
-    """Serialises where the shapes of a character are, as markers in the world."""
+    """Serialises where the shapes of a character and balls are, as markers in the world."""
 
-    def __init__(self, character: Character) -> None:
+    def __init__(self, character: Character, throws: Sequence[Throw] = (), gone: int = 0) -> None:
+        """For a character, the balls of these throws, and `gone` balls that are to be taken away.
+
+        The markers of the balls are numbered on from the character's.
+        """
         parts = list(_parts(character))
+        for row, throw in enumerate(throws, start=len(character.links)):
+            parts.append((row, Shape(ShapeType.SPHERE, (throw.radius,), color_rgba=_BALL_RGBA)))
         self._rows = [row for row, _ in parts]
         self._offsets = np.array([part.pose.position for _, part in parts]).reshape(-1, 3)
         turns = [part.pose.orientation_xyzw for _, part in parts]
@@ -43,7 +51,10 @@ class MarkerEncoder:
         for number, marker in enumerate(markers):
             marker.header.stamp.sec, marker.header.stamp.nanosec = _FIND_SECONDS, number
             marker.pose.position = Point(x=_FIND_POSE * (number + 1))
-        self._content = bytearray(serialize_message(MarkerArray(markers=markers)))
+        deleted = [Marker(id=len(parts) + i, action=Marker.DELETE) for i in range(gone)]
+        for marker in deleted:
+            marker.header.frame_id = WORLD
+        self._content = bytearray(serialize_message(MarkerArray(markers=markers + deleted)))
         self._stamps = [
             _find(self._content, "<iI", _FIND_SECONDS, number) for number in range(len(parts))
         ]
@@ -52,7 +63,7 @@ class MarkerEncoder:
         ]
 
     def encode(self, stamp_ns: int, origins: FloatArray, turns_xyzw: FloatArray) -> bytes:
-        """The serialised message, of origins (links, 3) in m and orientations (links, 4)."""
+        """The serialised message, of origins (b, 3) in m and orientations (b, 4): links, balls."""
         turns = turns_xyzw[self._rows]
         poses = np.empty((len(self._rows), _POSE))
         poses[:, :3] = origins[self._rows] + rotations.rotate(turns, self._offsets)

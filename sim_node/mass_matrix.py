@@ -10,7 +10,7 @@ base's first three columns are its velocity in its own axes, not in the world's.
 import numpy as np
 
 from msgs_config import rotations
-from msgs_config.arrays import FloatArray
+from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character import Character
 from msgs_config.joint_layout import JointType
 
@@ -38,7 +38,9 @@ class MassMatrix:
                 entries = slice(entries.start + 3, entries.stop)
             moved = self._turns if joint.type in _TURNING else self._slides
             moved[index][:, entries] = axes
-        self._moves = self._inherited()
+        own = np.abs(self._turns).sum(axis=1) + np.abs(self._slides).sum(axis=1) > 0.0
+        self._owners = np.argmax(own, axis=0)  # (n,) the link of each entry's joint
+        self._moves = self._inherited(own)
         poses = [link.joint.pose_in_parent for link in links]
         self._offsets = np.array([pose.position for pose in poses])
         self._fixed = rotations.matrix(np.array([pose.orientation_xyzw for pose in poses]))
@@ -49,9 +51,9 @@ class MassMatrix:
         diagonals = np.array([link.inertia_diagonal for link in links])
         self._root_inertias = np.sqrt(diagonals)[:, :, np.newaxis]
 
-    def _inherited(self) -> FloatArray:
+    def _inherited(self, own: BoolArray) -> FloatArray:
         """Whether (links, 1, n), 1 or 0, an entry moves a link: its own, or one that carries it."""
-        moves = np.abs(self._turns).sum(axis=1) + np.abs(self._slides).sum(axis=1) > 0.0
+        moves = own.copy()
         for index, parent in enumerate(self._parents):
             if parent >= 0:
                 moves[index] |= moves[parent]
@@ -64,9 +66,8 @@ class MassMatrix:
         centres = origins + rotations.apply(axes, self._centres)
         turns = np.einsum("lij,ljn->in", axes, self._turns)  # each entry is one link's own
         slides = np.einsum("lij,ljn->in", axes, self._slides)
-        owned = np.abs(self._turns).sum(axis=1) + np.abs(self._slides).sum(axis=1) > 0.0
-        arms = centres[:, :, np.newaxis] - np.einsum("li,ln->in", origins, owned.astype(float))
-        linear = self._moves * (slides + np.cross(turns, arms, axis=1))
+        arms = centres[:, :, np.newaxis] - origins[self._owners].T
+        linear = self._moves * (slides + np.cross(turns[np.newaxis], arms, axis=1))
         principal = np.einsum("lij,ljk->lki", axes, self._principal)  # transposed
         angular = np.einsum("lij,ljn->lin", principal, self._moves * turns)
         rows = np.concatenate((self._root_masses * linear, self._root_inertias * angular))

@@ -50,11 +50,7 @@ def measure_mobility(character: Character) -> FloatArray:
 
 
 def make_passive_forces(character: Character, step_s: float) -> PassiveForces:
-    """The passive forces of a character's joints at engine steps of `step_s`.
-
-    Raises:
-        ConfigurationError: a soft limit is unstable at such steps; says which and why.
-    """
+    """The passive forces of a character's joints at engine steps of `step_s`."""
     is_passive = [joint.damping or joint.soft_limit for joint in character.moving_joints]
     size = character.layout.size
     mobility = measure_mobility(character) if any(is_passive) else np.zeros((size, size))

@@ -50,6 +50,8 @@ class World:
             fixedTimeStep=settings.step_s,
             numSolverIterations=settings.solver_iterations,
             numSubSteps=0,
+            # They are for rigid bodies alone: a hinge 0.04 rad beyond its limit would stay there.
+            useSplitImpulse=0,
             deterministicOverlappingPairs=1,
             enableFileCaching=0,
             physicsClientId=self._client,

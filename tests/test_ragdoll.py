@@ -29,8 +29,8 @@ GRAVITY = 9.81
 MOST_ENERGY = 1.05  # of what there was
 RESTING = 0.1  # J
 DROPS, BATCH = 100, 5
-TWITCH, LASTING_EXCESS = 70.0, 5.0  # degrees beyond a limit, in a blow and lying
-FAR, LONGEST = 10.0, 0.5  # degrees beyond a limit, and s of all blows together in which it is
+TWITCH, LASTING_EXCESS = 40.0, 4.0  # degrees beyond a limit, in a blow and lying
+FAR, LONGEST = 10.0, 0.2  # degrees beyond a limit, and s of all blows together in which it is
 
 
 @dataclass(frozen=True)

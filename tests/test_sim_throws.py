@@ -9,6 +9,7 @@ from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from ros import PATIENCE, Inbox, Processes, SimulatorClient, joint_state, stamp_ns, tick_of
 from sensor_msgs.msg import JointState, MultiDOFJointState
+from visualization_msgs.msg import Marker
 
 from msgs_config import topics
 from msgs_config.arrays import FloatArray
@@ -100,6 +101,42 @@ def test_a_throw_begins_at_its_tick_and_does_what_it_does_without_ros(
             if tick >= 10:
                 assert where[tick + 1].tobytes() == run.ball_motion().tobytes()
         assert abs(run.ball_motion()[0, 7]) < 6.0  # it has hit something
+
+
+def test_balls_are_shown_where_they_are_until_a_reset(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    # Arrange
+    throws, shown = client.speak(topics.THROW), client.listen(topics.VISUALIZATION)
+    _, thrown = hear(client)
+    processes.simulator("pendulum", display_rate=240.0, wait_for_subscribers=1)
+    send(client, throws, throw_message(CLOCK.stamp_ns(3), AT_CHEST))
+
+    # Act
+    state = client.drive(client.first_state(), 9, np.random.default_rng(1))
+    client.spin_until(lambda: markers_at(shown, tick_of(state)), "the last markers")
+    client.spin_until(lambda: tick_of(state) in thrown.ticks(), "the last place of the ball")
+    client.reset()
+    again = client.spin_until(lambda: markers_at(shown, tick_of(state) + 1), "the next episode")
+
+    # Assert
+    before, last = markers_at(shown, 2), markers_at(shown, tick_of(state))
+    *body, ball = last
+    assert [m.id for m in before] == [m.id for m in body]
+    assert (ball.header.frame_id, ball.action, ball.type) == ("world", Marker.ADD, Marker.SPHERE)
+    assert ball.id not in {m.id for m in body}
+    assert ball.color.a > 0.0
+    diameters = [ball.scale.x, ball.scale.y, ball.scale.z]
+    assert diameters == [2.0 * AT_CHEST.radius] * 3
+    place = ball.pose.position
+    assert [place.x, place.y, place.z] == motions(thrown)[tick_of(state)][0, :3].tolist()
+    assert [(m.id, m.action) for m in again[len(body) :]] == [(ball.id, Marker.DELETE)]
+
+
+def markers_at(shown: Inbox, tick: int) -> list[Marker]:
+    """The markers of a tick; none if they are not there."""
+    found = [m.markers for m in shown.messages if tick_of(m.markers[0]) == tick]
+    return list(found[-1]) if found else []
 
 
 def test_a_ball_is_felt_like_any_other_contact_and_a_reset_removes_it(

@@ -193,8 +193,9 @@ def _draw(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 9), layout="constrained")
-    panels = figure.subplots(len(hits), 2, sharex=True)
+    panels = figure.subplots(len(hits), 2, sharex="row")
     marks, modes = Marks(), list[tuple[float, float, str]]()  # of all of them, for the legend
+    usual = joint_errors(alone, alone.reference_position)
     for (impulse, run), (moved, error) in zip(hits.items(), panels, strict=True):
         reaction = reactions[impulse]
         marks = Marks(
@@ -206,9 +207,7 @@ def _draw(
         moved.set_ylabel("root moved (m)")
         moved.set_title(f"{impulse:g} N s", fontsize="medium", loc="left")
         error.plot(run.times, reaction.error, label="hit")
-        error.plot(
-            alone.times, joint_errors(alone, alone.reference_position), "k--", label="not hit"
-        )
+        error.plot(run.times, usual[: len(run.times)], "k--", label="not hit")
         error.set_ylabel("joint error (rad)")
         for panel in (moved, error):
             panel.set_ylim(bottom=0.0)
