@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Protocol
@@ -40,8 +40,11 @@ def stand_back() -> None:
     For who only listens to a loop. To be called before there are other threads, which inherit it.
     Its share of a busy machine stays the same.
     """
-    if hasattr(os, "SCHED_BATCH"):  # Linux
-        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    if not hasattr(os, "SCHED_BATCH"):  # Linux alone has it
+        return
+    if os.sched_getscheduler(0) == os.SCHED_OTHER:  # what somebody has chosen stays
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 class StopSignal:

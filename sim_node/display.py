@@ -78,6 +78,8 @@ class Display:
         self._visualization.publish(
             self._markers.encode(self._actor.state.stamp_ns, origins, turns)
         )
+        if self._markers.takes_away:  # once is enough
+            self._markers = MarkerEncoder(self._actor.character, self._throws)
 
     def _header(self) -> Header:
         seconds, nanoseconds = split_stamp(self._actor.state.stamp_ns)

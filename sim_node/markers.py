@@ -54,6 +54,8 @@ class MarkerEncoder:
         deleted = [Marker(id=len(parts) + i, action=Marker.DELETE) for i in range(gone)]
         for marker in deleted:
             marker.header.frame_id = WORLD
+        self.takes_away = gone > 0
+        """Whether its messages take balls away."""
         self._content = bytearray(serialize_message(MarkerArray(markers=markers + deleted)))
         self._stamps = [
             _find(self._content, "<iI", _FIND_SECONDS, number) for number in range(len(parts))

@@ -122,9 +122,12 @@ def held(explicit: FloatArray, implicit: FloatArray, mobility: FloatArray) -> Fl
     forces = [0.0] * len(explicit)
     wanted, taken, coupling = explicit.tolist(), implicit.tolist(), mobility.tolist()
     for _ in range(_SWEEPS):
+        before = forces.copy()
         for i, row in enumerate(coupling):
             others = sum(a * f for a, f in zip(row, forces, strict=True)) - row[i] * forces[i]
             forces[i] = max(0.0, (wanted[i] - taken[i] * others) / (1.0 + taken[i] * row[i]))
+        if forces == before:
+            break  # nothing changes any more
     return np.array(forces)
 
 

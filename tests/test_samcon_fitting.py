@@ -1,5 +1,7 @@
 """The fit of the balance feedback to a motion, and the angular momentum that its cost looks at."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from physics import character
@@ -61,16 +63,36 @@ def test_what_is_fitted_are_gains() -> None:
 def test_the_fit_is_the_same_on_two_processes_and_costs_what_it_says() -> None:
     told: list[float] = []
 
-    alone = fitted(PROBLEM, SETTINGS, 16, 1, lambda _, least: told.append(least))
-    together = fitted(PROBLEM, SETTINGS, 16, 2)
+    without = replace(PROBLEM, feedback={})
 
-    assert alone == together != dict(PROBLEM.feedback)
+    alone = fitted(without, SETTINGS, 16, 1, lambda _, least: told.append(least))
+    together = fitted(without, SETTINGS, 16, 2)
+
+    assert alone == together
     assert told == [mean_cost(PROBLEM, SETTINGS, alone)]
+    assert told[0] < mean_cost(PROBLEM, SETTINGS, {})
+
+
+def test_a_fit_never_ends_with_worse_gains_than_it_began_with() -> None:
+    best = fitted(PROBLEM, SETTINGS, 16, 1)
+    for _ in range(2):  # a fit of what was fitted tries other gains around it
+        better = fitted(replace(PROBLEM, feedback=best), SETTINGS, 16, 1)
+
+        costs = [mean_cost(PROBLEM, SETTINGS, gains) for gains in (better, best)]
+        assert costs[0] <= costs[1]
+        best = better
 
 
 @pytest.mark.parametrize(
     ("options", "reason"),
-    [(("--fit", "-1"), "--fit is -1"), (("--fit", "16", "--open-loop"), "--open-loop is without")],
+    [
+        (("--fit", "-1"), "--fit is -1"),
+        (("--fit", "16", "--open-loop"), "which --open-loop leaves out"),
+        (("--fit", "16", "--resume"), "--resume goes on with what was fitted before"),
+        (("--fit", "16", "--cluster", "localhost:1"), "not on a --cluster"),
+        (("--seed", "-1"), "seed is -1; it must be 0 to 4294967294"),
+        (("--seed", "4294967295"), "seed is 4294967295"),
+    ],
 )
 def test_a_wrong_fit_is_one_line(
     tmp_path_factory: pytest.TempPathFactory,

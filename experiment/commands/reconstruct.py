@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # it takes a second to import
 
 _SUFFIX = ".json"
 _CHARACTER = "humanoid"
-_SIMULATOR: dict[str, object] = {"rate": 240, "command_delay_ticks": 0}  # a run's own
+_SIMULATOR: dict[str, object] = {"rate": 240, "command_delay_ticks": 0}  # what `run` has by default
 
 
 def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -61,7 +61,11 @@ def _add_search(command: argparse.ArgumentParser) -> None:
         "--open-loop", action="store_true", help="without the balance feedback of the preset"
     )
     command.add_argument(
-        "--fit", type=int, default=0, metavar="N", help="fit the feedback first, in N runs (0)"
+        "--fit",
+        type=int,
+        default=0,
+        metavar="N",
+        help="fit the feedback first: try N gains, in sixteens, in two runs each (0)",
     )
     command.add_argument("--rate", type=int, default=240, metavar="HZ", help="control rate (240)")
     command.add_argument(
@@ -136,11 +140,8 @@ def _job(options: argparse.Namespace) -> "Job":
     workers = options.workers if options.workers is not None else os.cpu_count() or 1
     if workers < 1:
         raise ConfigurationError(f"--workers is {workers}; it must be 1 or more")
+    _check_fit(options)
     given = {name: getattr(options, name) for name in ("samples", "kept", "window", "seed")}
-    if options.open_loop and options.fit:
-        raise ConfigurationError("--fit is of the feedback, and --open-loop is without")
-    if options.fit < 0:
-        raise ConfigurationError(f"--fit is {options.fit}; it must be 0 or more")
     if options.open_loop:
         given["feedback"] = {}
     settings = preset(
@@ -156,6 +157,20 @@ def _job(options: argparse.Namespace) -> "Job":
         {"rate": options.rate, "command_delay_ticks": options.delay_ticks},
     )
     return Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
+
+
+def _check_fit(options: argparse.Namespace) -> None:
+    """Raise ConfigurationError where --fit cannot be used."""
+    if options.fit < 0:
+        raise ConfigurationError(f"--fit is {options.fit}; it must be 0 or more")
+    if not options.fit:
+        return
+    if options.open_loop:
+        raise ConfigurationError("--fit fits the feedback, which --open-loop leaves out")
+    if options.resume:
+        raise ConfigurationError("--fit begins anew; --resume goes on with what was fitted before")
+    if options.cluster:
+        raise ConfigurationError("--fit runs on this machine's processes, not on a --cluster")
 
 
 def _report(job: "Job", found: "Reconstruction") -> None:

@@ -1,14 +1,16 @@
 """Fits the balance feedback to a motion, so that it goes on for longest without corrections.
 
-CMA-ES over the gains, each tried in one run from the first state. The search then begins from a
+CMA-ES over the gains, each tried in two runs from the first state. The search then begins from a
 feedback with which what it looks ahead at holds for longer.
 
 Source: Hansen 2016, "The CMA Evolution Strategy: A Tutorial"; the package `cma` is its author's.
 Liu, van de Panne and Yin 2016, "Guided Learning of Control Graphs", fit such a feedback likewise.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from typing import TypeAlias
 
 import joblib
 import numpy as np
@@ -18,11 +20,21 @@ from experiment.samcon import cost
 from experiment.samcon.problem import Problem
 from experiment.samcon.rollout import Branch, Rollout
 from experiment.samcon.settings import Settings
-from experiment.samcon.workers import rollout_of
+from experiment.samcon.workers import (
+    forget,
+    leave_interrupts_to_the_parent,
+    processes,
+    rollout_of,
+)
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
 
-_POPULATION = 16
+Gains: TypeAlias = dict[str, float]
+"""Gains of the feedback by name."""
+
+POPULATION = 16
+"""Gains are tried so many at a time."""
+
 _STEP = 0.16  # of the gains at first, times how large each of them usually is
 _USUAL = {"centre_vx": 0.2, "centre_vy": 0.2, "centre_vz": 0.2, "one": 0.1, "side": 0.1}
 _SPIN = 0.2
@@ -62,13 +74,13 @@ def names() -> tuple[str, ...]:
 def fitted(
     problem: Problem,
     settings: Settings,
-    runs: int,
+    count: int,
     workers: int,
     report: Callable[[int, float], None] = lambda *_: None,
-) -> dict[str, float]:
-    """Gains by name that cost least in so many runs, more or less; from the problem's own on.
+) -> Gains:
+    """The gains that cost least of `count`, rounded up to whole populations, and the problem's own.
 
-    `report` is told how many there were, and the least mean cost of a window so far. The result
+    `report` is told how many were tried, and the least mean cost of a window so far. The result
     does not depend on the number of processes.
 
     Raises:
@@ -83,15 +95,16 @@ def fitted(
     found = tuple(dict.fromkeys((*names(), *problem.feedback)))
     usual = np.array([_usual(name) for name in found])
     first = np.array([problem.feedback.get(name, 0.0) for name in found]) / usual
-    best, least = dict(problem.feedback), np.inf
-    options = {"popsize": _POPULATION, "seed": settings.seed, "verbose": -9}
+    best = dict(problem.feedback)
+    # its own generator takes the seed 0 for none
+    options = {"popsize": POPULATION, "seed": settings.seed + 1, "verbose": -9}
     evolution = cma.CMAEvolutionStrategy(first, _STEP, options)
-    with joblib.Parallel(n_jobs=workers, batch_size=1) as parallel:
-        for done in range(_POPULATION, runs + _POPULATION, _POPULATION):
+    with _costs_of(problem, settings, workers) as costs_of:
+        (least,) = costs_of([best])
+        for done in range(POPULATION, count + POPULATION, POPULATION):
             points = evolution.ask()
             tried = [_gains(found, point * usual) for point in points]
-            work = (joblib.delayed(mean_cost)(problem, settings, gains) for gains in tried)
-            costs = list(parallel(work))
+            costs = costs_of(tried)
             shrink = [_SHRINK * float(np.sum((point - first) ** 2)) for point in points]
             evolution.tell(points, [sum(pair) for pair in zip(costs, shrink, strict=True)])
             index = int(np.argmin(costs))
@@ -101,12 +114,43 @@ def fitted(
     return best
 
 
+@contextmanager
+def _costs_of(
+    problem: Problem, settings: Settings, workers: int
+) -> Iterator[Callable[[Sequence[Gains]], list[float]]]:
+    """What tells the mean costs of gains, in order, by so many processes; 1 is this one."""
+
+    def alone(tried: Sequence[Gains]) -> list[float]:
+        return [mean_cost(problem, settings, gains) for gains in tried]
+
+    if workers == 1:
+        try:
+            yield alone
+        finally:
+            forget(_without_feedback(problem))
+        return
+    with processes(workers) as parallel:
+        yield lambda tried: list(
+            parallel(joblib.delayed(_cost_in_process)(problem, settings, gains) for gains in tried)
+        )
+
+
+def _cost_in_process(problem: Problem, settings: Settings, gains: Gains) -> float:
+    leave_interrupts_to_the_parent()
+    return mean_cost(problem, settings, gains)
+
+
+def _without_feedback(problem: Problem) -> Problem:
+    """What the engines are made for, lest another one is made for each gains."""
+    return replace(problem, feedback={})
+
+
 def mean_cost(problem: Problem, settings: Settings, gains: Mapping[str, float]) -> float:
     """The mean cost of the windows of runs without corrections but nudges in the first window.
 
     The nudges keep the feedback from balancing on a knife's edge.
     """
-    rollout = rollout_of(replace(problem, feedback={}))
+    rollout = rollout_of(_without_feedback(problem))
     rollout.respond(gains)
     count, nothing = len(rollout.windows), np.zeros(rollout.layout.size)
     rng = np.random.default_rng(settings.seed)
@@ -139,7 +183,7 @@ def _usual(name: str) -> float:
     return _USUAL.get(feature, _SPIN if feature.startswith("spin") else 1.0)
 
 
-def _gains(found: tuple[str, ...], values: FloatArray) -> dict[str, float]:
+def _gains(found: tuple[str, ...], values: FloatArray) -> Gains:
     return {
         name: float(f"{value:.{_DIGITS}g}")
         for name, value in zip(found, values.tolist(), strict=True)

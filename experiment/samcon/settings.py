@@ -10,6 +10,7 @@ import yaml
 from controller_node.feedback_gains import checked_gains
 from msgs_config.errors import ConfigurationError, one_of
 
+_LARGEST_SEED = 2**32 - 2  # one more has still to be a seed of numpy
 PRESETS = Path(__file__).with_name("presets.yaml")
 
 
@@ -94,9 +95,10 @@ def settings_from(content: Mapping[str, Any]) -> Settings:
         if isinstance(values.get(name), Mapping):
             values[name] = replace(kind(), **values[name])
     values["feedback"] = checked_gains(values.get("feedback", {}))
-    values["gains"] = {name: float(gain) for name, gain in values.get("gains", {}).items()}
+    values["gains"] = _numbers(values.get("gains", {}))
     settings = Settings(**values)
     for name, least, most in (
+        ("seed", 0, _LARGEST_SEED),
         ("samples", 1, 1_000_000),
         ("kept", 1, 100_000),
         ("tries", 1, 1000),
@@ -111,3 +113,13 @@ def settings_from(content: Mapping[str, Any]) -> Settings:
     if not 0.0 < settings.window <= 10.0:
         raise ConfigurationError(f"window is {settings.window} s; it must be above 0, at most 10 s")
     return settings
+
+
+def _numbers(gains: object) -> dict[str, float]:
+    """Gains by the names of the controller's parameters; which there are, the plan checks."""
+    if not isinstance(gains, Mapping):
+        raise ConfigurationError(f"gains is {gains!r}; it must be a mapping of names to numbers")
+    for name, gain in gains.items():
+        if isinstance(gain, bool) or not isinstance(gain, int | float):
+            raise ConfigurationError(f"{name} is {gain!r}; it must be a number")
+    return {str(name): float(gain) for name, gain in gains.items()}

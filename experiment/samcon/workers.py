@@ -41,13 +41,7 @@ class Workers:
         self.count = count
         self._local = count == 1 and not cluster
         if not self._local:
-            backend = None if cluster else "loky"
-            self._open.enter_context(_quiet_managers())
-            self._parallel = self._open.enter_context(
-                joblib.Parallel(n_jobs=count, backend=backend, return_as="generator", batch_size=1)
-            )
-            if not cluster:
-                self._open.callback(_end_processes, count)
+            self._parallel = self._open.enter_context(processes(count, is_cluster=bool(cluster)))
 
     def __enter__(self) -> "Workers":
         return self
@@ -59,9 +53,7 @@ class Workers:
         trace: TracebackType | None,
     ) -> None:
         self._open.close()
-        rollout = _rollouts.pop(repr(self._problem), None)
-        if rollout is not None:
-            rollout.close()
+        forget(self._problem)
 
     def expand(self, branches: Sequence[Branch]) -> Iterator[Expansion]:
         """The expansions of branches, in their order, as they come.
@@ -89,10 +81,35 @@ def rollout_of(problem: Problem) -> Rollout:
     return _rollouts[key]
 
 
-def _expand(problem: Problem, branches: Sequence[Branch]) -> list[Expansion]:
-    """What a worker's process does; Ctrl-C is for the process that started it."""
+def forget(problem: Problem) -> None:
+    """Close this process's engine for a problem, if there is one."""
+    rollout = _rollouts.pop(repr(problem), None)
+    if rollout is not None:
+        rollout.close()
+
+
+@contextmanager
+def processes(count: int, *, is_cluster: bool = False) -> Iterator[joblib.Parallel]:
+    """So many processes, which end with the `with` block; those of a cluster do not."""
+    backend = None if is_cluster else "loky"
+    parallel = joblib.Parallel(n_jobs=count, backend=backend, return_as="generator", batch_size=1)
+    with _quiet_managers(), parallel as opened:
+        try:
+            yield opened
+        finally:
+            if not is_cluster:
+                get_reusable_executor(max_workers=count).shutdown(wait=True, kill_workers=True)
+
+
+def leave_interrupts_to_the_parent() -> None:
+    """To be called in a worker's process: Ctrl-C is for the process that started it."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _expand(problem: Problem, branches: Sequence[Branch]) -> list[Expansion]:
+    """What a worker's process does."""
+    leave_interrupts_to_the_parent()
     with _one_at_a_time:  # a cluster's worker may have several threads
         rollout = rollout_of(problem)
         return [rollout.expand(branch) for branch in branches]
@@ -125,10 +142,6 @@ def _quiet_managers() -> Iterator[None]:
         yield
     finally:
         threading.excepthook = before
-
-
-def _end_processes(count: int) -> None:
-    get_reusable_executor(max_workers=count).shutdown(wait=True, kill_workers=True)
 
 
 def _join_cluster(stack: ExitStack, address: str) -> int:
