@@ -120,4 +120,4 @@ class _FarSide(Node):
 
 if __name__ == "__main__":
     limit_threads()
-    sys.exit(run_node(lambda: _FarSide))
+    run_node(lambda: _FarSide)

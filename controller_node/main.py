@@ -1,15 +1,15 @@
 """The executable `controller_node`."""
 
-import sys
 from collections.abc import Callable
+from typing import NoReturn
 
 from msgs_config.process import RunnableNode, limit_threads, run_node
 
 
-def main() -> int:
-    """Run the controller until a signal; returns the exit code."""
+def main() -> NoReturn:
+    """Run the controller until a signal."""
     limit_threads()
-    return run_node(_load)
+    run_node(_load)
 
 
 def _load() -> Callable[[], RunnableNode]:
@@ -19,4 +19,4 @@ def _load() -> Callable[[], RunnableNode]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -37,7 +37,9 @@ class PdController(Node):
 
 rclpy.init()
 try:
-    rclpy.spin(PdController())
+    node = PdController()
+    while rclpy.ok():
+        rclpy.spin_once(node, timeout_sec=0.5)  # rclpy.spin may sleep through a SIGTERM
 except (KeyboardInterrupt, ExternalShutdownException):
     pass
 finally:

@@ -128,7 +128,8 @@ def main():
     rclpy.init()
     try:
         pusher = Pusher(arguments)
-        rclpy.spin_until_future_complete(pusher, pusher.over)
+        while rclpy.ok() and not pusher.over.done():  # a wait without end may miss a SIGTERM
+            rclpy.spin_until_future_complete(pusher, pusher.over, timeout_sec=0.5)
         return pusher.report() if pusher.over.done() else 1
     except (KeyboardInterrupt, ExternalShutdownException):
         return 1

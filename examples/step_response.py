@@ -99,7 +99,8 @@ def main():
     rclpy.init()
     try:
         node = StepResponse(*gains)
-        rclpy.spin_until_future_complete(node, node.done)
+        while rclpy.ok() and not node.done.done():  # a wait without end may miss a SIGTERM
+            rclpy.spin_until_future_complete(node, node.done, timeout_sec=0.5)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 1
     finally:

@@ -103,7 +103,9 @@ parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("--part", choices=GOALS, required=True, help="the joints to control")
 rclpy.init()
 try:
-    rclpy.spin(PartController(parser.parse_args(remove_ros_args()[1:]).part))
+    node = PartController(parser.parse_args(remove_ros_args()[1:]).part)
+    while rclpy.ok():
+        rclpy.spin_once(node, timeout_sec=0.5)  # rclpy.spin may sleep through a SIGTERM
 except (KeyboardInterrupt, ExternalShutdownException):
     pass
 finally:

@@ -1,16 +1,16 @@
 """The executable `recorder`."""
 
-import sys
 from collections.abc import Callable
+from typing import NoReturn
 
 from msgs_config.process import RunnableNode, limit_threads, run_node, stand_back
 
 
-def main() -> int:
-    """Run the recorder until a signal; returns the exit code."""
+def main() -> NoReturn:
+    """Run the recorder until a signal."""
     limit_threads()
     stand_back()
-    return run_node(_load)
+    run_node(_load)
 
 
 def _load() -> Callable[[], RunnableNode]:
@@ -20,4 +20,4 @@ def _load() -> Callable[[], RunnableNode]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

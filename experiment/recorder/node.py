@@ -98,14 +98,15 @@ class RecorderNode(Node):
         due = {self._search: 0.0, self._flush: 0.0, self._tell_progress: 0.0}
         try:
             while not stop:
-                self._drain()
+                self._drain(time.time_ns())
                 spinner.serve()
                 now = time.monotonic()
                 for act, at in due.items():
                     if at <= now:
                         due[act] = now + act()
                 time.sleep(_DRAIN_PERIOD)
-            while self._drain():
+            stopped_ns = time.time_ns()
+            while self._drain(stopped_ns):
                 pass
         finally:
             spinner.close()
@@ -143,18 +144,21 @@ class RecorderNode(Node):
         """The last tick of which every character's state has come."""
         return min(listener.last_tick for listener in self._listeners.values())
 
-    def _drain(self) -> int:
-        """Take all messages that are there, in the order in which they were published."""
+    def _drain(self, until_ns: int) -> bool:
+        """Take the messages that are there, in the order in which they were published.
+
+        Returns whether any of them was published by a wall time in ns: others may be on their way.
+        """
         batch = [
             (published_ns, inbox.recorded, raw)
             for inbox in self._inboxes
-            for published_ns, raw in inbox.take_all()
+            for published_ns, raw in inbox.take_until(until_ns)
         ]
         batch.sort(key=lambda message: message[0])
         for published_ns, recorded, raw in batch:
             self._keep(recorded, raw, published_ns)
             os.sched_yield()  # who works in the loop goes first
-        return len(batch)
+        return bool(batch) and batch[0][0] <= until_ns
 
     def _keep(self, recorded: RecordedTopic, raw: bytes, published_ns: int) -> None:
         try:

@@ -2,16 +2,17 @@
 
 import sys
 from collections.abc import Callable
+from typing import NoReturn
 
 from msgs_config.process import RunnableNode, limit_threads, run_node
 
 COMMANDS, STATES = "commands", "states"
 
 
-def main() -> int:
-    """Run a player until it has played; returns the exit code."""
+def main() -> NoReturn:
+    """Run a player until it has played."""
     limit_threads()
-    return run_node(_load_commands if sys.argv.pop(1) == COMMANDS else _load_states)
+    run_node(_load_commands if sys.argv.pop(1) == COMMANDS else _load_states)
 
 
 def _load_commands() -> Callable[[], RunnableNode]:
@@ -27,4 +28,4 @@ def _load_states() -> Callable[[], RunnableNode]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
