@@ -139,7 +139,12 @@ def test_the_nodes_start_with_a_file_and_run(
     spaces = [node.removesuffix(CONTROLLER)[1:] for node in controllers(file)]
     states = [client.listen(topics.JOINT_STATES.under(space)) for space in spaces]
 
-    nodes = [start(processes, file, node) for node in NODES[file]]
+    # the simulators last: they say it where they wait for long
+    nodes = [start(processes, file, node) for node in controllers(file)]
+    torques = [topics.JOINT_TORQUES.under(space).name for space in spaces]
+    client.spin_until(lambda: all(map(client.node.count_publishers, torques)), "controllers")
+    others = [node for node in NODES[file] if node not in controllers(file)]
+    nodes += [start(processes, file, node) for node in others]
 
     client.spin_until(lambda: all(map(have_been_answered, states)), "states that were answered")
     assert [node.exit_code for node in nodes] == [None] * len(nodes)

@@ -1,10 +1,10 @@
 """A reconstruction played over topics: real nodes, the same doubles."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import yaml
 
 from experiment.cli import main
 from experiment.samcon.problem import Problem
@@ -14,29 +14,72 @@ from experiment.samcon.settings import preset
 DURATION = 0.3  # s
 
 
+def job(file: Path, simulator: dict[str, object]) -> Job:
+    """A short search, with a feedback and gains of its own."""
+    settings = preset("humanoid", "kick", samples=8, kept=2, lookahead=0)
+    assert any(settings.feedback.values())
+    assert settings.gains
+    return Job(Problem.of("humanoid", "kick", DURATION, settings, simulator), 1, settings, file)
+
+
 @pytest.mark.parametrize(("rate", "delay"), [(240, 0), (480, 1)])
 def test_over_topics_it_is_what_was_found_bit_for_bit(
     domain: int, tmp_path: Path, rate: int, delay: int
 ) -> None:
     del domain
-    settings = replace(preset("humanoid", "walk", samples=8, kept=2), lookahead=0)
-    simulator = {"rate": rate, "command_delay_ticks": delay}
-    problem = Problem("humanoid", "walk", DURATION, 0.1, simulator, feedback=settings.feedback)
-    file, directory = tmp_path / "walk.json", tmp_path / "run"
-    found = reconstruct(Job(problem, 1, settings, file))
+    file, directory = tmp_path / "kick.json", tmp_path / "run"
+    found = reconstruct(job(file, {"rate": rate, "command_delay_ticks": delay}))
 
-    code = main(
-        [
-            *("run", "--clip", str(file), "--duration", f"{DURATION}"),
-            *("--set", "controller_node.root_assistance:=false", "--output", str(directory)),
-            *("--set", f"sim_node.rate:={rate}"),
-            *("--set", f"sim_node.command_delay_ticks:={delay}"),
-        ]
-    )
+    code = main(["run", "--clip", str(file), "--output", str(directory)])
 
     summary = json.loads((directory / "summary.json").read_text())
     assert code == 0
-    assert any(settings.feedback.values())
     assert summary["ticks"] == round(DURATION * rate) == found.figures.ticks
     assert summary["actuators"] == summary["degrees_of_freedom"] - 6
     assert summary["state_hash"] == found.figures.state_hash
+    assert main(["replay", str(directory)]) == 0
+
+
+def test_what_a_file_was_found_with_goes_behind_what_is_set(tmp_path: Path) -> None:
+    file, directory = tmp_path / "kick.json", tmp_path / "run"
+    reconstruct(job(file, {"rate": 480, "command_delay_ticks": 1}))
+    given = ["--set", "controller_node.rate:=240", "--set", "controller_node.gains.left_knee.d:=9"]
+
+    code = main(
+        [
+            *("run", "--clip", str(file), "--duration", "0.1", "--in-process", *given),
+            *("--output", str(directory)),
+        ]
+    )
+
+    parameters = {
+        name: yaml.safe_load((directory / "parameters" / f"{name}.yaml").read_text())
+        for name in ("sim_node", "controller_node")
+    }
+    simulator, controller = (next(iter(content.values())) for content in parameters.values())
+    simulator, controller = simulator["ros__parameters"], controller["ros__parameters"]
+    assert code == 0
+    assert (simulator["rate"], simulator["command_delay_ticks"]) == (240, 1)
+    assert simulator["max_ticks"] == 24
+    assert controller["gains.left_knee.d"] == 9.0
+    assert controller["gains.right_knee.d"] == 25.0
+    assert controller["root_assistance"] is False
+
+
+@pytest.mark.parametrize(
+    "made", [{}, {"duration": "long"}, {"duration": 1.0, "parameters": {"sim_node": {}}}]
+)
+def test_a_file_that_does_not_say_how_it_was_found_is_refused(
+    tmp_path: Path, made: dict[str, object], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "kick.json"
+    reconstruct(job(file, {}))
+    content = json.loads(file.read_text())
+    content["Reconstruction"] = made
+    file.write_text(json.dumps(content))
+
+    code = main(["run", "--clip", str(file), "--output", str(tmp_path / "run")])
+
+    assert code == 1
+    assert "Reconstruction must have 'duration', and 'parameters'" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()

@@ -10,6 +10,7 @@ tracked depends on it.
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,40 @@ def read_feedback(character: Character, name_or_path: str) -> dict[str, float]:
         return checked_gains(gains)
     except ConfigurationError as error:
         raise ClipError(f"{path}: {FEEDBACK}: {error}") from error
+
+
+@dataclass(frozen=True)
+class FoundWith:
+    """The run in which a corrected motion was found; in any other one it is another motion."""
+
+    duration: float  # s
+    simulator: Mapping[str, object]  # parameters of `sim_node`, by name
+    controller: Mapping[str, object]  # of `controller_node`
+
+
+def read_found_with(character: Character, name_or_path: str) -> FoundWith | None:
+    """The run that a clip's file was found with, None if it does not say.
+
+    Raises:
+        ClipError: there is no such clip, or what it says is malformed.
+    """
+    if not name_or_path.endswith(SUFFIX):
+        return None
+    path = clip_path(character, name_or_path)
+    made = _content(path).get(RECONSTRUCTION)
+    if made is None:
+        return None
+    try:
+        sides = made["parameters"]
+        found = FoundWith(
+            float(made["duration"]), dict(sides["sim_node"]), dict(sides["controller_node"])
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise ClipError(
+            f"{path}: {RECONSTRUCTION} must have 'duration', and 'parameters' of sim_node and of "
+            "controller_node"
+        ) from error
+    return found
 
 
 def read_reconstruction(path: Path) -> dict[str, Any]:

@@ -20,7 +20,6 @@ if TYPE_CHECKING:  # it takes a second to import
 
 _SUFFIX = ".json"
 _CHARACTER = "humanoid"
-_SIMULATOR: dict[str, object] = {"rate": 240, "command_delay_ticks": 0}  # what `run` has by default
 
 
 def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -31,7 +30,7 @@ def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParse
         description=(
             "Search corrections of a motion clip with which the character does it without root "
             "assistance (sampling-based motion control, Liu et al. 2010). The result is a clip "
-            "file: play it with `run --clip FILE --set controller_node.root_assistance:=false`."
+            "file with the parameters of its run: play it with `run --clip FILE`."
         ),
         epilog="example: actuated_characters reconstruct --clip walk --cycles 4 --output walk.json",
     )
@@ -195,16 +194,8 @@ def _report(job: "Job", found: "Reconstruction") -> None:
 
 
 def _play_command(job: "Job") -> str:
-    """How to have the file played: with the same parameters as it was found with."""
-    parameters: dict[str, object] = {"controller_node.root_assistance": "false"}
-    for name, value in job.problem.controller.items():
-        parameters[f"controller_node.{name}"] = value
-    for name, value in job.problem.simulator.items():
-        if value != _SIMULATOR[name]:
-            parameters[f"sim_node.{name}"] = value
-    options = [f"--set {name}:={value}" for name, value in parameters.items()]
-    duration = f"{job.problem.duration:.6f}"
-    command = f"actuated_characters run --clip {shlex.quote(str(job.output))} --duration {duration}"
+    """How to have the file played, which brings the parameters that it was found with."""
+    command = f"actuated_characters run --clip {shlex.quote(str(job.output))}"
     if job.problem.character != _CHARACTER:
-        options.insert(0, f"--character {shlex.quote(job.problem.character)}")
-    return " ".join((command, *options))
+        command += f" --character {shlex.quote(job.problem.character)}"
+    return command

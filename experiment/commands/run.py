@@ -30,6 +30,9 @@ _RECORDING = {  # options, and the recorder's parameters
 }
 
 
+_DURATION = 10.0  # s
+
+
 def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command to those of `actuated_characters`."""
     run = commands.add_parser(
@@ -54,9 +57,8 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
     run.add_argument(
         "--duration",
         type=float,
-        default=10.0,
         metavar="S",
-        help="simulated time in s (%(default)g)",
+        help=f"simulated time in s ({_DURATION:g}, or that of a reconstruction)",
     )
     run.add_argument(
         "--output", type=Path, metavar="DIR", help="where the results go (runs/CHARACTER-MOTION)"
@@ -95,7 +97,11 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
 def _add_tracked(run: argparse.ArgumentParser) -> None:
     """Add the options that say what is tracked."""
     tracked = run.add_mutually_exclusive_group()
-    tracked.add_argument("--clip", help="track this motion clip: a name or a file")
+    tracked.add_argument(
+        "--clip",
+        help="track this motion clip: a name or a file. One by `reconstruct` brings the "
+        "parameters that it was found with; what --set says goes before",
+    )
     tracked.add_argument(
         "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
     )
@@ -164,9 +170,9 @@ def _checked_plan(
     from experiment.plan import make_plan
     from sim_node.parameters import tick_period
 
-    plan = make_plan(
-        options.character, options.duration, _reference(options), simulator, controller
-    )
+    found_in = _bring_parameters(options, simulator, controller)
+    duration = options.duration if options.duration is not None else found_in or _DURATION
+    plan = make_plan(options.character, duration, _reference(options), simulator, controller)
     if options.in_process and tick_period(plan.simulator):
         raise ConfigurationError(
             "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
@@ -180,6 +186,24 @@ def _checked_plan(
     for name in options.exclude or ():
         _check_excludable(name)
     return plan
+
+
+def _bring_parameters(
+    options: argparse.Namespace, simulator: dict[str, object], controller: dict[str, object]
+) -> float | None:
+    """Set what a reconstruction was found with, unless it is set; returns its length in s."""
+    from controller_node.references.corrected_file import read_found_with
+    from msgs_config.character_loading import load_character
+
+    if options.clip is None:
+        return None
+    found = read_found_with(load_character(options.character), options.clip)
+    if found is None:
+        return None
+    given = {**simulator, **controller}  # what both sides have is the same
+    for settings, brought in ((simulator, found.simulator), (controller, found.controller)):
+        settings.update({name: brought[name] for name in brought if name not in given})
+    return found.duration
 
 
 def _check_excludable(name: str) -> None:
