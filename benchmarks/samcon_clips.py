@@ -24,17 +24,10 @@ from experiment.samcon.settings import preset  # noqa: E402
 from experiment.samcon.verification import Figures  # noqa: E402
 from msgs_config.errors import RunError  # noqa: E402
 
-CYCLES = {  # of each clip
-    "walk": 4,
-    "run": 4,
-    "jump": 1,
-    "kick": 1,
-    "cartwheel": 1,
-    "roll": 1,
-    "spin": 1,
-    "spinkick": 1,
-    "dance_a": 1,
-}
+CLIPS = [
+    *("walk", "walk:2", "walk:4", "run", "run:2", "jump", "kick"),
+    *("cartwheel", "roll", "spin", "spinkick", "dance_a"),
+]
 CENTRE_ERROR, JOINT_ERROR = 0.15, 0.30  # m, rad; what counts as done is not farther away
 
 
@@ -59,7 +52,9 @@ class Attempt:
 def main() -> int:
     """Reconstruct clips with some seeds, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("clips", nargs="*", default=list(CYCLES), help="(all)")
+    parser.add_argument(
+        "clips", nargs="*", default=CLIPS, help=f"or CLIP:CYCLES ({' '.join(CLIPS)})"
+    )
     parser.add_argument("--seeds", type=int, default=5, help="(%(default)s)")
     parser.add_argument("--samples", type=int, default=1000, help="a window (%(default)s)")
     parser.add_argument("--workers", type=int, default=1, help="processes (%(default)s)")
@@ -71,21 +66,24 @@ def main() -> int:
     for clip in options.clips:
         attempts = []
         for seed in range(1, options.seeds + 1):
-            attempts.append(_attempt(clip, seed, options.samples, options.workers))
+            name, _, cycles = clip.partition(":")
+            attempts.append(
+                _attempt(name, int(cycles or 1), seed, options.samples, options.workers)
+            )
             console.print(f"{clip}, seed {seed}: {attempts[-1]}")
         table.add_row(clip, *_row(attempts))
     console.print(table)
     return 0
 
 
-def _attempt(clip: str, seed: int, samples: int, workers: int) -> Attempt:
+def _attempt(clip: str, cycles: int, seed: int, samples: int, workers: int) -> Attempt:
     settings = preset("humanoid", clip, samples=samples, seed=seed)
-    duration = duration_of("humanoid", clip, CYCLES.get(clip, 1))
+    duration = duration_of("humanoid", clip, cycles)
     problem = Problem.of("humanoid", clip, duration, settings)
     with tempfile.TemporaryDirectory() as directory:
         output = Path(directory) / "motion.json"
         try:
-            found = reconstruct(Job(problem, CYCLES.get(clip, 1), settings, output, workers))
+            found = reconstruct(Job(problem, cycles, settings, output, workers))
         except RunError:
             costs = read_reconstruction(output)["costs"]
             return Attempt(None, len(costs) * settings.window / duration)

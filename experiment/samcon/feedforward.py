@@ -17,6 +17,7 @@ from controller_node.references.base import Reference
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from sim_node.mass_matrix import yielding
 
 _APART = 0.05  # s from a time, between which its acceleration is measured: clips have 30 frames/s
 _DOWN, _UP = 0.07, 0.15  # m of a foot's origin, at which it bears all of its share, and nothing
@@ -79,5 +80,6 @@ class Feedforward:
         weights = np.multiply.outer(shares, kinds).ravel()
         roots = jacobians[:, :6]
         mobility = np.einsum("wi,w,wj->ij", roots, weights, roots) + _SLIGHT * np.eye(6)
-        wrenches = weights * rotations.apply(roots, np.linalg.solve(mobility, needed))
+        rows = np.vstack((weights[:, np.newaxis] * roots, needed))
+        wrenches = yielding(mobility, rows)[:-1, -1]  # a LAPACK's last bits are the processor's
         return rotations.apply(jacobians.T, wrenches)
