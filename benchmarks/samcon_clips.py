@@ -63,17 +63,22 @@ def main() -> int:
     table = Table(title=f"{options.samples} samples a window", title_justify="left")
     for column in ("clip", "done", "to its end", "reached", "centre, m", "joints, rad"):
         table.add_column(column, justify="right" if column != "clip" else "left")
-    for clip in options.clips:
+    for clip, (name, cycles) in [(clip, _parsed(clip)) for clip in options.clips]:
         attempts = []
         for seed in range(1, options.seeds + 1):
-            name, _, cycles = clip.partition(":")
-            attempts.append(
-                _attempt(name, int(cycles or 1), seed, options.samples, options.workers)
-            )
+            attempts.append(_attempt(name, cycles, seed, options.samples, options.workers))
             console.print(f"{clip}, seed {seed}: {attempts[-1]}")
         table.add_row(clip, *_row(attempts))
     console.print(table)
     return 0
+
+
+def _parsed(clip: str) -> tuple[str, int]:
+    """The name and the cycles that CLIP or CLIP:CYCLES says."""
+    name, _, cycles = clip.partition(":")
+    if cycles and not cycles.isdecimal():
+        raise SystemExit(f"{clip}: write it as CLIP or CLIP:CYCLES, such as walk:4")
+    return name, int(cycles or 1)
 
 
 def _attempt(clip: str, cycles: int, seed: int, samples: int, workers: int) -> Attempt:

@@ -20,7 +20,7 @@ from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
 from sim_node.probe import measure_probe
 
-_SHARED = ("rate", "gravity", "placement")  # the same on both sides; set on one, they count on both
+SHARED = ("rate", "gravity", "placement")  # the same on both sides; set on one, they count on both
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
@@ -115,9 +115,7 @@ def _check_engines(character: Character, gravity: float) -> None:
 def _shared(
     simulator: Mapping[str, object], controller: Mapping[str, object]
 ) -> tuple[dict[str, object], dict[str, object]]:
-    both = {
-        name: side[name] for side in (controller, simulator) for name in _SHARED if name in side
-    }
+    both = {name: side[name] for side in (controller, simulator) for name in SHARED if name in side}
     for name, value in both.items():
         for side in (simulator, controller):
             if side.get(name, value) != value:

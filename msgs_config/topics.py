@@ -31,7 +31,7 @@ STREAM_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
-_LISTENING_DEPTH = 50_000
+LISTENING_DEPTH = 50_000
 """What a reader keeps for a process that is busy otherwise, with a disk for instance, for long.
 
 It costs nothing until it is needed, unlike a publisher's."""
@@ -79,7 +79,7 @@ class Topic:
         """The topic for who must not miss anything, however seldom it takes what has come."""
         qos = QoSProfile(
             history=HistoryPolicy.KEEP_LAST,
-            depth=_LISTENING_DEPTH,
+            depth=LISTENING_DEPTH,
             reliability=self.qos.reliability,
             durability=self.qos.durability,
         )

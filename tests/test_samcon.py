@@ -211,6 +211,14 @@ def test_a_clips_feedback_is_its_own() -> None:
     assert preset("humanoid", "walk", feedback={}).feedback == {}
 
 
+def test_a_control_rate_may_have_settings_of_its_own() -> None:
+    walk, faster = preset("humanoid", "walk"), preset("humanoid", "walk", 480)
+
+    assert preset("humanoid", "walk", 240) == walk
+    assert faster.gains != walk.gains
+    assert preset("humanoid", "kick", 480) == preset("humanoid", "kick")
+
+
 def test_settings_are_what_their_content_says() -> None:
     content = json.loads(json.dumps(SMALL.content()))
 

@@ -10,6 +10,7 @@ from experiment.cli import main
 from experiment.samcon.problem import Problem
 from experiment.samcon.reconstruction import Job, reconstruct
 from experiment.samcon.settings import preset
+from msgs_config.character_loading import load_character
 
 DURATION = 0.3  # s
 
@@ -66,20 +67,69 @@ def test_what_a_file_was_found_with_goes_behind_what_is_set(tmp_path: Path) -> N
     assert controller["root_assistance"] is False
 
 
+@pytest.fixture(scope="module")
+def kick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A reconstruction's file."""
+    file = tmp_path_factory.mktemp("kick") / "kick.json"
+    reconstruct(job(file, {}))
+    return file
+
+
+def changed(kick: Path, tmp_path: Path, **made: object) -> Path:
+    """The file, with other things said of how it was found."""
+    content = json.loads(kick.read_text())
+    content["Reconstruction"].update(made)
+    file = tmp_path / "kick.json"
+    file.write_text(json.dumps(content))
+    return file
+
+
+def simulated(file: Path, directory: Path, *options: str) -> dict[str, object]:
+    """The simulator's parameters of a file's run in one process."""
+    run = ("run", "--clip", str(file), "--in-process", "--output", str(directory))
+    assert main([*run, *options]) == 0
+    (written,) = yaml.safe_load((directory / "parameters" / "sim_node.yaml").read_text()).values()
+    parameters: dict[str, object] = written["ros__parameters"]
+    return parameters
+
+
+def test_an_unfinished_one_is_run_as_far_as_it_was_found(kick: Path, tmp_path: Path) -> None:
+    file = changed(kick, tmp_path, duration=100.0, complete=False)
+
+    assert simulated(file, tmp_path / "run")["max_ticks"] == round(DURATION * 240)
+
+
+def test_joints_that_are_commanded_decide_on_the_roots_assistance(
+    kick: Path, tmp_path: Path
+) -> None:
+    joints = load_character("humanoid").layout.joint_names
+    given = f"sim_node.commanded_joints:=[{', '.join(joints)}]"
+
+    found = simulated(kick, tmp_path / "run", "--set", given)
+
+    assert found["commanded_joints"] == list(joints)
+
+
 @pytest.mark.parametrize(
-    "made", [{}, {"duration": "long"}, {"duration": 1.0, "parameters": {"sim_node": {}}}]
+    ("made", "reason"),
+    [
+        ({"duration": "long"}, "Reconstruction must have 'duration', 'complete', and '"),
+        ({"duration": 10**400}, "Reconstruction must have 'duration'"),
+        ({"parameters": {"sim_node": {}}}, "Reconstruction must have 'duration'"),
+        ({"duration": 0.0}, "duration is 0.0 s"),
+    ],
 )
 def test_a_file_that_does_not_say_how_it_was_found_is_refused(
-    tmp_path: Path, made: dict[str, object], capsys: pytest.CaptureFixture[str]
+    kick: Path,
+    tmp_path: Path,
+    made: dict[str, object],
+    reason: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    file = tmp_path / "kick.json"
-    reconstruct(job(file, {}))
-    content = json.loads(file.read_text())
-    content["Reconstruction"] = made
-    file.write_text(json.dumps(content))
+    file = changed(kick, tmp_path, **made)
 
     code = main(["run", "--clip", str(file), "--output", str(tmp_path / "run")])
 
     assert code == 1
-    assert "Reconstruction must have 'duration', and 'parameters'" in capsys.readouterr().err
+    assert reason in capsys.readouterr().err
     assert not (tmp_path / "run").exists()

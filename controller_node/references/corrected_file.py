@@ -3,8 +3,8 @@
 `Loop` and `Frames` are those of the clip (`clip_file.py`), so that whatever reads clips reads the
 motion. `Corrections` has the names of the degrees of freedom corrected (`dofs`), the ends of the
 windows in s (`ends`) and a row of offsets for each of them, rad or m (`offsets`). `Feedback` has
-gains by name (`feedback_gains.py`). What made the file stands in `Reconstruction`; nothing that is
-tracked depends on it.
+gains by name (`feedback_gains.py`). What made the file stands in `Reconstruction`; what is tracked
+does not depend on it, but a run takes its length and its parameters from there.
 """
 
 import json
@@ -68,7 +68,7 @@ def read_feedback(character: Character, name_or_path: str) -> dict[str, float]:
 class FoundWith:
     """The run in which a corrected motion was found; in any other one it is another motion."""
 
-    duration: float  # s
+    duration: float  # s, as far as it was found
     simulator: Mapping[str, object]  # parameters of `sim_node`, by name
     controller: Mapping[str, object]  # of `controller_node`
 
@@ -87,13 +87,14 @@ def read_found_with(character: Character, name_or_path: str) -> FoundWith | None
         return None
     try:
         sides = made["parameters"]
-        found = FoundWith(
-            float(made["duration"]), dict(sides["sim_node"]), dict(sides["controller_node"])
-        )
-    except (KeyError, TypeError, ValueError) as error:
+        duration = float(made["duration"])
+        if not made["complete"]:
+            duration = min(duration, float(max(_content(path)[CORRECTIONS]["ends"])))
+        found = FoundWith(duration, dict(sides["sim_node"]), dict(sides["controller_node"]))
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ClipError(
-            f"{path}: {RECONSTRUCTION} must have 'duration', and 'parameters' of sim_node and of "
-            "controller_node"
+            f"{path}: {RECONSTRUCTION} must have 'duration', 'complete', and 'parameters' of "
+            "sim_node and of controller_node"
         ) from error
     return found
 

@@ -146,6 +146,7 @@ def _job(options: argparse.Namespace) -> "Job":
     settings = preset(
         options.character,
         options.clip,
+        options.rate,
         **{name: value for name, value in given.items() if value is not None},
     )
     problem = Problem.of(

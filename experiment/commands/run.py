@@ -22,15 +22,13 @@ if TYPE_CHECKING:  # it takes a second to import
     from msgs_config.parameters import Values
 
 _NODES = ("sim_node", "controller_node")
+_DURATION = 10.0  # s
 _RECORDING = {  # options, and the recorder's parameters
     "storage": "storage",
     "compression": "compression",
     "topic": "topics",
     "exclude": "exclude",
 }
-
-
-_DURATION = 10.0  # s
 
 
 def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -100,7 +98,7 @@ def _add_tracked(run: argparse.ArgumentParser) -> None:
     tracked.add_argument(
         "--clip",
         help="track this motion clip: a name or a file. One by `reconstruct` brings the "
-        "parameters that it was found with; what --set says goes before",
+        "length and the parameters that it was found with; --duration and --set take precedence",
     )
     tracked.add_argument(
         "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
@@ -171,7 +169,9 @@ def _checked_plan(
     from sim_node.parameters import tick_period
 
     found_in = _bring_parameters(options, simulator, controller)
-    duration = options.duration if options.duration is not None else found_in or _DURATION
+    duration = _DURATION if found_in is None else found_in
+    if options.duration is not None:
+        duration = options.duration
     plan = make_plan(options.character, duration, _reference(options), simulator, controller)
     if options.in_process and tick_period(plan.simulator):
         raise ConfigurationError(
@@ -193,6 +193,7 @@ def _bring_parameters(
 ) -> float | None:
     """Set what a reconstruction was found with, unless it is set; returns its length in s."""
     from controller_node.references.corrected_file import read_found_with
+    from experiment.plan import SHARED
     from msgs_config.character_loading import load_character
 
     if options.clip is None:
@@ -200,9 +201,13 @@ def _bring_parameters(
     found = read_found_with(load_character(options.character), options.clip)
     if found is None:
         return None
-    given = {**simulator, **controller}  # what both sides have is the same
+    taken = {name for name in SHARED if name in simulator or name in controller}
+    if "commanded_joints" in simulator:  # they decide on it
+        taken.add("root_assistance")
     for settings, brought in ((simulator, found.simulator), (controller, found.controller)):
-        settings.update({name: brought[name] for name in brought if name not in given})
+        settings.update(
+            {name: brought[name] for name in brought if name not in (*settings, *taken)}
+        )
     return found.duration
 
 

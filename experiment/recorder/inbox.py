@@ -31,19 +31,19 @@ class Inbox:
         """How many messages never came, between those that did."""
         return self._loss.lost
 
-    def take_until(self, time_ns: int) -> Iterator[tuple[int, bytes]]:
+    def take(self, most: int) -> Iterator[tuple[int, bytes]]:
         """What is there: wall time in ns at which it was published, and the message.
 
-        Ends with the first message published after `time_ns`: who publishes faster than this can
-        take would otherwise never let it end. The wall clock may be set back; the times of a topic
-        are not.
+        No more than `most`: who publishes faster than this can take would otherwise never let it
+        end. The wall clock may be set back; the times of a topic are not.
         """
-        while (received := self._subscription.take_received()) is not None:
+        for _ in range(most):
+            received = self._subscription.take_received()
+            if received is None:
+                break
             self._loss.take(received.number)
             self._last_ns = max(received.published_ns, self._last_ns)
             yield self._last_ns, received.raw
-            if received.published_ns > time_ns:
-                break
 
     def _refuse(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
         if not self._is_refused:

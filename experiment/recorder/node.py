@@ -43,6 +43,7 @@ PARAMETERS = [
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
+_AT_ONCE = 1000  # messages of a topic, between flushes and answers to services
 _SERVICE_PERIOD = 0.1  # s between turns of the executor, which looks at each of many topics
 _FLUSH_PERIOD = 0.5  # s: what was published longer ago outlives even a kill of the recorder
 _SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
@@ -98,16 +99,16 @@ class RecorderNode(Node):
         due = {self._search: 0.0, self._flush: 0.0, self._tell_progress: 0.0}
         try:
             while not stop:
-                self._drain(time.time_ns())
+                self._drain()
                 spinner.serve()
                 now = time.monotonic()
                 for act, at in due.items():
                     if at <= now:
                         due[act] = now + act()
                 time.sleep(_DRAIN_PERIOD)
-            stopped_ns = time.time_ns()
-            while self._drain(stopped_ns):
-                pass
+            for _ in range(topics.LISTENING_DEPTH // _AT_ONCE):  # no more was there at the stop
+                if not self._drain():
+                    break
         finally:
             spinner.close()
             self._close_bag()
@@ -144,21 +145,18 @@ class RecorderNode(Node):
         """The last tick of which every character's state has come."""
         return min(listener.last_tick for listener in self._listeners.values())
 
-    def _drain(self, until_ns: int) -> bool:
-        """Take the messages that are there, in the order in which they were published.
-
-        Returns whether any of them was published by a wall time in ns: others may be on their way.
-        """
+    def _drain(self) -> int:
+        """Take some of each topic's messages, all of them if it keeps up, in the order of time."""
         batch = [
             (published_ns, inbox.recorded, raw)
             for inbox in self._inboxes
-            for published_ns, raw in inbox.take_until(until_ns)
+            for published_ns, raw in inbox.take(_AT_ONCE)
         ]
         batch.sort(key=lambda message: message[0])
         for published_ns, recorded, raw in batch:
             self._keep(recorded, raw, published_ns)
             os.sched_yield()  # who works in the loop goes first
-        return bool(batch) and batch[0][0] <= until_ns
+        return len(batch)
 
     def _keep(self, recorded: RecordedTopic, raw: bytes, published_ns: int) -> None:
         try:

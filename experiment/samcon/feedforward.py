@@ -81,5 +81,6 @@ class Feedforward:
         roots = jacobians[:, :6]
         mobility = np.einsum("wi,w,wj->ij", roots, weights, roots) + _SLIGHT * np.eye(6)
         rows = np.vstack((weights[:, np.newaxis] * roots, needed))
-        wrenches = yielding(mobility, rows)[:-1, -1]  # a LAPACK's last bits are the processor's
+        # W J M^-1 needed is its last column; a LAPACK's last bits would be the processor's
+        wrenches = yielding(mobility, rows)[:-1, -1]
         return rotations.apply(jacobians.T, wrenches)

@@ -59,8 +59,10 @@ class Settings:
         return asdict(self) | {"noise": {name: list(row) for name, row in self.noise.items()}}
 
 
-def preset(character: str, clip: str, **given: object) -> Settings:
+def preset(character: str, clip: str, rate_hz: int | None = None, **given: object) -> Settings:
     """The settings for a clip by name, or else for any of the character's, with some given.
+
+    Those of the control rate, if there are any, take the place of those of the clip.
 
     Raises:
         ConfigurationError: there is none for the character, or a value is wrong.
@@ -71,7 +73,8 @@ def preset(character: str, clip: str, **given: object) -> Settings:
             f"{one_of('character to reconstruct', character, sorted(content))}"
         )
     values: dict[str, Any] = dict(content[character]["default"])
-    for name, value in content[character].get(clip, {}).items():
+    presets = content[character]
+    for name, value in presets.get(f"{clip}@{rate_hz}", presets.get(clip, {})).items():
         adds = isinstance(value, dict) and name != "feedback"  # gains belong together
         values[name] = {**values.get(name, {}), **value} if adds else value
     return settings_from({**values, **given})
