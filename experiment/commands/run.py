@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiment.commands.progress import progress_bar
-from experiment.commands.settings import node_settings
+from experiment.commands.settings import bring_parameters, node_settings
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -168,7 +168,7 @@ def _checked_plan(
     from experiment.plan import make_plan
     from sim_node.parameters import tick_period
 
-    found_in = _bring_parameters(options, simulator, controller)
+    found_in = bring_parameters(options.character, options.clip, simulator, controller)
     duration = _DURATION if found_in is None else found_in
     if options.duration is not None:
         duration = options.duration
@@ -186,29 +186,6 @@ def _checked_plan(
     for name in options.exclude or ():
         _check_excludable(name)
     return plan
-
-
-def _bring_parameters(
-    options: argparse.Namespace, simulator: dict[str, object], controller: dict[str, object]
-) -> float | None:
-    """Set what a reconstruction was found with, unless it is set; returns its length in s."""
-    from controller_node.references.corrected_file import read_found_with
-    from experiment.plan import SHARED
-    from msgs_config.character_loading import load_character
-
-    if options.clip is None:
-        return None
-    found = read_found_with(load_character(options.character), options.clip)
-    if found is None:
-        return None
-    taken = {name for name in SHARED if name in simulator or name in controller}
-    if "commanded_joints" in simulator:  # they decide on it
-        taken.add("root_assistance")
-    for settings, brought in ((simulator, found.simulator), (controller, found.controller)):
-        settings.update(
-            {name: brought[name] for name in brought if name not in (*settings, *taken)}
-        )
-    return found.duration
 
 
 def _check_excludable(name: str) -> None:

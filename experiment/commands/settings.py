@@ -28,3 +28,35 @@ def node_settings(texts: Sequence[str], nodes: Sequence[str]) -> dict[str, dict[
         except (yaml.YAMLError, ValueError, RecursionError) as error:
             raise ConfigurationError(f"--set {text}: the value is not valid YAML") from error
     return settings
+
+
+def bring_parameters(
+    character: str,
+    clip: str | None,
+    simulator: dict[str, object],
+    controller: dict[str, object],
+) -> float | None:
+    """Set what a clip was found with, unless it is set, if it is a reconstruction.
+
+    Returns its length in s, None of other clips.
+
+    Raises:
+        ActuatedCharactersError: there is no such character or clip, or its file is malformed.
+    """
+    from controller_node.references.corrected_file import read_found_with
+    from experiment.plan import SHARED
+    from msgs_config.character_loading import load_character
+
+    if clip is None:
+        return None
+    found = read_found_with(load_character(character), clip)
+    if found is None:
+        return None
+    taken = {name for name in SHARED if name in simulator or name in controller}
+    if "commanded_joints" in simulator:  # they decide on it
+        taken.add("root_assistance")
+    for settings, brought in ((simulator, found.simulator), (controller, found.controller)):
+        settings.update(
+            {name: brought[name] for name in brought if name not in (*settings, *taken)}
+        )
+    return found.duration
