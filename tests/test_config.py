@@ -126,6 +126,9 @@ def start(processes: Processes, file: str, node: str) -> Process:
     return processes.python("-m", MODULES[name], *arguments)
 
 
+WAITING = "[sim_node]: waiting for commands of"  # rightly, where controllers take long to start
+
+
 def have_been_answered(states: Inbox) -> bool:
     """Whether some states have come, of a character that is moved by torques."""
     stamps = {stamp_ns(state) for state in states.messages}
@@ -139,16 +142,12 @@ def test_the_nodes_start_with_a_file_and_run(
     spaces = [node.removesuffix(CONTROLLER)[1:] for node in controllers(file)]
     states = [client.listen(topics.JOINT_STATES.under(space)) for space in spaces]
 
-    # the simulators last: they say it where they wait for long
-    nodes = [start(processes, file, node) for node in controllers(file)]
-    torques = [topics.JOINT_TORQUES.under(space).name for space in spaces]
-    client.spin_until(lambda: all(map(client.node.count_publishers, torques)), "controllers")
-    others = [node for node in NODES[file] if node not in controllers(file)]
-    nodes += [start(processes, file, node) for node in others]
+    nodes = [start(processes, file, node) for node in NODES[file]]
 
     client.spin_until(lambda: all(map(have_been_answered, states)), "states that were answered")
     assert [node.exit_code for node in nodes] == [None] * len(nodes)
-    assert [node.stderr for node in nodes] == [""] * len(nodes)
+    said = [line for node in nodes for line in node.stderr.splitlines()]
+    assert [line for line in said if WAITING not in line] == []
 
 
 def test_a_file_is_for_any_namespace(processes: Processes, client: SimulatorClient) -> None:

@@ -249,14 +249,21 @@ def test_a_signal_ends_a_recorder_to_whom_more_comes_than_it_can_take(
     processes: Processes, own_graph: int, tmp_path: Path
 ) -> None:
     (tmp_path / "flooding.py").write_text(FLOODING)
-    for _ in range(FLOODS):
-        processes.python("-m", "flooding")
+
+    def flushes(recorder: Process) -> int:
+        return recorder.stdout.count("flushed")
+
     with observer(own_graph) as client:
         recorder = processes.node(
             "recorder", directory="recording", topics=["flood"], progress_period=0.05
         )
         running(processes, client)
-        client.spin_until(lambda: len(re.findall("flushed", recorder.stdout)) > 1, "flushes")
+        client.spin_until(lambda: re.search(r"tick \d\d", recorder.stdout), "ticks")
+        for _ in range(FLOODS):
+            processes.python("-m", "flooding")
+        client.spin_until(lambda: client.node.count_subscribers("flood"), "the flood recorded")
+        before = flushes(recorder)
+        client.spin_until(lambda: flushes(recorder) > before + 2, "flushes")
 
         end(recorder, signal.SIGTERM, within=BEHINDHAND)
 
