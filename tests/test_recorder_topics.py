@@ -14,6 +14,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from physics import character, simulation
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from ros import Processes, SimulatorClient, tick_of, wrench_message
@@ -21,7 +22,9 @@ from rosbags.highlevel import AnyReader
 from std_msgs.msg import Header
 
 from experiment.bags.reader import read_messages
+from experiment.recorder.inbox import Inbox
 from experiment.recorder.node import RecorderNode
+from experiment.recorder.topics import RecordedTopic
 from msgs_config import topics
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.tick_clock import TickClock
@@ -329,3 +332,16 @@ def test_one_recorder_records_several_characters_with_figures_of_each(
         assert figures[name]["lost_messages"] == {}
         assert (tmp_path / "run" / name / "measurements.csv").exists()
     assert figures["left"]["state_hash"] != figures["right"]["state_hash"]
+
+
+def test_a_topic_gives_no_more_at_a_time_than_is_asked_for(client: SimulatorClient) -> None:
+    # who publishes faster than a recorder takes would otherwise never let it flush, or end
+    topic = Topic("flood", Header, topics.STREAM_QOS)
+    publisher = client.speak(topic)
+    inbox = Inbox(client.node, RecordedTopic(topic, "/flood", "flood", None))
+    client.spin_until(publisher.get_subscription_count, "a recorder's inbox")
+    for _ in range(12):
+        publisher.publish(Header())
+    assert publisher.wait_for_all_acked(Duration(seconds=30))
+
+    assert [len(list(inbox.take(5))) for _ in range(4)] == [5, 5, 2, 0]
