@@ -82,14 +82,15 @@ def read_found_with(character: Character, name_or_path: str) -> FoundWith | None
     if not name_or_path.endswith(SUFFIX):
         return None
     path = clip_path(character, name_or_path)
-    made = _content(path).get(RECONSTRUCTION)
+    content = _content(path)
+    made = content.get(RECONSTRUCTION)
     if made is None:
         return None
     try:
         sides = made["parameters"]
         duration = float(made["duration"])
         if not made["complete"]:
-            duration = min(duration, float(max(_content(path)[CORRECTIONS]["ends"])))
+            duration = min(duration, float(max(content[CORRECTIONS]["ends"], default=0.0)))
         found = FoundWith(duration, dict(sides["sim_node"]), dict(sides["controller_node"]))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ClipError(
