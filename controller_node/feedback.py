@@ -11,6 +11,7 @@ Yin 2016, "Guided Learning of Control Graphs" (feedback linear in such features,
 
 import math
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeAlias
@@ -29,8 +30,6 @@ from msgs_config.joint_layout import JointType
 _LIFTED = 0.06  # m by which one foot is above the other when it alone swings
 _LARGEST = 0.6  # rad
 _LEG = [JointType.SPHERICAL, JointType.REVOLUTE, JointType.SPHERICAL]
-_KNOWN_TICKS = 512  # of which the motion's features are kept
-
 
 Numbers: TypeAlias = list[float]
 
@@ -65,8 +64,12 @@ class _Wanted:
 class Feedback:
     """The feedback of a character about a motion, a function of time and state."""
 
-    def __init__(self, character: Character, motion: Reference, gains: FeedbackGains) -> None:
+    def __init__(
+        self, character: Character, motion: Reference, gains: FeedbackGains, *, known_ticks: int = 0
+    ) -> None:
         """Find the legs: those of the two links that the character stands on.
+
+        Of `known_ticks` the motion's features are kept, for who asks for them more than once.
 
         Raises:
             CharacterError: its base is fixed, or a leg is not a ball joint, a hinge, a ball joint.
@@ -78,12 +81,22 @@ class Feedback:
         names = [link.name for link in character.links]
         self._feet = np.array([names.index(foot) for foot in character.feet])
         self._entries = np.array([_leg(character, int(foot)) for foot in self._feet])  # (2, 7)
+        self._sides = self._sides_at(np.array(character.rest_position))
+        self._set(gains)
+        self._motion = motion
+        self._known = lru_cache(maxsize=known_ticks)(self._of_motion)
+
+    def with_gains(self, gains: FeedbackGains) -> "Feedback":
+        """The same with other gains; both share what they know of the motion."""
+        other = copy(self)
+        other._set(gains)
+        return other
+
+    def _set(self, gains: FeedbackGains) -> None:
         matrices = np.stack((gains.stance, gains.swing))
         self._gains = np.concatenate((gains.stance[:, :-1], gains.swing[:, :-1]))
-        sides = self._sides_at(np.array(character.rest_position))
-        self._of_sides = np.multiply.outer(sides, matrices[:, :, -1]).swapaxes(0, 1)  # (2, 2, 7)
-        self._motion = motion
-        self._known = lru_cache(maxsize=_KNOWN_TICKS)(self._of_motion)
+        of_sides = np.multiply.outer(self._sides, matrices[:, :, -1])
+        self._of_sides = of_sides.swapaxes(0, 1)  # (2, 2, 7)
 
     def response(self, time: float, position: FloatArray, velocity: FloatArray) -> FloatArray:
         """What is added to the tracking errors (n,) of a state at a time in s, rad."""

@@ -7,11 +7,10 @@ import numpy as np
 from controller_node.parameters import make_controller
 from experiment.metrics import Tick
 from experiment.plan import Plan
-from experiment.planned_push import PlannedPush
+from experiment.planned_push import PlannedPush, push_schedule
 from experiment.planned_throw import PlannedThrow
 from msgs_config.tick_clock import TickClock
-from sim_node.parameters import make_role, make_settings, push_ticks
-from sim_node.pushes import PushSchedule
+from sim_node.parameters import make_role, make_settings
 from sim_node.simulation import Simulation
 from sim_node.throwing import ThrowSchedule
 
@@ -28,16 +27,7 @@ def ticks_in_process(
     """
     controller = make_controller(plan.character, plan.reference, plan.controller)
     role = make_role(plan.character, plan.simulator)
-    schedule, clock = PushSchedule(plan.character), TickClock(plan.simulator.integer("rate"))
-    for push in pushes:
-        content = push.arrays()
-        schedule.add(
-            content.links,
-            content.wrenches,
-            content.points,
-            first_tick=clock.first_tick_from(push.stamp_ns),
-            ticks=push_ticks(plan.simulator),
-        )
+    schedule, clock = push_schedule(plan, pushes), TickClock(plan.simulator.integer("rate"))
     balls = ThrowSchedule()
     for throw in throws:
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))

@@ -10,6 +10,8 @@ from experiment.plan import Plan
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.tick_clock import TickClock
 from msgs_config.wrench_messages import WrenchArrays
+from sim_node.parameters import push_ticks
+from sim_node.pushes import PushSchedule
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,21 @@ class PlannedPush:
         """The push as a message's content."""
         points = [] if self.point is None else [self.point]
         return WrenchArrays.of_rows(self.stamp_ns, [self.link], [self.wrench], points)
+
+
+def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> PushSchedule:
+    """The pushes of a plan as its simulator takes them, without topics."""
+    schedule, clock = PushSchedule(plan.character), TickClock(plan.simulator.integer("rate"))
+    for push in pushes:
+        content = push.arrays()
+        schedule.add(
+            content.links,
+            content.wrenches,
+            content.points,
+            first_tick=clock.first_tick_from(push.stamp_ns),
+            ticks=push_ticks(plan.simulator),
+        )
+    return schedule
 
 
 def write_pushes(file: Path, pushes: Sequence[PlannedPush]) -> None:

@@ -1,6 +1,8 @@
 """The fit of the balance feedback to a motion, and the angular momentum that its cost looks at."""
 
+from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,9 +11,16 @@ from physics import character
 from controller_node.dynamics import DynamicsModel
 from controller_node.feedback_gains import FeedbackGains
 from experiment.cli import main
+from experiment.loop import ticks_in_process
+from experiment.planned_push import planned_push
+from experiment.samcon.checkpoint import checkpoint_path, read_policy
 from experiment.samcon.features import Features
-from experiment.samcon.fitting import fitted, mean_cost, names
+from experiment.samcon.fitting import Fit, Level, State, Trials, fitted
+from experiment.samcon.policy import Policy, PolicySpace, names
 from experiment.samcon.problem import Problem
+from experiment.samcon.reconstruction import Job, duration_of, reconstruct
+from experiment.samcon.rollout import Branch, Rollout
+from experiment.samcon.search import Progress
 from experiment.samcon.settings import preset
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
@@ -20,6 +29,12 @@ HUMANOID = character("humanoid")
 SIZE = HUMANOID.layout.size
 SETTINGS = preset("humanoid", "jump")
 PROBLEM = Problem.of("humanoid", "jump", 0.2, SETTINGS)
+
+
+def mean_cost(policy: Policy) -> float:
+    """What a policy costs in the runs with which a fit tests it."""
+    cost, _ = Trials(PROBLEM, SETTINGS, 1).test(Level(0.0, 4, 0.0), Fit(16), policy)
+    return cost
 
 
 def position() -> FloatArray:
@@ -60,27 +75,106 @@ def test_what_is_fitted_are_gains() -> None:
     assert FeedbackGains.of(dict.fromkeys(names(), 1.0)).stance.any()
 
 
+def test_a_policy_is_its_vector_again() -> None:
+    space = PolicySpace(Problem.of("humanoid", "walk", 1.0, SETTINGS), HUMANOID, 4)
+    vector = np.round(np.sin(np.arange(len(space.vector(Policy({}))))), 2)
+
+    policy = space.policy(vector)
+
+    np.testing.assert_allclose(space.vector(policy), vector, rtol=0.01)
+    assert policy.feedback[names()[3]] != 0.0
+
+
+def test_the_second_half_of_a_cycle_mirrors_the_first() -> None:
+    space = PolicySpace(Problem.of("humanoid", "walk", 1.0, SETTINGS), HUMANOID, 4)
+    count = len(space.vector(Policy({})))
+
+    offsets = space.policy(np.arange(1.0, 1.0 + count)).offsets
+
+    for name, other in (("hip", "left_hip"), ("ankle", "left_ankle")):
+        x, y, z = offsets[f"right_{name}"][1]
+        assert offsets[other][3] == [-x, -y, z]
+    assert offsets["left_knee"][2] == offsets["right_knee"][0] != offsets["left_knee"][0]
+
+
+def test_a_motion_that_ends_has_no_offsets() -> None:
+    assert not PolicySpace(PROBLEM, HUMANOID, 0).policy(np.zeros(200)).offsets
+
+
+def test_it_gets_harder_step_by_step_to_a_last_level() -> None:
+    fit, level = Fit(16, assistance=0.0117, push=5.0), Level(0.0117, 10, 0.0)
+
+    steps = []
+    while (harder := level.harder(fit, 20)) != level:
+        level = harder
+        steps.append((round(level.assistance, 4), level.windows, level.push))
+
+    assert steps == [(0.0, 10, 0.0), (0.0, 15, 0.0), (0.0, 20, 0.0), (0.0, 20, 5.0)]
+
+
 def test_the_fit_is_the_same_on_two_processes_and_costs_what_it_says() -> None:
-    told: list[float] = []
+    told: list[State] = []
+    without, fit = replace(PROBLEM, feedback={}), Fit(16)
 
-    without = replace(PROBLEM, feedback={})
-
-    alone = fitted(without, SETTINGS, 16, 1, lambda _, least: told.append(least))
-    together = fitted(without, SETTINGS, 16, 2)
+    alone = fitted(without, SETTINGS, fit, 1, told.append)
+    together = fitted(without, SETTINGS, fit, 2)
 
     assert alone == together
-    assert told == [mean_cost(PROBLEM, SETTINGS, alone)]
-    assert told[0] < mean_cost(PROBLEM, SETTINGS, {})
+    assert [state.done for state in told] == [16]
+    assert told[0].cost == mean_cost(alone) < mean_cost(Policy({}))
 
 
-def test_a_fit_never_ends_with_worse_gains_than_it_began_with() -> None:
-    best = fitted(PROBLEM, SETTINGS, 16, 1)
-    for _ in range(2):  # a fit of what was fitted tries other gains around it
-        better = fitted(replace(PROBLEM, feedback=best), SETTINGS, 16, 1)
+def test_a_fit_never_ends_with_a_worse_policy_than_it_began_with() -> None:
+    best = fitted(PROBLEM, SETTINGS, Fit(16), 1)
+    for _ in range(2):  # a fit of what was fitted tries others around it
+        better = fitted(replace(PROBLEM, feedback=best.feedback), SETTINGS, Fit(16), 1)
 
-        costs = [mean_cost(PROBLEM, SETTINGS, gains) for gains in (better, best)]
-        assert costs[0] <= costs[1]
+        assert mean_cost(better) <= mean_cost(best)
         best = better
+
+
+def test_a_walk_begins_with_the_offsets_of_its_cycle() -> None:
+    settings = preset("humanoid", "walk", window=0.1056)  # s, twelve a cycle
+    problem = Problem.of("humanoid", "walk", duration_of("humanoid", "walk", 2), settings)
+    with Trials(problem, settings, 1) as trials:
+        offsets = trials.space.policy(np.linspace(0.1, 1.0, 200)).offsets
+
+    with closing(Rollout(replace(problem, offsets=offsets))) as rollout:
+        plain = rollout.plain(12 + 3)[HUMANOID.layout.joint("left_knee").entries]
+
+    assert {len(rows) for rows in offsets.values()} == {12}
+    assert plain.tolist() == offsets["left_knee"][3] != [0.0]
+
+
+def test_a_push_in_a_trial_is_that_of_a_run() -> None:
+    problem = replace(PROBLEM, feedback={}, feedforward=0.0)
+    push = planned_push(problem.plan(), "chest", (200.0, 0.0, 0.0), 0.05)
+    with closing(Rollout(problem)) as rollout:
+        nothing = np.zeros((1, SIZE))
+        branch = Branch(None, 0, nothing[:0], nothing[0], nothing, 3, pushes=(push,))
+        (ends,) = rollout.expand(branch).features
+
+    *_, last = ticks_in_process(problem.plan(), [push])
+    *_, unpushed = ticks_in_process(problem.plan())
+
+    assert ends[-1, :SIZE].tobytes() == last.following.position.tobytes()
+    assert last.following.position.tobytes() != unpushed.following.position.tobytes()
+
+
+def test_what_was_fitted_is_resumed_with(tmp_path: Path) -> None:
+    output, stopped = tmp_path / "spin.json", KeyboardInterrupt()
+    settings = preset("humanoid", "spin", samples=4, lookahead=0)
+    problem = Problem.of("humanoid", "spin", 0.2, settings)
+    job = Job(problem, 1, settings, output).with_policy(Policy({"stance.hip_x.tilt_x": 0.123}))
+
+    def report(progress: Progress, *_: float) -> None:
+        if progress.window == 2:
+            raise stopped
+
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct(job, report)
+
+    assert read_policy(checkpoint_path(output)) == Policy({"stance.hip_x.tilt_x": 0.123})
 
 
 @pytest.mark.parametrize(
@@ -90,6 +184,9 @@ def test_a_fit_never_ends_with_worse_gains_than_it_began_with() -> None:
         (("--fit", "16", "--open-loop"), "which --open-loop leaves out"),
         (("--fit", "16", "--resume"), "--resume goes on with what was fitted before"),
         (("--fit", "16", "--cluster", "localhost:1"), "not on a --cluster"),
+        (("--fit-push", "5"), "--fit-push is for --fit"),
+        (("--fit", "16", "--fit-assistance", "-1"), "--fit-assistance is -1"),
+        (("--fit", "16", "--fit-push", "nan"), "--fit-push is nan"),
         (("--seed", "-1"), "seed is -1; it must be 0 to 4294967294"),
         (("--seed", "4294967295"), "seed is 4294967295"),
     ],

@@ -3,7 +3,6 @@
 import argparse
 import os
 import shlex
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,8 @@ from rich.table import Table
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
+    from experiment.samcon.fitting import Fit
+    from experiment.samcon.fitting import State as FitState
     from experiment.samcon.reconstruction import Job, Reconstruction
     from experiment.samcon.search import Progress as SearchProgress
 
@@ -64,7 +65,22 @@ def _add_search(command: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="fit the feedback first: try N gains, in sixteens, in two runs each (0)",
+        help="fit the feedback first, and of a clip that wraps the offsets that a cycle begins "
+        "with: try N of them, in sixteens (0)",
+    )
+    command.add_argument(
+        "--fit-assistance",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="of the root's gains, which the fit begins with and withdraws step by step (0)",
+    )
+    command.add_argument(
+        "--fit-push",
+        type=float,
+        default=0.0,
+        metavar="NS",
+        help="N s, of the pushes in the last runs of the fit, each two seconds (0)",
     )
     command.add_argument("--rate", type=int, default=240, metavar="HZ", help="control rate (240)")
     command.add_argument(
@@ -79,6 +95,7 @@ def _add_search(command: argparse.ArgumentParser) -> None:
 
 
 def _reconstruct(options: argparse.Namespace) -> None:
+    from experiment.samcon.fitting import Fit
     from experiment.samcon.reconstruction import reconstruct
 
     job = _job(options)
@@ -99,28 +116,35 @@ def _reconstruct(options: argparse.Namespace) -> None:
 
     with bar:
         if options.fit:
-            job = _fitted(job, options.fit, bar)
+            fit = Fit(options.fit, options.fit_assistance, options.fit_push)
+            job = _fitted(job, fit, bar)
         found = reconstruct(job, report)
     _report(job, found)
 
 
-def _fitted(job: "Job", runs: int, bar: Progress) -> "Job":
+def _fitted(job: "Job", fit: "Fit", bar: Progress) -> "Job":
     """The job with a feedback that has been fitted to its motion."""
     from experiment.samcon.fitting import fitted
 
-    task = bar.add_task("feedback", total=runs, state="begins")
+    task = bar.add_task("feedback", total=fit.count, state="begins")
 
-    def report(done: int, least: float) -> None:
-        bar.update(task, completed=min(done, runs), state=f"mean cost of a window {least:.3g}")
+    def report(state: "FitState") -> None:
+        level = state.level
+        held = f"{level.assistance:.3f} assistance, " if level.assistance else ""
+        pushed = f", {level.push:g} N s" if level.push else ""
+        bar.update(
+            task,
+            completed=min(state.done, fit.count),
+            state=f"{held}{level.windows} windows{pushed}: mean cost {state.cost:.3g}",
+        )
 
-    gains = fitted(job.problem, job.settings, runs, job.workers, report)
-    problem = replace(job.problem, feedback=gains)
-    return replace(job, problem=problem, settings=replace(job.settings, feedback=gains))
+    policy = fitted(job.problem, job.settings, fit, job.workers, report)
+    return job.with_policy(policy)
 
 
 def _job(options: argparse.Namespace) -> "Job":
     """What is to be done; raises ActuatedCharactersError where options cannot be used."""
-    from experiment.samcon.checkpoint import checkpoint_path
+    from experiment.samcon.checkpoint import checkpoint_path, read_policy
     from experiment.samcon.problem import Problem
     from experiment.samcon.reconstruction import Job, duration_of
     from experiment.samcon.settings import preset
@@ -156,13 +180,22 @@ def _job(options: argparse.Namespace) -> "Job":
         settings,
         {"rate": options.rate, "command_delay_ticks": options.delay_ticks},
     )
-    return Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
+    job = Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
+    if options.resume and not options.open_loop:  # it may have been fitted before
+        return job.with_policy(read_policy(checkpoint_path(output)))
+    return job
 
 
 def _check_fit(options: argparse.Namespace) -> None:
     """Raise ConfigurationError where --fit cannot be used."""
     if options.fit < 0:
         raise ConfigurationError(f"--fit is {options.fit}; it must be 0 or more")
+    for name, most in (("fit_assistance", 1.0), ("fit_push", 1000.0)):
+        value, option = getattr(options, name), f"--{name.replace('_', '-')}"
+        if not 0.0 <= value <= most:
+            raise ConfigurationError(f"{option} is {value:g}; it must be 0 to {most:g}")
+        if value and not options.fit:
+            raise ConfigurationError(f"{option} is for --fit, which says how many are tried")
     if not options.fit:
         return
     if options.open_loop:

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from controller_node.feedback_gains import checked_gains
 from controller_node.references.corrected_file import write_whole
+from experiment.samcon.policy import Policy
 from experiment.samcon.search import Progress
 from experiment.samcon.tree import Node
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -54,6 +56,21 @@ def write_checkpoint(path: Path, key: Mapping[str, Any], progress: Progress) -> 
         ],
     }
     write_whole(path, json.dumps(content))
+
+
+def read_policy(path: Path) -> Policy:
+    """The feedback and the offsets that a checkpoint's search began with.
+
+    Raises:
+        RecordingError: there is none, or it cannot be read.
+    """
+    try:
+        key = json.loads(path.read_text(encoding="utf-8"))["key"]
+        return Policy(checked_gains(key["feedback"]), dict(key["offsets"]))
+    except OSError as error:
+        raise RecordingError(f"cannot resume from {path}: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, ConfigurationError) as error:
+        raise RecordingError(f"{path}: not a checkpoint that can be resumed") from error
 
 
 def read_checkpoint(path: Path, key: Mapping[str, Any]) -> Progress:

@@ -1,27 +1,35 @@
-"""Fits the balance feedback to a motion, so that it goes on for longest without corrections.
+"""Fits what acts without a search to a motion, so that it goes on for longest without corrections.
 
-CMA-ES over the gains, each tried in two runs from the first state. The search then begins from a
-feedback with which what it looks ahead at holds for longer.
+CMA-ES over the gains of the feedback, and over the offsets of a cycle's windows if the motion
+wraps. Each policy is tried in runs from the first state. The search then begins from one with
+which what it looks ahead at holds for longer.
 
-Source: Hansen 2016, "The CMA Evolution Strategy: A Tutorial"; the package `cma` is its author's.
-Liu, van de Panne and Yin 2016, "Guided Learning of Control Graphs", fit such a feedback likewise.
+It may begin with some of the root's assistance, which is withdrawn step by step, each time that
+the policy in the middle gets to the end of its runs. Then the runs get longer, and pushed.
+
+Sources: Hansen 2016, "The CMA Evolution Strategy: A Tutorial"; the package `cma` is its author's.
+Liu, van de Panne and Yin 2016, "Guided Learning of Control Graphs", fit such a feedback likewise;
+Sharon and van de Panne 2005, "Synthesis of Controllers for Stylized Planar Bipedal Walking".
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
-from typing import TypeAlias
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from math import cos, sin
+from types import ModuleType, TracebackType
 
 import joblib
 import numpy as np
 
-from controller_node.feedback_gains import FEATURES, OUTPUTS
+from controller_node.references.clip_file import read_clip
+from experiment.planned_push import PlannedPush, planned_push
 from experiment.samcon import cost
+from experiment.samcon.policy import Policy, PolicySpace
 from experiment.samcon.problem import Problem
 from experiment.samcon.rollout import Branch, Rollout
 from experiment.samcon.settings import Settings
 from experiment.samcon.workers import (
-    forget,
+    forget_all,
     leave_interrupts_to_the_parent,
     processes,
     rollout_of,
@@ -29,143 +37,219 @@ from experiment.samcon.workers import (
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
 
-Gains: TypeAlias = dict[str, float]
-"""Gains of the feedback by name."""
-
 POPULATION = 16
-"""Gains are tried so many at a time."""
+"""Policies are tried so many at a time."""
 
-_STEP = 0.16  # of the gains at first, times how large each of them usually is
-_USUAL = {"centre_vx": 0.2, "centre_vy": 0.2, "centre_vz": 0.2, "one": 0.1, "side": 0.1}
-_SPIN = 0.2
+_STEP = 0.12  # of the vector at first
 _WORST = 100.0  # cost of a window
 _LOST = 150.0  # of each window after that in which it was lost
-_SHRINK = 0.005  # a squared step from the first gains, against the cost of a window
-_RUNS = 2  # with each gains
-_NUDGE = 0.15  # of the search's noise
-_DIGITS = 3  # of gains, as they stand in files
-
-# what has something to do with what: about x it leans sideways, about z ahead
-_SIDEWAYS = ("centre_y", "centre_vy", "arm_y", "tilt_x", "spin_x", "one")
-_AHEAD = ("centre_x", "centre_vx", "arm_x", "tilt_z", "spin_z", "one")
-_CANDIDATES = {
-    "hip_x": _SIDEWAYS,
-    "hip_y": ("tilt_y", "spin_y"),
-    "hip_z": _AHEAD,
-    "knee": ("centre_z", "centre_vz", "one"),
-    "ankle_x": _SIDEWAYS,
-    "ankle_z": _AHEAD,
-}
+_SHRINK = 0.005  # a squared step from the first policy, against the cost of a window
+_TEST_EVERY = 3  # populations
+_TESTS = 2  # runs
+_WEAKER = 0.85  # of the root's assistance
+_WEAKEST = 0.01  # share of it, below which there is none
+_ROOT_STIFFNESS = 4000.0  # N/m, the lecture's; its orientation is left alone
+_ROOT_DAMPING = 400.0  # N s/m
+_LONGER = 1.5  # runs, each time
+_FIRST_RUN = 3.8  # s
+_PUSH_EVERY = 2.0  # s
+_PUSH_TIME = 0.1  # s
 
 
-def names() -> tuple[str, ...]:
-    """The gains that are fitted."""
-    assert set(_CANDIDATES) <= set(OUTPUTS)
-    return tuple(
-        f"{leg}.{output}.{feature}"
-        for leg in ("stance", "swing")
-        for output, features in _CANDIDATES.items()
-        if leg == "stance" or not output.startswith("ankle")
-        for feature in features
-        if feature in FEATURES
-    )
+@dataclass(frozen=True)
+class Fit:
+    """What is to be fitted, and how."""
+
+    count: int  # policies, rounded up to whole populations
+    assistance: float = 0.0  # share of the root's gains that it begins with
+    push: float = 0.0  # N s, each two seconds of the last runs
+    nudge: float = 0.03  # of the search's noise, in the first window of each run
+
+
+@dataclass(frozen=True)
+class Level:
+    """How hard the runs are."""
+
+    assistance: float
+    windows: int
+    push: float  # N s
+
+    def harder(self, fit: Fit, windows: int) -> "Level":
+        """The next one; itself, if there is none."""
+        if self.assistance:
+            less = self.assistance * _WEAKER
+            return replace(self, assistance=less if less >= _WEAKEST else 0.0)
+        if self.windows < windows:
+            return replace(self, windows=min(int(self.windows * _LONGER), windows))
+        return replace(self, push=fit.push)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a policy, from the first state."""
+
+    nudge: FloatArray  # (n,) offset more in the first window, rad
+    pushes: tuple[PlannedPush, ...]
+
+
+@dataclass(frozen=True)
+class State:
+    """How far a fit is."""
+
+    done: int  # policies
+    level: Level
+    cost: float  # mean of a window, of the best policy at this level
 
 
 def fitted(
     problem: Problem,
     settings: Settings,
-    count: int,
+    fit: Fit,
     workers: int,
-    report: Callable[[int, float], None] = lambda *_: None,
-) -> Gains:
-    """The gains that cost least of `count`, rounded up to whole populations, and the problem's own.
+    report: Callable[[State], None] = lambda _: None,
+) -> Policy:
+    """The best policy at the hardest level that was reached.
 
-    `report` is told how many were tried, and the least mean cost of a window so far. The result
-    does not depend on the number of processes.
+    The best of the middles of the distribution, as tested every few populations, and the
+    problem's own one. The result does not depend on the number of processes.
 
     Raises:
-        ConfigurationError: there is no package `cma`.
+        ConfigurationError: there is no package `cma`, or a number of the fit is wrong.
     """
-    try:
-        import cma  # type: ignore[import-untyped,unused-ignore]
-    except ImportError as error:
-        raise ConfigurationError(
-            "--fit needs the package 'cma': pip install 'actuated_characters[fit]'"
-        ) from error
-    found = tuple(dict.fromkeys((*names(), *problem.feedback)))
-    usual = np.array([_usual(name) for name in found])
-    first = np.array([problem.feedback.get(name, 0.0) for name in found]) / usual
-    best = dict(problem.feedback)
-    # its own generator takes the seed 0 for none
-    options = {"popsize": POPULATION, "seed": settings.seed + 1, "verbose": -9}
-    evolution = cma.CMAEvolutionStrategy(first, _STEP, options)
-    with _costs_of(problem, settings, workers) as costs_of:
-        (least,) = costs_of([best])
-        for done in range(POPULATION, count + POPULATION, POPULATION):
+    cma = _cma()
+    with Trials(problem, settings, workers) as trials:
+        space, level = trials.space, trials.first_level(fit)
+        best = Policy(problem.feedback, problem.offsets)
+        first = space.vector(best)
+        # its own generator takes the seed 0 for none
+        options = {"popsize": POPULATION, "seed": settings.seed + 1, "verbose": -9}
+        evolution = cma.CMAEvolutionStrategy(first, _STEP, options)
+        least, _ = trials.test(level, fit, best)
+        for population in range(1, -(-fit.count // POPULATION) + 1):
             points = evolution.ask()
-            tried = [_gains(found, point * usual) for point in points]
-            costs = costs_of(tried)
+            costs = trials.costs(level, fit, [space.policy(point) for point in points], population)
             shrink = [_SHRINK * float(np.sum((point - first) ** 2)) for point in points]
             evolution.tell(points, [sum(pair) for pair in zip(costs, shrink, strict=True)])
-            index = int(np.argmin(costs))
-            if costs[index] < least:
-                best, least = tried[index], costs[index]
-            report(done, least)
+            if population % _TEST_EVERY == 0 or population * POPULATION >= fit.count:
+                policy = space.policy(evolution.mean)
+                tested, held = trials.test(level, fit, policy)
+                harder = level.harder(fit, trials.windows)
+                if held and harder != level:
+                    level, best = harder, policy
+                    least, _ = trials.test(level, fit, best)
+                elif tested < least:
+                    best, least = policy, tested
+            report(State(population * POPULATION, level, least))
     return best
 
 
-@contextmanager
-def _costs_of(
-    problem: Problem, settings: Settings, workers: int
-) -> Iterator[Callable[[Sequence[Gains]], list[float]]]:
-    """What tells the mean costs of gains, in order, by so many processes; 1 is this one."""
+@dataclass(frozen=True)
+class Tried:
+    """What became of a run."""
 
-    def alone(tried: Sequence[Gains]) -> list[float]:
-        return [mean_cost(problem, settings, gains) for gains in tried]
+    cost: float  # mean of the windows
+    held: bool  # to its end
 
-    if workers == 1:
-        try:
-            yield alone
-        finally:
-            forget(_without_feedback(problem))
-        return
-    with processes(workers) as parallel:
-        yield lambda tried: list(
-            parallel(joblib.delayed(_cost_in_process)(problem, settings, gains) for gains in tried)
+
+class Trials:
+    """Tries policies, on a number of processes; 1 is this process alone."""
+
+    def __init__(self, problem: Problem, settings: Settings, workers: int) -> None:
+        self._problem, self._settings = problem, settings
+        rollout = rollout_of(_bare(problem, 0.0))
+        self.windows = len(rollout.windows)
+        self.space = PolicySpace(
+            problem, rollout.plan.character, _windows_a_cycle(problem, rollout)
+        )
+        self._plan = rollout.plan
+        self._noise = np.zeros(rollout.layout.size)
+        for name, widths in settings.noise.items():
+            self._noise[rollout.layout.joint(name).entries] = widths
+        self._open = ExitStack()
+        self._parallel = self._open.enter_context(processes(workers)) if workers > 1 else None
+
+    def __enter__(self) -> "Trials":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._open.close()
+        forget_all()
+
+    def first_level(self, fit: Fit) -> Level:
+        """Where a fit begins: all windows at once, unless the root is held at first."""
+        some = round(_FIRST_RUN / self._problem.window)
+        windows = min(some, self.windows) if fit.assistance else self.windows
+        return Level(fit.assistance, windows, 0.0 if fit.assistance else fit.push)
+
+    def costs(self, level: Level, fit: Fit, policies: Sequence[Policy], draw: int) -> list[float]:
+        """The mean costs of a window of policies, in order, in runs that a number draws."""
+        runs = self._runs(level, fit, [self._settings.seed, draw], 1 + (level.push > 0.0))
+        tried = self._tried(level, [(policy, run) for policy in policies for run in runs])
+        costs = np.array([one.cost for one in tried]).reshape(len(policies), -1)
+        return [float(cost) for cost in costs.mean(axis=1)]
+
+    def test(self, level: Level, fit: Fit, policy: Policy) -> tuple[float, bool]:
+        """A policy's mean cost of a window, and whether all its runs went to their ends."""
+        runs = self._runs(level, fit, [self._settings.seed], _TESTS)
+        tried = self._tried(level, [(policy, run) for run in runs])
+        return float(np.mean([one.cost for one in tried])), all(one.held for one in tried)
+
+    def _runs(self, level: Level, fit: Fit, seed: list[int], count: int) -> list[Run]:
+        """Runs at a level; where there are pushes, every other one is pushed."""
+        rng = np.random.default_rng(np.random.SeedSequence(seed))
+        return [
+            Run(
+                fit.nudge * self._noise * rng.uniform(-1.0, 1.0, len(self._noise)),
+                self._pushes(level, rng) if number % 2 else (),
+            )
+            for number in range(count)
+        ]
+
+    def _pushes(self, level: Level, rng: np.random.Generator) -> tuple[PlannedPush, ...]:
+        """Pushes on the root, each two seconds, from random sides."""
+        if not level.push:
+            return ()
+        end = level.windows * self._problem.duration / self.windows
+        root = self._plan.character.links[0].name
+        times = np.arange(rng.uniform(0.5, _PUSH_EVERY), end - _PUSH_TIME, _PUSH_EVERY).tolist()
+        sides = rng.uniform(-np.pi, np.pi, len(times)).tolist()
+        force = level.push / self._plan.simulator.number("wrench_duration")
+        return tuple(
+            planned_push(self._plan, root, (force * cos(side), force * sin(side), 0.0), time)
+            for time, side in zip(times, sides, strict=True)
         )
 
+    def _tried(self, level: Level, pairs: Sequence[tuple[Policy, Run]]) -> list[Tried]:
+        bare = _bare(self._problem, level.assistance)
+        if self._parallel is None:
+            return [tried(bare, self._settings, level.windows, *pair) for pair in pairs]
+        work = (
+            joblib.delayed(_tried_in_process)(bare, self._settings, level.windows, *pair)
+            for pair in pairs
+        )
+        return list(self._parallel(work))
 
-def _cost_in_process(problem: Problem, settings: Settings, gains: Gains) -> float:
+
+def _tried_in_process(
+    problem: Problem, settings: Settings, windows: int, policy: Policy, run: Run
+) -> Tried:
     leave_interrupts_to_the_parent()
-    return mean_cost(problem, settings, gains)
+    return tried(problem, settings, windows, policy, run)
 
 
-def _without_feedback(problem: Problem) -> Problem:
-    """What the engines are made for, lest another one is made for each gains."""
-    return replace(problem, feedback={})
-
-
-def mean_cost(problem: Problem, settings: Settings, gains: Mapping[str, float]) -> float:
-    """The mean cost of the windows of runs without corrections but nudges in the first window.
-
-    The nudges keep the feedback from balancing on a knife's edge.
-    """
-    rollout = rollout_of(_without_feedback(problem))
-    rollout.respond(gains)
-    count, nothing = len(rollout.windows), np.zeros(rollout.layout.size)
-    rng = np.random.default_rng(settings.seed)
-    samples = rollout.plain(0) + np.zeros((_RUNS, len(nothing)))
-    for name, widths in settings.noise.items():
-        entries = rollout.layout.joint(name).entries
-        size = (_RUNS - 1, entries.stop - entries.start)
-        samples[1:, entries] += _NUDGE * np.array(widths) * rng.uniform(-1.0, 1.0, size)
-    branch = Branch(None, 0, samples[:0], nothing, samples, count - 1, settings.bounds)
-    runs = rollout.expand(branch).features
-    return float(np.mean([_mean_cost(rollout, ends, settings) for ends in runs]))
-
-
-def _mean_cost(rollout: Rollout, ends: FloatArray, settings: Settings) -> float:
-    """The mean cost of a run's windows from their ends (w, f)."""
+def tried(problem: Problem, settings: Settings, windows: int, policy: Policy, run: Run) -> Tried:
+    """A policy's run over the first windows."""
+    rollout = rollout_of(problem)
+    rollout.act(policy.feedback, policy.offsets)
+    nothing = np.zeros(rollout.layout.size)
+    sample = (rollout.plain(0) + run.nudge)[np.newaxis]
+    branch = Branch(None, 0, sample[:0], nothing, sample, windows - 1, settings.bounds, run.pushes)
+    (ends,) = rollout.expand(branch).features
     total = 0.0
     for window, end in enumerate(ends):
         desired = rollout.desired(window)
@@ -173,18 +257,39 @@ def _mean_cost(rollout: Rollout, ends: FloatArray, settings: Settings) -> float:
         terms = cost.terms(rollout.layout, rollout.height, rows, desired, settings.bounds)
         value = float(terms.cost(settings.weights)[0])
         if not np.isfinite(value) or not np.isfinite(end).all():
-            return (total + _LOST * (len(ends) - window)) / len(ends)
+            return Tried((total + _LOST * (windows - window)) / windows, held=False)
         total += min(value, _WORST)
-    return total / len(ends)
+    return Tried(total / windows, held=True)
 
 
-def _usual(name: str) -> float:
-    feature = name.rpartition(".")[2]
-    return _USUAL.get(feature, _SPIN if feature.startswith("spin") else 1.0)
-
-
-def _gains(found: tuple[str, ...], values: FloatArray) -> Gains:
-    return {
-        name: float(f"{value:.{_DIGITS}g}")
-        for name, value in zip(found, values.tolist(), strict=True)
+def _bare(problem: Problem, assistance: float) -> Problem:
+    """A problem without a policy, lest an engine is made for each of them; with some assistance."""
+    bare = replace(problem, feedback={}, offsets={})
+    if not assistance:
+        return bare
+    gains = {
+        "gains.root.p": assistance * _ROOT_STIFFNESS,
+        "gains.root.d": assistance * _ROOT_DAMPING,
+        "gains.root_r.p": 0.0,
+        "gains.root_r.d": 0.0,
     }
+    return replace(bare, controller={**problem.controller, "root_assistance": True, **gains})
+
+
+def _windows_a_cycle(problem: Problem, rollout: Rollout) -> int:
+    """Windows of a cycle, if it is cut into whole ones; else 0."""
+    frames = read_clip(rollout.plan.character, problem.clip)
+    share = len(rollout.windows) * float(frames.times[-1]) / problem.duration
+    whole = abs(share - round(share)) < 1e-6
+    return round(share) if frames.wraps and whole else 0
+
+
+def _cma() -> ModuleType:
+    try:
+        import cma  # type: ignore[import-untyped,unused-ignore]
+    except ImportError as error:
+        raise ConfigurationError(
+            "--fit needs the package 'cma': pip install 'actuated_characters[fit]'"
+        ) from error
+    module: ModuleType = cma
+    return module

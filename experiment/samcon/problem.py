@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from experiment.plan import Plan, make_plan
-from experiment.samcon.settings import Settings
+from experiment.samcon.settings import Rows, Settings
 from msgs_config.arrays import IntArray
 from msgs_config.tick_clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 
@@ -24,6 +24,7 @@ class Problem:
     controller: Mapping[str, object] = field(default_factory=dict)
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name
     feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
+    offsets: Mapping[str, Rows] = field(default_factory=dict)  # to begin with, see `Settings`
 
     @classmethod
     def of(
@@ -44,6 +45,7 @@ class Problem:
             settings.gains,
             settings.feedback,
             settings.feedforward,
+            settings.offsets,
         )
 
     def plan(self, clip: str | None = None) -> Plan:

@@ -6,15 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.controller import Controller
-from controller_node.feedback import responding
+from controller_node.feedback import Feedback, RespondingReference
+from controller_node.feedback_gains import FeedbackGains
 from controller_node.parameters import make_controller
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.corrected import Offset
+from experiment.planned_push import PlannedPush, push_schedule
 from experiment.samcon import cost
 from experiment.samcon.features import Features
 from experiment.samcon.feedforward import Feedforward
 from experiment.samcon.problem import Problem, Windows
-from experiment.samcon.settings import Bounds
+from experiment.samcon.settings import Bounds, Rows
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.joint_layout import Configuration
@@ -35,6 +37,7 @@ class Branch:
     samples: FloatArray  # (s, n) offsets to try in the window after the path
     lookahead: int = 0  # windows without a correction that are simulated after that, to look
     bounds: Bounds | None = None  # beyond which a sample is not followed any further
+    pushes: tuple[PlannedPush, ...] = ()  # upon each of the samples
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,7 @@ class Rollout:
         self.windows = Windows(plan.ticks, plan.simulator.integer("rate"), problem.window)
         self.features = Features(plan.character)
         self._trial = Trial(plan.reference)
+        self._feedback: Feedback | None = None
         self._controller = self._responding(problem.feedback)
         self._feedforward = Feedforward(
             plan.character,
@@ -127,7 +131,9 @@ class Rollout:
         )
         self.height = float(self.desired(0)[2]) if self.layout.has_floating_base else 1.0  # m
         self._share = problem.feedforward
-        self._plain: dict[int, FloatArray] = {}
+        self._begin = self._rows(problem.offsets)
+        self._needed: dict[int, FloatArray] = {}  # of the inverse dynamics, by window
+        self._pushes = push_schedule(plan, ())
         self._simulation = self._fresh()
         self._episode_ns = self._simulation.actors[0].state.stamp_ns
 
@@ -135,13 +141,20 @@ class Rollout:
         """End the engine."""
         self._simulation.close()
 
-    def respond(self, gains: Mapping[str, float]) -> None:
-        """Have other gains of the feedback, by name, than the problem's."""
+    def act(self, gains: Mapping[str, float], offsets: Mapping[str, Rows]) -> None:
+        """Have other gains of the feedback, and other offsets to begin with, than the problem's."""
         self._controller = self._responding(gains)
+        self._begin = self._rows(offsets)
 
     def _responding(self, gains: Mapping[str, float]) -> Controller:
         plan = self.plan
-        reference = responding(plan.character, self._trial, plan.reference, gains)
+        if not any(gains.values()):
+            return make_controller(plan.character, self._trial, plan.controller)
+        found = FeedbackGains.of(gains)
+        if self._feedback is None:
+            known = plan.ticks + 1
+            self._feedback = Feedback(plan.character, plan.reference, found, known_ticks=known)
+        reference = RespondingReference(self._trial, self._feedback.with_gains(found))
         return make_controller(plan.character, reference, plan.controller)
 
     def desired(self, window: int) -> FloatArray:
@@ -151,14 +164,25 @@ class Rollout:
         return self.features.row(state.configuration.position, state.velocity)
 
     def plain(self, window: int) -> FloatArray:
-        """The offset (n,) of a window without a correction: zero, or the inverse dynamics' one."""
-        if window not in self._plain:
-            offset = np.zeros(self.layout.size)
-            if self._share:
-                found = self._feedforward.offset(self.windows.times(window))
-                offset = np.clip(self._share * found, -_LARGEST_PLAIN, _LARGEST_PLAIN)
-            self._plain[window] = offset
-        return self._plain[window]
+        """The offset (n,) of a window without a correction.
+
+        The problem's of the window in its cycle, and its share of the inverse dynamics' one.
+        """
+        offset: FloatArray = self._begin[window % len(self._begin)]
+        if not self._share:
+            return offset
+        if window not in self._needed:
+            found = self._share * self._feedforward.offset(self.windows.times(window))
+            self._needed[window] = np.clip(found, -_LARGEST_PLAIN, _LARGEST_PLAIN)
+        return offset + self._needed[window]
+
+    def _rows(self, offsets: Mapping[str, Rows]) -> FloatArray:
+        """Offsets (c, n) of a cycle's windows."""
+        count = max((len(rows) for rows in offsets.values()), default=1)
+        table = np.zeros((count, self.layout.size))
+        for name, rows in offsets.items():
+            table[:, self.layout.joint(name).entries] = rows
+        return table
 
     def expand(self, branch: Branch) -> Expansion:
         """Try a branch's samples."""
@@ -177,6 +201,7 @@ class Rollout:
         rows = np.full((len(branch.samples), 1 + branch.lookahead, self.features.width), np.nan)
         for row, sample in zip(rows, branch.samples, strict=True):
             simulation.restore(saved)
+            self._pushes = push_schedule(self.plan, branch.pushes)
             self._try(window, before, Offset(self.layout, sample), row, branch.bounds)
         simulation.forget(saved)
         return Expansion(snapshot, start, rows)
@@ -225,4 +250,6 @@ class Rollout:
         (actor,) = simulation.actors
         for _ in range(last - first):
             effort, _ = controller.answer(actor.state, self._episode_ns)
-            simulation.step([np.where(actor.commanded, effort, 0.0)])
+            simulation.step(
+                [np.where(actor.commanded, effort, 0.0)], [self._pushes.take(simulation.tick)]
+            )

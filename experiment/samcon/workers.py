@@ -81,6 +81,12 @@ def rollout_of(problem: Problem) -> Rollout:
     return _rollouts[key]
 
 
+def forget_all() -> None:
+    """Close this process's engines."""
+    while _rollouts:
+        _rollouts.popitem()[1].close()
+
+
 def forget(problem: Problem) -> None:
     """Close this process's engine for a problem, if there is one."""
     rollout = _rollouts.pop(repr(problem), None)
