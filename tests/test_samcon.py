@@ -282,6 +282,16 @@ def test_the_search_costs_less_than_the_motion_without_corrections(
     assert found[1].cost < alone.cost
 
 
+def test_who_was_never_corrected_goes_on_however_few_the_samples(tmp_path: Path) -> None:
+    last: list[Progress] = []
+    settings = replace(SMALL, samples=4, kept=20)
+    problem = replace(PROBLEM, duration=0.6)
+
+    reconstruct(Job(problem, 1, settings, tmp_path / "w.json"), lambda now, *_: last.append(now))
+
+    assert any(not node.offsets.any() for node in last[-1].levels[-1])
+
+
 def test_a_look_ahead_is_what_comes_without_a_correction(rollout: Rollout) -> None:
     samples, nothing = offsets(2), np.zeros(LAYOUT.size)
 

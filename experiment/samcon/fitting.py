@@ -48,8 +48,8 @@ _TEST_EVERY = 3  # populations
 _TESTS = 2  # runs
 _WEAKER = 0.85  # of the root's assistance
 _WEAKEST = 0.01  # share of it, below which there is none
-_ROOT_STIFFNESS = 4000.0  # N/m, the lecture's; its orientation is left alone
-_ROOT_DAMPING = 400.0  # N s/m
+# N/m and N s/m, N m/rad and N m s/rad: the lecture's, but for a quarter of the force's
+_ASSISTANCE = {"root": (1000.0, 100.0), "root_r": (1000.0, 100.0)}
 _LONGER = 1.5  # runs, each time
 _FIRST_RUN = 3.8  # s
 _PUSH_EVERY = 2.0  # s
@@ -268,10 +268,9 @@ def _bare(problem: Problem, assistance: float) -> Problem:
     if not assistance:
         return bare
     gains = {
-        "gains.root.p": assistance * _ROOT_STIFFNESS,
-        "gains.root.d": assistance * _ROOT_DAMPING,
-        "gains.root_r.p": 0.0,
-        "gains.root_r.d": 0.0,
+        f"gains.{vector}.{kind}": assistance * gain
+        for vector, pair in _ASSISTANCE.items()
+        for kind, gain in zip("pd", pair, strict=True)
     }
     return replace(bare, controller={**problem.controller, "root_assistance": True, **gains})
 

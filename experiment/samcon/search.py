@@ -139,11 +139,12 @@ class _Steps:
 
     def next_level(self, progress: Progress) -> list[Node]:
         """The nodes that are kept of the next window; none if all samples are lost."""
-        window, parents, settings = progress.window, progress.levels[-1], self._settings
+        window, settings = progress.window, self._settings
         tried = sum(progress.tries.values())
         rng = np.random.default_rng(np.random.SeedSequence([settings.seed, window, tried]))
         refined = int(settings.refined * settings.samples)
         broad = max(settings.samples - refined, 1)
+        parents = self._some(progress.levels[-1], broad)
         owners = np.arange(broad) * len(parents) // broad
         offsets = self._drawn(rng, broad) + self._rollout.plain(window)
         plain = np.flatnonzero(np.diff(owners, prepend=-1))
@@ -175,6 +176,15 @@ class _Steps:
         sound.sort(key=lambda index: (samples.costs[index], index))
         never = [i for i in sound if self._is_plain(parents[samples.owners[i]])]
         return sound[: max(int(_PLAIN * self._settings.kept), 1)] + never
+
+    def _some(self, nodes: list[Node], count: int) -> list[Node]:
+        """At most so many of the nodes, good ones and bad ones; who was never corrected is in."""
+        if len(nodes) <= count:
+            return nodes
+        some = [nodes[index * len(nodes) // count] for index in range(count)]
+        never = [node for node in nodes if self._is_plain(node)]
+        some = [node for node in some if all(node is not other for other in never)]
+        return [*some[: count - len(never)], *never]
 
     def _is_plain(self, node: Node) -> bool:
         """Whether nothing on the way to a node was a correction."""
