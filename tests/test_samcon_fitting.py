@@ -1,5 +1,6 @@
 """The fit of the balance feedback to a motion, and the angular momentum that its cost looks at."""
 
+import json
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,6 @@ from controller_node.feedback_gains import FeedbackGains
 from experiment.cli import main
 from experiment.loop import ticks_in_process
 from experiment.planned_push import planned_push
-from experiment.samcon.checkpoint import checkpoint_path, read_policy
 from experiment.samcon.features import Features
 from experiment.samcon.fitting import Fit, Level, State, Trials, fitted
 from experiment.samcon.policy import Policy, PolicySpace, names
@@ -162,10 +162,13 @@ def test_a_push_in_a_trial_is_that_of_a_run() -> None:
 
 
 def test_what_was_fitted_is_resumed_with(tmp_path: Path) -> None:
-    output, stopped = tmp_path / "spin.json", KeyboardInterrupt()
-    settings = preset("humanoid", "spin", samples=4, lookahead=0)
-    problem = Problem.of("humanoid", "spin", 0.2, settings)
-    job = Job(problem, 1, settings, output).with_policy(Policy({"stance.hip_x.tilt_x": 0.123}))
+    output, stopped = tmp_path / "walk.json", KeyboardInterrupt()
+    settings = preset("humanoid", "walk", 240, samples=8)
+    simulator = {"rate": 240, "command_delay_ticks": 0}
+    duration = duration_of("humanoid", "walk", 1)
+    problem = Problem.of("humanoid", "walk", duration, settings, simulator)
+    found = {**settings.feedback, "stance.knee.one": 0.0876}
+    job = Job(problem, 1, settings, output).with_policy(Policy(found))
 
     def report(progress: Progress, *_: float) -> None:
         if progress.window == 2:
@@ -174,7 +177,9 @@ def test_what_was_fitted_is_resumed_with(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         reconstruct(job, report)
 
-    assert read_policy(checkpoint_path(output)) == Policy({"stance.hip_x.tilt_x": 0.123})
+    options = ["--samples", "8", "--workers", "1", "--output", str(output)]
+    assert main(["reconstruct", *options, "--resume"]) == 0
+    assert json.loads(output.read_text())["Feedback"] == found
 
 
 @pytest.mark.parametrize(
