@@ -22,6 +22,7 @@ from experiment.samcon.reconstruction import Job, duration_of, reconstruct
 from experiment.samcon.rollout import Branch, Rollout
 from experiment.samcon.search import Progress
 from experiment.samcon.settings import preset
+from experiment.samcon.workers import some_processes
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 
@@ -33,7 +34,7 @@ PROBLEM = Problem.of("humanoid", "jump", 0.2, SETTINGS)
 
 def mean_cost(policy: Policy) -> float:
     """What a policy costs in the runs with which a fit tests it."""
-    cost, _ = Trials(PROBLEM, SETTINGS, 1).test(Level(0.0, 4, 0.0), Fit(16), policy)
+    cost, _ = Trials(PROBLEM, SETTINGS).test(Level(0.0, 4, 0.0), Fit(16), policy)
     return cost
 
 
@@ -136,7 +137,8 @@ def test_a_fit_never_ends_with_a_worse_policy_than_it_began_with() -> None:
 def test_a_walk_begins_with_the_offsets_of_its_cycle() -> None:
     settings = preset("humanoid", "walk", window=0.1056)  # s, twelve a cycle
     problem = Problem.of("humanoid", "walk", duration_of("humanoid", "walk", 2), settings)
-    with Trials(problem, settings, 1) as trials:
+    with some_processes(1) as alone:
+        trials = Trials(problem, settings, alone)
         offsets = trials.space.policy(np.linspace(0.1, 1.0, 200)).offsets
 
     with closing(Rollout(replace(problem, offsets=offsets))) as rollout:

@@ -9,30 +9,27 @@ the policy in the middle gets to the end of its runs. Then the runs get longer, 
 
 Sources: Hansen 2016, "The CMA Evolution Strategy: A Tutorial"; the package `cma` is its author's.
 Liu, van de Panne and Yin 2016, "Guided Learning of Control Graphs", fit such a feedback likewise;
-Sharon and van de Panne 2005, "Synthesis of Controllers for Stylized Planar Bipedal Walking".
+van de Panne and Lamouret 1995, "Guided Optimization for Balanced Locomotion", help at first, too.
 """
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from math import cos, sin
-from types import ModuleType, TracebackType
+from types import ModuleType
 
 import joblib
 import numpy as np
 
 from controller_node.references.clip_file import read_clip
 from experiment.planned_push import PlannedPush, planned_push
-from experiment.samcon import cost
 from experiment.samcon.policy import Policy, PolicySpace
 from experiment.samcon.problem import Problem
 from experiment.samcon.rollout import Branch, Rollout
 from experiment.samcon.settings import Settings
 from experiment.samcon.workers import (
-    forget_all,
     leave_interrupts_to_the_parent,
-    processes,
     rollout_of,
+    some_processes,
 )
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
@@ -53,7 +50,6 @@ _ASSISTANCE = {"root": (1000.0, 100.0), "root_r": (1000.0, 100.0)}
 _LONGER = 1.5  # runs, each time
 _FIRST_RUN = 3.8  # s
 _PUSH_EVERY = 2.0  # s
-_PUSH_TIME = 0.1  # s
 
 
 @dataclass(frozen=True)
@@ -117,7 +113,8 @@ def fitted(
         ConfigurationError: there is no package `cma`, or a number of the fit is wrong.
     """
     cma = _cma()
-    with Trials(problem, settings, workers) as trials:
+    with some_processes(workers) as parallel:
+        trials = Trials(problem, settings, parallel)
         space, level = trials.space, trials.first_level(fit)
         best = Policy(problem.feedback, problem.offsets)
         first = space.vector(best)
@@ -152,9 +149,11 @@ class Tried:
 
 
 class Trials:
-    """Tries policies, on a number of processes; 1 is this process alone."""
+    """Tries policies, on some processes; None is this one alone."""
 
-    def __init__(self, problem: Problem, settings: Settings, workers: int) -> None:
+    def __init__(
+        self, problem: Problem, settings: Settings, parallel: joblib.Parallel | None = None
+    ) -> None:
         self._problem, self._settings = problem, settings
         rollout = rollout_of(_bare(problem, 0.0))
         self.windows = len(rollout.windows)
@@ -162,23 +161,8 @@ class Trials:
             problem, rollout.plan.character, _windows_a_cycle(problem, rollout)
         )
         self._plan = rollout.plan
-        self._noise = np.zeros(rollout.layout.size)
-        for name, widths in settings.noise.items():
-            self._noise[rollout.layout.joint(name).entries] = widths
-        self._open = ExitStack()
-        self._parallel = self._open.enter_context(processes(workers)) if workers > 1 else None
-
-    def __enter__(self) -> "Trials":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._open.close()
-        forget_all()
+        self._noise = settings.largest_offsets(rollout.layout)
+        self._parallel = parallel
 
     def first_level(self, fit: Fit) -> Level:
         """Where a fit begins: all windows at once, unless the root is held at first."""
@@ -216,9 +200,10 @@ class Trials:
             return ()
         end = level.windows * self._problem.duration / self.windows
         root = self._plan.character.links[0].name
-        times = np.arange(rng.uniform(0.5, _PUSH_EVERY), end - _PUSH_TIME, _PUSH_EVERY).tolist()
+        held = self._plan.simulator.number("wrench_duration")
+        times = np.arange(rng.uniform(0.5, _PUSH_EVERY), end - held, _PUSH_EVERY).tolist()
         sides = rng.uniform(-np.pi, np.pi, len(times)).tolist()
-        force = level.push / self._plan.simulator.number("wrench_duration")
+        force = level.push / held
         return tuple(
             planned_push(self._plan, root, (force * cos(side), force * sin(side), 0.0), time)
             for time, side in zip(times, sides, strict=True)
@@ -252,11 +237,8 @@ def tried(problem: Problem, settings: Settings, windows: int, policy: Policy, ru
     (ends,) = rollout.expand(branch).features
     total = 0.0
     for window, end in enumerate(ends):
-        desired = rollout.desired(window)
-        rows = np.nan_to_num(end)[np.newaxis]
-        terms = cost.terms(rollout.layout, rollout.height, rows, desired, settings.bounds)
-        value = float(terms.cost(settings.weights)[0])
-        if not np.isfinite(value) or not np.isfinite(end).all():
+        (value,) = rollout.costs(window, end[np.newaxis], settings).tolist()
+        if not np.isfinite(value):
             return Tried((total + _LOST * (windows - window)) / windows, held=False)
         total += min(value, _WORST)
     return Tried(total / windows, held=True)

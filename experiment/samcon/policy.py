@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from controller_node.feedback_gains import FEATURES, OUTPUTS
+from controller_node.feedback_gains import OUTPUTS
 from experiment.samcon.problem import Problem
 from experiment.samcon.settings import Rows
 from msgs_config.arrays import FloatArray
@@ -56,7 +56,6 @@ def names() -> tuple[str, ...]:
         for output, features in _CANDIDATES.items()
         if leg == "stance" or not output.startswith("ankle")
         for feature in features
-        if feature in FEATURES
     )
 
 

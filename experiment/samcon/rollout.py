@@ -16,7 +16,7 @@ from experiment.samcon import cost
 from experiment.samcon.features import Features
 from experiment.samcon.feedforward import Feedforward
 from experiment.samcon.problem import Problem, Windows
-from experiment.samcon.settings import Bounds, Rows
+from experiment.samcon.settings import Bounds, Rows, Settings
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.joint_layout import Configuration
@@ -162,6 +162,13 @@ class Rollout:
         end = self.windows.time(int(self.windows.bounds[window + 1]))
         state = self.plan.reference.sample(end)
         return self.features.row(state.configuration.position, state.velocity)
+
+    def costs(self, window: int, ends: FloatArray, settings: Settings) -> FloatArray:
+        """The costs (s,) of features (s, f) at a window's end; infinite of what is lost."""
+        rows, desired = np.nan_to_num(ends), self.desired(window)
+        terms = cost.terms(self.layout, self.height, rows, desired, settings.bounds)
+        sound = np.all(np.isfinite(ends), axis=1)
+        return np.where(sound, terms.cost(settings.weights), np.inf)
 
     def plain(self, window: int) -> FloatArray:
         """The offset (n,) of a window without a correction.

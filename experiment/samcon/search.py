@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from experiment.samcon import cost
 from experiment.samcon.rollout import Expansion, Rollout
 from experiment.samcon.settings import Settings
 from experiment.samcon.tree import Node, chosen, prune
@@ -130,10 +129,7 @@ class _Steps:
 
     def __init__(self, rollout: Rollout, workers: Workers, settings: Settings) -> None:
         self._rollout, self._workers, self._settings = rollout, workers, settings
-        layout = rollout.layout
-        self._noise = np.zeros(layout.size)
-        for name, widths in settings.noise.items():
-            self._noise[layout.joint(name).entries] = widths
+        self._noise = settings.largest_offsets(rollout.layout)
         self._corrected: IntArray = np.flatnonzero(self._noise)
         self.last_costs: tuple[float, ...] = ()
 
@@ -226,18 +222,9 @@ class _Steps:
 
     def _costs(self, window: int, ends: FloatArray) -> FloatArray:
         """The costs (s,) of features (s, 1 + l, f): of the window, and of how it goes on."""
-        costs = self._costs_at(window, ends[:, 0])
+        costs = self._rollout.costs(window, ends[:, 0], self._settings)
         beyond = range(window + 1, min(window + ends.shape[1], len(self._rollout.windows)))
         for later in beyond:
-            ahead = self._costs_at(later, ends[:, later - window])
+            ahead = self._rollout.costs(later, ends[:, later - window], self._settings)
             costs = costs + np.minimum(ahead, _WORST)
         return costs / (1 + len(beyond))
-
-    def _costs_at(self, window: int, ends: FloatArray) -> FloatArray:
-        rollout, settings = self._rollout, self._settings
-        sound = np.all(np.isfinite(ends), axis=1)
-        desired = rollout.desired(window)
-        found = cost.terms(
-            rollout.layout, rollout.height, np.nan_to_num(ends), desired, settings.bounds
-        ).cost(settings.weights)
-        return np.where(sound, found, np.inf)

@@ -5,10 +5,13 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import numpy as np
 import yaml
 
 from controller_node.feedback_gains import checked_gains
+from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.joint_layout import JointLayout
 
 _LARGEST_SEED = 2**32 - 2  # one more has still to be a seed of numpy
 Rows: TypeAlias = Sequence[Sequence[float]]
@@ -58,6 +61,13 @@ class Settings:
     gains: Mapping[str, float] = field(default_factory=dict)  # of the controller, by parameter
     weights: Weights = Weights()
     bounds: Bounds = Bounds()
+
+    def largest_offsets(self, layout: JointLayout) -> FloatArray:
+        """The noise (n,), zero of what is not corrected; rad or m."""
+        largest = np.zeros(layout.size)
+        for name, widths in self.noise.items():
+            largest[layout.joint(name).entries] = widths
+        return largest
 
     def content(self) -> dict[str, Any]:
         """The settings as JSON has them."""

@@ -53,7 +53,7 @@ class Workers:
         trace: TracebackType | None,
     ) -> None:
         self._open.close()
-        forget(self._problem)
+        forget()
 
     def expand(self, branches: Sequence[Branch]) -> Iterator[Expansion]:
         """The expansions of branches, in their order, as they come.
@@ -75,23 +75,28 @@ def rollout_of(problem: Problem) -> Rollout:
     """This process's engine for a problem, made when it is first asked for."""
     key = repr(problem)
     if key not in _rollouts:
-        for other in list(_rollouts):
-            _rollouts.pop(other).close()
+        forget()
         _rollouts[key] = Rollout(problem)
     return _rollouts[key]
 
 
-def forget_all() -> None:
-    """Close this process's engines."""
+def forget() -> None:
+    """Close this process's engine, if there is one."""
     while _rollouts:
         _rollouts.popitem()[1].close()
 
 
-def forget(problem: Problem) -> None:
-    """Close this process's engine for a problem, if there is one."""
-    rollout = _rollouts.pop(repr(problem), None)
-    if rollout is not None:
-        rollout.close()
+@contextmanager
+def some_processes(count: int) -> Iterator[joblib.Parallel | None]:
+    """So many processes, or None for this one alone; its engine is closed in the end."""
+    try:
+        if count == 1:
+            yield None
+            return
+        with processes(count) as parallel:
+            yield parallel
+    finally:
+        forget()
 
 
 @contextmanager
