@@ -268,6 +268,7 @@ def test_changes_that_come_together_are_taken_all_or_none(
 ) -> None:
     processes.controller("pendulum")
     simulator.ask(as_message("pendulum", some_state("pendulum", 1)))
+    said(simulator, law="stable_pd")  # the first one; only the last one would come later
     together: list[dict[str, object]] = [
         {"gains.hinge.p": 80.0, "law": "feedforward"},  # there is no file for it
         {"gains.hinge.p": 80.0, "gains.hinge.d": -1.0},
