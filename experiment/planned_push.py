@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -42,6 +43,39 @@ def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> PushSchedule:
             ticks=push_ticks(plan.simulator),
         )
     return schedule
+
+
+def parsed_push(text: str, plan: Plan) -> PlannedPush:
+    """The push that a text `LINK:FX,FY,FZ@S` says: N, world axes, and s since the first state.
+
+    Raises:
+        ConfigurationError: the text is not of that form, or see `planned_push`.
+    """
+    return planned_push(plan, *_parts(text))
+
+
+def pushes_within(texts: Sequence[str], plan: Plan) -> list[PlannedPush]:
+    """The pushes that texts say, but for those that would begin after the run.
+
+    Raises:
+        ConfigurationError: as `parsed_push`.
+    """
+    end = plan.ticks / plan.simulator.integer("rate")
+    return [parsed_push(text, plan) for text in texts if not _parts(text)[-1] >= end]
+
+
+def _parts(text: str) -> tuple[str, tuple[float, float, float], float]:
+    """Link, force and time of a text. Raises ConfigurationError if it is of another form."""
+    found = re.fullmatch(r"(.+):([^,@]+),([^,@]+),([^,@]+)@([^,@]+)", text)
+    try:
+        if found is None:
+            raise ValueError
+        x, y, z, time = (float(number) for number in found.groups()[1:])
+    except ValueError:
+        raise ConfigurationError(
+            f"--push {text}: write it as LINK:FX,FY,FZ@S, such as chest:100,0,0@1.5"
+        ) from None
+    return found[1], (x, y, z), time
 
 
 def write_pushes(file: Path, pushes: Sequence[PlannedPush]) -> None:

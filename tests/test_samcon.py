@@ -404,6 +404,8 @@ def test_the_command_writes_a_file_and_a_table(
         (("--output", "walk.json", "--clip", "wlak"), "did you mean 'walk'"),
         (("--output", "walk.json", "--character", "franka_panda"), "franka_panda"),
         (("--output", "walk.json", "--resume"), "cannot resume from"),
+        (("--output", "walk.json", "--push", "root:1,2"), "write it as LINK:FX,FY,FZ@S"),
+        (("--output", "walk.json", "--push", "root:9,0,0@9"), "time is 9.0 s; it must be 0 s to"),
     ],
 )
 def test_a_mistake_is_one_line(

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -15,21 +16,25 @@ from msgs_config.character_loading import load_character
 DURATION = 0.3  # s
 
 
-def job(file: Path, simulator: dict[str, object]) -> Job:
+PUSHES = ("chest:150,0,0@0.1", "root:0,100,0@0.25")
+
+
+def job(file: Path, simulator: dict[str, object], pushes: tuple[str, ...] = ()) -> Job:
     """A short search, with a feedback and gains of its own."""
     settings = preset("humanoid", "kick", samples=8, kept=2, lookahead=0)
     assert any(settings.feedback.values())
     assert settings.gains
-    return Job(Problem.of("humanoid", "kick", DURATION, settings, simulator), 1, settings, file)
+    problem = Problem.of("humanoid", "kick", DURATION, settings, simulator, pushes)
+    return Job(problem, 1, settings, file)
 
 
-@pytest.mark.parametrize(("rate", "delay"), [(240, 0), (480, 1)])
+@pytest.mark.parametrize(("rate", "delay", "pushes"), [(240, 0, ()), (480, 1, PUSHES)])
 def test_over_topics_it_is_what_was_found_bit_for_bit(
-    domain: int, tmp_path: Path, rate: int, delay: int
+    domain: int, tmp_path: Path, rate: int, delay: int, pushes: tuple[str, ...]
 ) -> None:
     del domain
     file, directory = tmp_path / "kick.json", tmp_path / "run"
-    found = reconstruct(job(file, {"rate": rate, "command_delay_ticks": delay}))
+    found = reconstruct(job(file, {"rate": rate, "command_delay_ticks": delay}, pushes))
 
     code = main(["run", "--clip", str(file), "--output", str(directory)])
 
@@ -99,6 +104,36 @@ def test_an_unfinished_one_is_run_as_far_as_it_was_found(kick: Path, tmp_path: P
     assert simulated(file, tmp_path / "run")["max_ticks"] == round(DURATION * 240)
 
 
+def hash_of(file: Path, directory: Path, *options: str) -> str:
+    """The hash of the states of a file's run in one process."""
+    simulated(file, directory, *options)
+    return str(json.loads((directory / "summary.json").read_text())["state_hash"])
+
+
+def test_pushes_that_were_known_come_again_unless_others_are_given(tmp_path: Path) -> None:
+    file, unpushed = tmp_path / "pushed.json", tmp_path / "unpushed.json"
+    found = reconstruct(job(file, {}, PUSHES))
+    unpushed.write_text(json.dumps(without_pushes(file)))
+    one = ("--push", PUSHES[0])
+
+    known = hash_of(file, tmp_path / "known")
+    none = hash_of(file, tmp_path / "none", "--push", "none")
+    other = hash_of(file, tmp_path / "other", *one)
+    short = hash_of(file, tmp_path / "short", "--duration", "0.2")
+
+    assert known == found.figures.state_hash
+    assert none == hash_of(unpushed, tmp_path / "1") != known
+    assert other == hash_of(unpushed, tmp_path / "2", *one) not in (known, none)
+    assert short == hash_of(unpushed, tmp_path / "3", *one, "--duration", "0.2")
+
+
+def without_pushes(file: Path) -> dict[str, Any]:
+    """The content of a file that says nothing of its pushes, as older ones did not."""
+    content: dict[str, Any] = json.loads(file.read_text())
+    del content["Reconstruction"]["pushes"]
+    return content
+
+
 def test_joints_that_are_commanded_decide_on_the_roots_assistance(
     kick: Path, tmp_path: Path
 ) -> None:
@@ -117,6 +152,9 @@ def test_joints_that_are_commanded_decide_on_the_roots_assistance(
         ({"duration": 10**400}, "Reconstruction must have 'duration'"),
         ({"parameters": {"sim_node": {}}}, "Reconstruction must have 'duration'"),
         ({"duration": 0.0}, "duration is 0.0 s"),
+        ({"pushes": 7}, "Reconstruction must have 'duration'"),
+        ({"pushes": ["tail:1,0,0@0.1"]}, "unknown link 'tail'"),
+        ({"pushes": ["root"]}, "write it as LINK:FX,FY,FZ@S"),
     ],
 )
 def test_a_file_that_does_not_say_how_it_was_found_is_refused(

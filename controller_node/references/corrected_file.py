@@ -71,6 +71,7 @@ class FoundWith:
     duration: float  # s, as far as it was found
     simulator: Mapping[str, object]  # parameters of `sim_node`, by name
     controller: Mapping[str, object]  # of `controller_node`
+    pushes: tuple[str, ...]  # LINK:FX,FY,FZ@S, which the search knew beforehand
 
 
 def read_found_with(character: Character, name_or_path: str) -> FoundWith | None:
@@ -91,7 +92,8 @@ def read_found_with(character: Character, name_or_path: str) -> FoundWith | None
         duration = float(made["duration"])
         if not made["complete"]:
             duration = min(duration, float(max(content[CORRECTIONS]["ends"], default=0.0)))
-        found = FoundWith(duration, dict(sides["sim_node"]), dict(sides["controller_node"]))
+        pushes = tuple(str(push) for push in made.get("pushes", ()))
+        found = FoundWith(duration, dict(sides["sim_node"]), dict(sides["controller_node"]), pushes)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ClipError(
             f"{path}: {RECONSTRUCTION} must have 'duration', 'complete', and 'parameters' of "

@@ -87,6 +87,14 @@ def _add_search(command: argparse.ArgumentParser) -> None:
         "--delay-ticks", type=int, default=0, metavar="D", help="by which commands come late (0)"
     )
     command.add_argument(
+        "--push",
+        action="append",
+        default=[],
+        metavar="LINK:FX,FY,FZ@S",
+        help="a force in N, world axes, on a link at a time in s, that the search knows "
+        "beforehand; it comes in the run as well; may be repeated",
+    )
+    command.add_argument(
         "--workers", type=int, metavar="N", help="processes (as many as there are cores)"
     )
     command.add_argument(
@@ -179,6 +187,7 @@ def _job(options: argparse.Namespace) -> "Job":
         duration_of(options.character, options.clip, options.cycles),
         settings,
         {"rate": options.rate, "command_delay_ticks": options.delay_ticks},
+        options.push,
     )
     job = Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
     if options.resume and not options.open_loop:  # it may have been fitted before

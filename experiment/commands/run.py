@@ -1,7 +1,6 @@
 """The command `actuated_characters run`: simulator, controller and recorder, and their figures."""
 
 import argparse
-import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from experiment.commands.settings import bring_parameters, node_settings
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a second to import
+    from controller_node.references.corrected_file import FoundWith
     from experiment.plan import Plan
     from experiment.planned_push import PlannedPush
     from experiment.planned_throw import PlannedThrow
@@ -69,7 +69,8 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         default=[],
         metavar="LINK:FX,FY,FZ@S",
         help="a force in N, world axes, on a link at a time in s, for sim_node.wrench_duration; "
-        "may be repeated",
+        "may be repeated. A reconstruction brings those that it was found with, but for others "
+        "that are given; none: without any",
     )
     run.add_argument(
         "--throw",
@@ -137,8 +138,10 @@ def _run(options: argparse.Namespace) -> None:
 
     settings = node_settings(options.set, _NODES)
     _set_behaviour(options.behaviour, settings["controller_node"])
-    plan = _checked_plan(options, settings["sim_node"], settings["controller_node"])
-    pushes = [_push(text, plan) for text in options.push]
+    simulator, controller = settings["sim_node"], settings["controller_node"]
+    found_in = bring_parameters(options.character, options.clip, simulator, controller)
+    plan = _checked_plan(options, simulator, controller, found_in)
+    pushes = _pushes(options.push, plan, found_in)
     throws, in_the_way = plan_throws(plan, options.throw)
     motion = _name_of(plan.controller)
     name = f"{plan.character.name}-{Path(motion).stem}"
@@ -162,14 +165,16 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _checked_plan(
-    options: argparse.Namespace, simulator: dict[str, object], controller: dict[str, object]
+    options: argparse.Namespace,
+    simulator: dict[str, object],
+    controller: dict[str, object],
+    found_in: "FoundWith | None",
 ) -> "Plan":
     """What is to be run; raises ActuatedCharactersError where options contradict each other."""
     from experiment.plan import make_plan
     from sim_node.parameters import tick_period
 
-    found_in = bring_parameters(options.character, options.clip, simulator, controller)
-    duration = _DURATION if found_in is None else found_in
+    duration = _DURATION if found_in is None else found_in.duration
     if options.duration is not None:
         duration = options.duration
     plan = make_plan(options.character, duration, _reference(options), simulator, controller)
@@ -242,20 +247,15 @@ def _reference(options: argparse.Namespace) -> dict[str, object]:
     return {"reference": options.reference or "hold"}
 
 
-def _push(text: str, plan: "Plan") -> "PlannedPush":
-    """What `--push LINK:FX,FY,FZ@S` says."""
-    from experiment.planned_push import planned_push
+def _pushes(texts: list[str], plan: "Plan", found_in: "FoundWith | None") -> "list[PlannedPush]":
+    """Those of `--push`; without any, those with which a reconstruction was found."""
+    from experiment.planned_push import parsed_push, pushes_within
 
-    found = re.fullmatch(r"(.+):([^,@]+),([^,@]+),([^,@]+)@([^,@]+)", text)
-    try:
-        if found is None:
-            raise ValueError
-        x, y, z, time = (float(number) for number in found.groups()[1:])
-    except ValueError:
-        raise ConfigurationError(
-            f"--push {text}: write it as LINK:FX,FY,FZ@S, such as chest:100,0,0@1.5"
-        ) from None
-    return planned_push(plan, found[1], (x, y, z), time)
+    if texts == ["none"]:
+        return []
+    if texts or found_in is None:
+        return [parsed_push(text, plan) for text in texts]
+    return pushes_within(found_in.pushes, plan)
 
 
 def _set_behaviour(behaviour: str | None, controller: dict[str, object]) -> None:

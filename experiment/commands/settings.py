@@ -1,10 +1,14 @@
 """What `--set NODE.NAME:=VALUE` says."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import yaml
 
 from msgs_config.errors import ConfigurationError, one_of
+
+if TYPE_CHECKING:  # it takes a while to import
+    from controller_node.references.corrected_file import FoundWith
 
 
 def node_settings(texts: Sequence[str], nodes: Sequence[str]) -> dict[str, dict[str, object]]:
@@ -35,10 +39,10 @@ def bring_parameters(
     clip: str | None,
     simulator: dict[str, object],
     controller: dict[str, object],
-) -> float | None:
+) -> "FoundWith | None":
     """Set what a clip was found with, unless it is set, if it is a reconstruction.
 
-    Returns its length in s, None of other clips.
+    Returns all that it was found with, None of other clips.
 
     Raises:
         ActuatedCharactersError: there is no such character or clip, or its file is malformed.
@@ -59,4 +63,4 @@ def bring_parameters(
         settings.update(
             {name: brought[name] for name in brought if name not in (*settings, *taken)}
         )
-    return found.duration
+    return found

@@ -1,12 +1,13 @@
 """What is to be reconstructed: a motion over some time, in windows, under a run's parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from experiment.plan import Plan, make_plan
+from experiment.planned_push import PlannedPush, parsed_push
 from experiment.samcon.settings import Rows, Settings
 from msgs_config.arrays import IntArray
 from msgs_config.tick_clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
@@ -25,6 +26,7 @@ class Problem:
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name
     feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
     offsets: Mapping[str, Rows] = field(default_factory=dict)  # to begin with, see `Settings`
+    pushes: tuple[str, ...] = ()  # LINK:FX,FY,FZ@S, which the search knows beforehand
 
     @classmethod
     def of(
@@ -34,6 +36,7 @@ class Problem:
         duration: float,
         settings: Settings,
         simulator: Mapping[str, object] | None = None,
+        pushes: Sequence[str] = (),
     ) -> "Problem":
         """A motion over a time in s, with what a search's settings say of how it is run."""
         return cls(
@@ -46,7 +49,12 @@ class Problem:
             settings.feedback,
             settings.feedforward,
             settings.offsets,
+            tuple(pushes),
         )
+
+    def planned_pushes(self, plan: Plan) -> tuple[PlannedPush, ...]:
+        """The pushes of its plan. Raises ConfigurationError if one is wrong."""
+        return tuple(parsed_push(text, plan) for text in self.pushes)
 
     def plan(self, clip: str | None = None) -> Plan:
         """The run, of the motion itself or of another clip; the root is not driven.

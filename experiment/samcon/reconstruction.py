@@ -144,6 +144,7 @@ def _write(
             "sim_node": dict(job.problem.simulator),
             "controller_node": {"root_assistance": False, **job.problem.controller},
         },
+        "pushes": list(job.problem.pushes),
         "settings": job.settings.content(),
         "complete": len(path) == len(rollout.windows),
         "costs": [node.cost for node in path],

@@ -37,7 +37,7 @@ class Branch:
     samples: FloatArray  # (s, n) offsets to try in the window after the path
     lookahead: int = 0  # windows without a correction that are simulated after that, to look
     bounds: Bounds | None = None  # beyond which a sample is not followed any further
-    pushes: tuple[PlannedPush, ...] = ()  # upon each of the samples
+    pushes: tuple[PlannedPush, ...] = ()  # upon each of the samples, beside the problem's
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,8 @@ class Rollout:
         self._share = problem.feedforward
         self._begin = self._rows(problem.offsets)
         self._needed: dict[int, FloatArray] = {}  # of the inverse dynamics, by window
-        self._pushes = push_schedule(plan, ())
+        self._planned = problem.planned_pushes(plan)
+        self._pushes = push_schedule(plan, self._planned)
         self._simulation = self._fresh()
         self._episode_ns = self._simulation.actors[0].state.stamp_ns
 
@@ -199,6 +200,7 @@ class Rollout:
         else:
             self._simulation.take_over(branch.snapshot)
         simulation = self._simulation
+        self._pushes = push_schedule(self.plan, self._planned)
         window, before = branch.start, self._offset(branch.start - 1, branch.before)
         for row in branch.path:
             offset = Offset(self.layout, row)
@@ -208,7 +210,7 @@ class Rollout:
         rows = np.full((len(branch.samples), 1 + branch.lookahead, self.features.width), np.nan)
         for row, sample in zip(rows, branch.samples, strict=True):
             simulation.restore(saved)
-            self._pushes = push_schedule(self.plan, branch.pushes)
+            self._pushes = push_schedule(self.plan, (*self._planned, *branch.pushes))
             self._try(window, before, Offset(self.layout, sample), row, branch.bounds)
         simulation.forget(saved)
         return Expansion(snapshot, start, rows)

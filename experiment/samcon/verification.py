@@ -46,7 +46,7 @@ def verified(problem: Problem, file: Path, best: Node) -> Figures:
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     measurement = Measurement(known)
     positions: list[FloatArray] = []
-    for count, tick in enumerate(ticks_in_process(plan), start=1):
+    for count, tick in enumerate(ticks_in_process(plan, problem.planned_pushes(plan)), start=1):
         if count == 1:
             measurement.add_state(tick.state)
         measurement.add_state(tick.following)
