@@ -15,14 +15,14 @@ from experiment.cli import main
 from experiment.loop import ticks_in_process
 from experiment.planned_push import planned_push
 from experiment.samcon.features import Features
-from experiment.samcon.fitting import Fit, Level, State, Trials, fitted
-from experiment.samcon.policy import Policy, PolicySpace, names
+from experiment.samcon.fitting import State, fitted
+from experiment.samcon.gain_space import Gains, GainSpace, names
 from experiment.samcon.problem import Problem
 from experiment.samcon.reconstruction import Job, duration_of, reconstruct
 from experiment.samcon.rollout import Branch, Rollout
 from experiment.samcon.search import Progress
 from experiment.samcon.settings import preset
-from experiment.samcon.workers import some_processes
+from experiment.samcon.trials import Fit, Level, Trials
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 
@@ -30,11 +30,12 @@ HUMANOID = character("humanoid")
 SIZE = HUMANOID.layout.size
 SETTINGS = preset("humanoid", "jump")
 PROBLEM = Problem.of("humanoid", "jump", 0.2, SETTINGS)
+LEVEL = Level(0.0, 4, 0.0)
 
 
-def mean_cost(policy: Policy) -> float:
-    """What a policy costs in the runs with which a fit tests it."""
-    cost, _ = Trials(PROBLEM, SETTINGS).test(Level(0.0, 4, 0.0), Fit(16), policy)
+def mean_cost(gains: Gains) -> float:
+    """What a feedback costs in the runs with which a fit tests it."""
+    cost, _ = Trials(PROBLEM, SETTINGS, Fit(16)).test(LEVEL, gains)
     return cost
 
 
@@ -76,30 +77,15 @@ def test_what_is_fitted_are_gains() -> None:
     assert FeedbackGains.of(dict.fromkeys(names(), 1.0)).stance.any()
 
 
-def test_a_policy_is_its_vector_again() -> None:
-    space = PolicySpace(Problem.of("humanoid", "walk", 1.0, SETTINGS), HUMANOID, 4)
-    vector = np.round(np.sin(np.arange(len(space.vector(Policy({}))))), 2)
+def test_gains_are_their_vector_again() -> None:
+    space = GainSpace({"stance.knee.side": 0.3})
+    vector = np.round(np.sin(np.arange(len(space.vector({})))), 2)
 
-    policy = space.policy(vector)
+    gains = space.gains(vector)
 
-    np.testing.assert_allclose(space.vector(policy), vector, rtol=0.01)
-    assert policy.feedback[names()[3]] != 0.0
-
-
-def test_the_second_half_of_a_cycle_mirrors_the_first() -> None:
-    space = PolicySpace(Problem.of("humanoid", "walk", 1.0, SETTINGS), HUMANOID, 4)
-    count = len(space.vector(Policy({})))
-
-    offsets = space.policy(np.arange(1.0, 1.0 + count)).offsets
-
-    for name, other in (("hip", "left_hip"), ("ankle", "left_ankle")):
-        x, y, z = offsets[f"right_{name}"][1]
-        assert offsets[other][3] == [-x, -y, z]
-    assert offsets["left_knee"][2] == offsets["right_knee"][0] != offsets["left_knee"][0]
-
-
-def test_a_motion_that_ends_has_no_offsets() -> None:
-    assert not PolicySpace(PROBLEM, HUMANOID, 0).policy(np.zeros(200)).offsets
+    np.testing.assert_allclose(space.vector(gains), vector, rtol=0.01)
+    assert gains[names()[3]] != 0.0
+    assert "stance.knee.side" in gains
 
 
 def test_it_gets_harder_step_by_step_to_a_last_level() -> None:
@@ -110,7 +96,7 @@ def test_it_gets_harder_step_by_step_to_a_last_level() -> None:
         level = harder
         steps.append((round(level.assistance, 4), level.windows, level.push))
 
-    assert steps == [(0.0, 10, 0.0), (0.0, 15, 0.0), (0.0, 20, 0.0), (0.0, 20, 5.0)]
+    assert steps == [(0.0, 10, 0.0), (0.0, 14, 0.0), (0.0, 19, 0.0), (0.0, 20, 0.0), (0.0, 20, 5.0)]
 
 
 def test_the_fit_is_the_same_on_two_processes_and_costs_what_it_says() -> None:
@@ -122,30 +108,35 @@ def test_the_fit_is_the_same_on_two_processes_and_costs_what_it_says() -> None:
 
     assert alone == together
     assert [state.done for state in told] == [16]
-    assert told[0].cost == mean_cost(alone) < mean_cost(Policy({}))
+    assert told[0].cost == mean_cost(alone) < mean_cost({})
 
 
-def test_a_fit_never_ends_with_a_worse_policy_than_it_began_with() -> None:
+def test_a_fit_never_ends_with_a_worse_feedback_than_it_began_with() -> None:
     best = fitted(PROBLEM, SETTINGS, Fit(16), 1)
     for _ in range(2):  # a fit of what was fitted tries others around it
-        better = fitted(replace(PROBLEM, feedback=best.feedback), SETTINGS, Fit(16), 1)
+        better = fitted(replace(PROBLEM, feedback=best), SETTINGS, Fit(16), 1)
 
         assert mean_cost(better) <= mean_cost(best)
         best = better
 
 
-def test_a_walk_begins_with_the_offsets_of_its_cycle() -> None:
-    settings = preset("humanoid", "walk", window=0.1056)  # s, twelve a cycle
-    problem = Problem.of("humanoid", "walk", duration_of("humanoid", "walk", 2), settings)
-    with some_processes(1) as alone:
-        trials = Trials(problem, settings, alone)
-        offsets = trials.space.policy(np.linspace(0.1, 1.0, 200)).offsets
+def test_a_motion_is_the_same_a_quarter_further_and_not_an_eighth() -> None:
+    def cost(turn: float) -> float:
+        turned = replace(PROBLEM, simulator={"placement": [0.0, 0.0, 0.0, turn * np.pi]})
+        return Trials(turned, SETTINGS, Fit(16)).test(LEVEL, PROBLEM.feedback)[0]
 
-    with closing(Rollout(replace(problem, offsets=offsets))) as rollout:
-        plain = rollout.plain(12 + 3)[HUMANOID.layout.joint("left_knee").entries]
+    assert cost(0.5) == pytest.approx(cost(0.0), rel=1e-6)
+    assert cost(0.25) != pytest.approx(cost(0.0), rel=1e-6)
 
-    assert {len(rows) for rows in offsets.values()} == {12}
-    assert plain.tolist() == offsets["left_knee"][3] != [0.0]
+
+def test_each_feedback_is_tried_at_all_headings() -> None:
+    def cost(headings: int, turn: float) -> float:
+        turned = replace(PROBLEM, simulator={"placement": [0.0, 0.0, 0.0, turn * np.pi]})
+        fit = Fit(16, headings=headings, nudge=0.0)
+        (found,) = Trials(turned, SETTINGS, fit).costs(LEVEL, [PROBLEM.feedback], 1)
+        return found
+
+    assert cost(2, 0.0) == np.mean([cost(1, 0.0), cost(1, 0.25)])
 
 
 def test_a_push_in_a_trial_is_that_of_a_run() -> None:
@@ -170,7 +161,7 @@ def test_what_was_fitted_is_resumed_with(tmp_path: Path) -> None:
     duration = duration_of("humanoid", "walk", 1)
     problem = Problem.of("humanoid", "walk", duration, settings, simulator)
     found = {**settings.feedback, "stance.knee.one": 0.0876}
-    job = Job(problem, 1, settings, output).with_policy(Policy(found))
+    job = Job(problem, 1, settings, output).with_feedback(found)
 
     def report(progress: Progress, *_: float) -> None:
         if progress.window == 2:

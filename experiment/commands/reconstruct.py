@@ -14,13 +14,14 @@ from rich.table import Table
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
-    from experiment.samcon.fitting import Fit
     from experiment.samcon.fitting import State as FitState
     from experiment.samcon.reconstruction import Job, Reconstruction
     from experiment.samcon.search import Progress as SearchProgress
+    from experiment.samcon.trials import Fit
 
 _SUFFIX = ".json"
 _CHARACTER = "humanoid"
+_MOST_HEADINGS = 8  # each has an engine in each process
 
 
 def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -65,8 +66,7 @@ def _add_search(command: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="fit the feedback first, and of a clip that wraps the offsets that a cycle begins "
-        "with: try N of them, in sixteens (0)",
+        help="fit the feedback first: try N of them, in sixteens (0)",
     )
     command.add_argument(
         "--fit-assistance",
@@ -81,6 +81,14 @@ def _add_search(command: argparse.ArgumentParser) -> None:
         default=0.0,
         metavar="NS",
         help="N s, of the pushes in the last runs of the fit, each two seconds (0)",
+    )
+    command.add_argument(
+        "--fit-headings",
+        type=int,
+        default=1,
+        metavar="N",
+        help="of the motion, at which each feedback is tried: for what turns, as the engine's "
+        "friction is not the same in all directions (1)",
     )
     command.add_argument("--rate", type=int, default=240, metavar="HZ", help="control rate (240)")
     command.add_argument(
@@ -103,8 +111,8 @@ def _add_search(command: argparse.ArgumentParser) -> None:
 
 
 def _reconstruct(options: argparse.Namespace) -> None:
-    from experiment.samcon.fitting import Fit
     from experiment.samcon.reconstruction import reconstruct
+    from experiment.samcon.trials import Fit
 
     job = _job(options)
     bar = Progress(
@@ -124,7 +132,7 @@ def _reconstruct(options: argparse.Namespace) -> None:
 
     with bar:
         if options.fit:
-            fit = Fit(options.fit, options.fit_assistance, options.fit_push)
+            fit = Fit(options.fit, options.fit_assistance, options.fit_push, options.fit_headings)
             job = _fitted(job, fit, bar)
         found = reconstruct(job, report)
     _report(job, found)
@@ -146,13 +154,12 @@ def _fitted(job: "Job", fit: "Fit", bar: Progress) -> "Job":
             state=f"{held}{level.windows} windows{pushed}: mean cost {state.cost:.3g}",
         )
 
-    policy = fitted(job.problem, job.settings, fit, job.workers, report)
-    return job.with_policy(policy)
+    return job.with_feedback(fitted(job.problem, job.settings, fit, job.workers, report))
 
 
 def _job(options: argparse.Namespace) -> "Job":
     """What is to be done; raises ActuatedCharactersError where options cannot be used."""
-    from experiment.samcon.checkpoint import checkpoint_path, read_policy
+    from experiment.samcon.checkpoint import checkpoint_path, read_feedback
     from experiment.samcon.problem import Problem
     from experiment.samcon.reconstruction import Job, duration_of
     from experiment.samcon.settings import preset
@@ -191,7 +198,7 @@ def _job(options: argparse.Namespace) -> "Job":
     )
     job = Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
     if options.resume and not options.open_loop:  # it may have been fitted before
-        return job.with_policy(read_policy(checkpoint_path(output)))
+        return job.with_feedback(read_feedback(checkpoint_path(output)))
     return job
 
 
@@ -205,6 +212,10 @@ def _check_fit(options: argparse.Namespace) -> None:
             raise ConfigurationError(f"{option} is {value:g}; it must be 0 to {most:g}")
         if value and not options.fit:
             raise ConfigurationError(f"{option} is for --fit, which says how many are tried")
+    if not 1 <= options.fit_headings <= _MOST_HEADINGS:
+        raise ConfigurationError(
+            f"--fit-headings is {options.fit_headings}; it must be 1 to {_MOST_HEADINGS}"
+        )
     if not options.fit:
         return
     if options.open_loop:

@@ -9,7 +9,7 @@ import numpy as np
 
 from controller_node.feedback_gains import checked_gains
 from controller_node.references.corrected_file import write_whole
-from experiment.samcon.policy import Policy
+from experiment.samcon.gain_space import Gains
 from experiment.samcon.search import Progress
 from experiment.samcon.tree import Node
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -58,15 +58,14 @@ def write_checkpoint(path: Path, key: Mapping[str, Any], progress: Progress) -> 
     write_whole(path, json.dumps(content))
 
 
-def read_policy(path: Path) -> Policy:
-    """The feedback and the offsets that a checkpoint's search began with.
+def read_feedback(path: Path) -> Gains:
+    """The feedback with which a checkpoint's search was made.
 
     Raises:
         RecordingError: there is none, or it cannot be read.
     """
     try:
-        key = json.loads(path.read_text(encoding="utf-8"))["key"]
-        return Policy(checked_gains(key["feedback"]), dict(key["offsets"]))
+        return checked_gains(json.loads(path.read_text(encoding="utf-8"))["key"]["feedback"])
     except OSError as error:
         raise RecordingError(f"cannot resume from {path}: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError, ConfigurationError) as error:

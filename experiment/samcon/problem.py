@@ -8,7 +8,7 @@ import numpy as np
 
 from experiment.plan import Plan, make_plan
 from experiment.planned_push import PlannedPush, parsed_push
-from experiment.samcon.settings import Rows, Settings
+from experiment.samcon.settings import Settings
 from msgs_config.arrays import IntArray
 from msgs_config.tick_clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 
@@ -25,7 +25,6 @@ class Problem:
     controller: Mapping[str, object] = field(default_factory=dict)
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name
     feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
-    offsets: Mapping[str, Rows] = field(default_factory=dict)  # to begin with, see `Settings`
     pushes: tuple[str, ...] = ()  # LINK:FX,FY,FZ@S, which the search knows beforehand
 
     @classmethod
@@ -48,7 +47,6 @@ class Problem:
             settings.gains,
             settings.feedback,
             settings.feedforward,
-            settings.offsets,
             tuple(pushes),
         )
 

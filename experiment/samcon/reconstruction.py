@@ -12,7 +12,7 @@ from controller_node.references.clip_file import clip_path, read_clip
 from controller_node.references.corrected import Corrections
 from controller_node.references.corrected_file import write_corrected
 from experiment.samcon.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
-from experiment.samcon.policy import Policy
+from experiment.samcon.gain_space import Gains
 from experiment.samcon.problem import Problem
 from experiment.samcon.rollout import Rollout
 from experiment.samcon.search import Failure, Progress, first_progress, result, search
@@ -52,13 +52,12 @@ class Job:
         """What a checkpoint must agree on."""
         return {**asdict(self.problem), **self.settings.content()}
 
-    def with_policy(self, policy: Policy) -> "Job":
-        """The same with another feedback and other offsets to begin with."""
-        gains, offsets = policy.feedback, policy.offsets
+    def with_feedback(self, gains: Gains) -> "Job":
+        """The same with another feedback."""
         return replace(
             self,
-            problem=replace(self.problem, feedback=gains, offsets=offsets),
-            settings=replace(self.settings, feedback=gains, offsets=offsets),
+            problem=replace(self.problem, feedback=gains),
+            settings=replace(self.settings, feedback=gains),
         )
 
 

@@ -16,7 +16,7 @@ from experiment.samcon import cost
 from experiment.samcon.features import Features
 from experiment.samcon.feedforward import Feedforward
 from experiment.samcon.problem import Problem, Windows
-from experiment.samcon.settings import Bounds, Rows, Settings
+from experiment.samcon.settings import Bounds, Settings
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.joint_layout import Configuration
@@ -131,7 +131,6 @@ class Rollout:
         )
         self.height = float(self.desired(0)[2]) if self.layout.has_floating_base else 1.0  # m
         self._share = problem.feedforward
-        self._begin = self._rows(problem.offsets)
         self._needed: dict[int, FloatArray] = {}  # of the inverse dynamics, by window
         self._planned = problem.planned_pushes(plan)
         self._pushes = push_schedule(plan, self._planned)
@@ -142,10 +141,9 @@ class Rollout:
         """End the engine."""
         self._simulation.close()
 
-    def act(self, gains: Mapping[str, float], offsets: Mapping[str, Rows]) -> None:
-        """Have other gains of the feedback, and other offsets to begin with, than the problem's."""
+    def act(self, gains: Mapping[str, float]) -> None:
+        """Have other gains of the feedback than the problem's."""
         self._controller = self._responding(gains)
-        self._begin = self._rows(offsets)
 
     def _responding(self, gains: Mapping[str, float]) -> Controller:
         plan = self.plan
@@ -172,25 +170,13 @@ class Rollout:
         return np.where(sound, terms.cost(settings.weights), np.inf)
 
     def plain(self, window: int) -> FloatArray:
-        """The offset (n,) of a window without a correction.
-
-        The problem's of the window in its cycle, and its share of the inverse dynamics' one.
-        """
-        offset: FloatArray = self._begin[window % len(self._begin)]
+        """The offset (n,) of a window without a correction: a share of the inverse dynamics'."""
         if not self._share:
-            return offset
+            return np.zeros(self.layout.size)
         if window not in self._needed:
             found = self._share * self._feedforward.offset(self.windows.times(window))
             self._needed[window] = np.clip(found, -_LARGEST_PLAIN, _LARGEST_PLAIN)
-        return offset + self._needed[window]
-
-    def _rows(self, offsets: Mapping[str, Rows]) -> FloatArray:
-        """Offsets (c, n) of a cycle's windows."""
-        count = max((len(rows) for rows in offsets.values()), default=1)
-        table = np.zeros((count, self.layout.size))
-        for name, rows in offsets.items():
-            table[:, self.layout.joint(name).entries] = rows
-        return table
+        return self._needed[window]
 
     def expand(self, branch: Branch) -> Expansion:
         """Try a branch's samples."""

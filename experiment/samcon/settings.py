@@ -1,9 +1,9 @@
 """What a search for corrections depends on, and its presets for each clip."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import yaml
@@ -14,9 +14,6 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.joint_layout import JointLayout
 
 _LARGEST_SEED = 2**32 - 2  # one more has still to be a seed of numpy
-Rows: TypeAlias = Sequence[Sequence[float]]
-"""Offsets of a joint in a cycle's windows, one after another; rad or m."""
-
 PRESETS = Path(__file__).with_name("presets.yaml")
 
 
@@ -56,8 +53,6 @@ class Settings:
     noise: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name; none: without
     feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
-    # offsets to begin with, of the windows of a cycle one after another, rows as `noise` has one
-    offsets: Mapping[str, Rows] = field(default_factory=dict)
     gains: Mapping[str, float] = field(default_factory=dict)  # of the controller, by parameter
     weights: Weights = Weights()
     bounds: Bounds = Bounds()
@@ -71,9 +66,8 @@ class Settings:
 
     def content(self) -> dict[str, Any]:
         """The settings as JSON has them."""
-        offsets = {name: [list(row) for row in rows] for name, rows in self.offsets.items()}
         noise = {name: list(row) for name, row in self.noise.items()}
-        return asdict(self) | {"noise": noise, "offsets": offsets}
+        return asdict(self) | {"noise": noise}
 
 
 def preset(character: str, clip: str, rate_hz: int | None = None, **given: object) -> Settings:
@@ -111,12 +105,6 @@ def settings_from(content: Mapping[str, Any]) -> Settings:
     values["noise"] = {
         name: tuple(float(number) for number in row) for name, row in values["noise"].items()
     }
-    values["offsets"] = {
-        name: tuple(tuple(float(number) for number in row) for row in rows)
-        for name, rows in values.get("offsets", {}).items()
-    }
-    if len({len(rows) for rows in values["offsets"].values()}) > 1:
-        raise ConfigurationError("offsets must have as many rows of each joint, one a window")
     for name, kind in (("weights", Weights), ("bounds", Bounds)):
         if isinstance(values.get(name), Mapping):
             values[name] = replace(kind(), **values[name])

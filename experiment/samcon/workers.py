@@ -18,6 +18,8 @@ from msgs_config.errors import ConfigurationError
 
 _TASKS_A_WORKER = 4  # a window; more of them spread the work better, and cost more each
 
+_KEPT = 8  # engines of a process; a fit has one for each heading
+
 _rollouts: dict[str, Rollout] = {}
 _one_at_a_time = threading.Lock()
 
@@ -72,23 +74,26 @@ class Workers:
 
 
 def rollout_of(problem: Problem) -> Rollout:
-    """This process's engine for a problem, made when it is first asked for."""
+    """This process's engine for a problem, made when it is first asked for; a few are kept."""
     key = repr(problem)
-    if key not in _rollouts:
-        forget()
-        _rollouts[key] = Rollout(problem)
-    return _rollouts[key]
+    found = _rollouts.pop(key, None)
+    if found is None:
+        while len(_rollouts) >= _KEPT:
+            _rollouts.pop(next(iter(_rollouts))).close()
+        found = Rollout(problem)
+    _rollouts[key] = found  # the last one that was asked for is the last to go
+    return found
 
 
 def forget() -> None:
-    """Close this process's engine, if there is one."""
+    """Close this process's engines."""
     while _rollouts:
         _rollouts.popitem()[1].close()
 
 
 @contextmanager
 def some_processes(count: int) -> Iterator[joblib.Parallel | None]:
-    """So many processes, or None for this one alone; its engine is closed in the end."""
+    """So many processes, or None for this one alone; its engines are closed in the end."""
     try:
         if count == 1:
             yield None

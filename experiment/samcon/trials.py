@@ -1,0 +1,202 @@
+"""Trials of a feedback: runs from the first state without corrections, easy ones and hard ones.
+
+A run may be helped by some of the root's assistance, begin at another heading, and be pushed. The
+headings are there because the engine's friction is not the same in all directions of the world:
+what holds along one axis need not hold between two (docs/reconstruction.md).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import cos, pi, sin
+
+import joblib
+import numpy as np
+
+from experiment.planned_push import PlannedPush, planned_push
+from experiment.samcon.gain_space import Gains
+from experiment.samcon.problem import Problem
+from experiment.samcon.rollout import Branch
+from experiment.samcon.settings import Settings
+from experiment.samcon.workers import leave_interrupts_to_the_parent, rollout_of
+from msgs_config.arrays import FloatArray
+
+_WORST = 100.0  # cost of a window
+_LOST = 150.0  # of each window after that in which it was lost
+_TESTS = 2  # runs at each heading
+_MOST_HOLD = 0.7  # share of them with which a level is done
+_WEAKER = 0.85  # of the root's assistance
+_WEAKEST = 0.01  # share of it, below which there is none
+# N/m and N s/m, N m/rad and N m s/rad: the lecture's, but for a quarter of the force's
+_ASSISTANCE = {"root": (1000.0, 100.0), "root_r": (1000.0, 100.0)}
+_LONGER = 1.4  # runs, each time
+_FIRST_RUN = 3.8  # s
+_PUSH_EVERY = 2.0  # s
+_QUARTER = 0.5 * pi  # rad, after which the engine's friction is the same again
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What is to be fitted, and how."""
+
+    count: int  # feedbacks, rounded up to whole populations
+    assistance: float = 0.0  # share of the root's gains that it begins with
+    push: float = 0.0  # N s, each two seconds of the last runs
+    headings: int = 1  # of the motion, at which each feedback is tried
+    nudge: float = 0.03  # of the search's noise, in the first window of each run
+
+
+@dataclass(frozen=True)
+class Level:
+    """How hard the runs are."""
+
+    assistance: float
+    windows: int
+    push: float  # N s
+
+    def harder(self, fit: Fit, windows: int) -> "Level":
+        """The next one; itself, if there is none."""
+        if self.assistance:
+            less = self.assistance * _WEAKER
+            return replace(self, assistance=less if less >= _WEAKEST else 0.0)
+        if self.windows < windows:
+            return replace(self, windows=min(int(self.windows * _LONGER), windows))
+        return replace(self, push=fit.push)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a feedback, from the first state."""
+
+    heading: float  # rad, by which the motion is turned
+    nudge: FloatArray  # (n,) offset more in the first window, rad
+    pushes: tuple[PlannedPush, ...]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What became of a run."""
+
+    cost: float  # mean of the windows
+    held: bool  # to its end
+
+
+class Trials:
+    """Tries feedbacks, on some processes; None is this one alone."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        settings: Settings,
+        fit: Fit,
+        parallel: joblib.Parallel | None = None,
+    ) -> None:
+        self._problem, self._settings, self._fit = problem, settings, fit
+        rollout = rollout_of(_bare(problem, 0.0, 0.0))
+        self.windows = len(rollout.windows)
+        self._plan = rollout.plan
+        self._noise = settings.largest_offsets(rollout.layout)
+        self._parallel = parallel
+
+    def first_level(self) -> Level:
+        """Where a fit begins."""
+        windows = min(round(_FIRST_RUN / self._problem.window), self.windows)
+        is_last = windows == self.windows and not self._fit.assistance
+        return Level(self._fit.assistance, windows, self._fit.push if is_last else 0.0)
+
+    def costs(self, level: Level, feedbacks: Sequence[Gains], draw: int) -> list[float]:
+        """The mean costs of a window of feedbacks, in order, in runs that a number draws."""
+        runs = self._runs(level, [self._settings.seed, draw], 1 + (level.push > 0.0))
+        tried = self._tried(level, [(gains, run) for gains in feedbacks for run in runs])
+        costs = np.array([one.cost for one in tried]).reshape(len(feedbacks), -1)
+        return [float(cost) for cost in costs.mean(axis=1)]
+
+    def test(self, level: Level, gains: Gains) -> tuple[float, bool]:
+        """A feedback's mean cost of a window, and whether most of its runs went to their ends."""
+        runs = self._runs(level, [self._settings.seed], _TESTS)
+        tried = self._tried(level, [(gains, run) for run in runs])
+        held = float(np.mean([one.held for one in tried]))
+        return float(np.mean([one.cost for one in tried])), held >= _MOST_HOLD
+
+    def _runs(self, level: Level, seed: list[int], count: int) -> list[Run]:
+        """So many runs at each heading; where there are pushes, every other one is pushed."""
+        rng = np.random.default_rng(np.random.SeedSequence(seed))
+        headings = np.arange(self._fit.headings) * _QUARTER / self._fit.headings
+        return [
+            Run(
+                heading,
+                self._fit.nudge * self._noise * rng.uniform(-1.0, 1.0, len(self._noise)),
+                self._pushes(level, rng) if number % 2 else (),
+            )
+            for number in range(count)
+            for heading in headings.tolist()
+        ]
+
+    def _pushes(self, level: Level, rng: np.random.Generator) -> tuple[PlannedPush, ...]:
+        """Pushes on the root, each two seconds, from random sides."""
+        if not level.push:
+            return ()
+        end = level.windows * self._problem.duration / self.windows
+        root = self._plan.character.links[0].name
+        held = self._plan.simulator.number("wrench_duration")
+        times = np.arange(rng.uniform(0.5, _PUSH_EVERY), end - held, _PUSH_EVERY).tolist()
+        sides = rng.uniform(-np.pi, np.pi, len(times)).tolist()
+        force = level.push / held
+        return tuple(
+            planned_push(self._plan, root, (force * cos(side), force * sin(side), 0.0), time)
+            for time, side in zip(times, sides, strict=True)
+        )
+
+    def _tried(self, level: Level, pairs: Sequence[tuple[Gains, Run]]) -> list[Tried]:
+        work = [
+            (_bare(self._problem, level.assistance, run.heading), level.windows, gains, run)
+            for gains, run in pairs
+        ]
+        if self._parallel is None:
+            return [tried(self._settings, *one) for one in work]
+        return list(
+            self._parallel(joblib.delayed(_tried_in_process)(self._settings, *one) for one in work)
+        )
+
+
+def _tried_in_process(
+    settings: Settings, problem: Problem, windows: int, gains: Gains, run: Run
+) -> Tried:
+    leave_interrupts_to_the_parent()
+    return tried(settings, problem, windows, gains, run)
+
+
+def tried(settings: Settings, problem: Problem, windows: int, gains: Gains, run: Run) -> Tried:
+    """A feedback's run over the first windows of a problem."""
+    rollout = rollout_of(problem)
+    rollout.act(gains)
+    nothing = np.zeros(rollout.layout.size)
+    sample = (rollout.plain(0) + run.nudge)[np.newaxis]
+    branch = Branch(None, 0, sample[:0], nothing, sample, windows - 1, settings.bounds, run.pushes)
+    (ends,) = rollout.expand(branch).features
+    total = 0.0
+    for window, end in enumerate(ends):
+        (value,) = rollout.costs(window, end[np.newaxis], settings).tolist()
+        if not np.isfinite(value):
+            return Tried((total + _LOST * (windows - window)) / windows, held=False)
+        total += min(value, _WORST)
+    return Tried(total / windows, held=True)
+
+
+def _bare(problem: Problem, assistance: float, heading: float) -> Problem:
+    """A problem without its feedback, lest an engine is made for each; with what makes it easier.
+
+    What it is tried with is another one anyway: it is turned, and some of the root's assistance
+    may help it.
+    """
+    bare = replace(problem, feedback={})
+    if heading:
+        turned = {"placement": [0.0, 0.0, 0.0, heading]}
+        bare = replace(bare, simulator={**problem.simulator, **turned})
+    if not assistance:
+        return bare
+    gains = {
+        f"gains.{vector}.{kind}": assistance * gain
+        for vector, pair in _ASSISTANCE.items()
+        for kind, gain in zip("pd", pair, strict=True)
+    }
+    return replace(bare, controller={**problem.controller, "root_assistance": True, **gains})
