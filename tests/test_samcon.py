@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -356,7 +357,7 @@ def test_what_cannot_be_done_ends_with_the_best_attempt(tmp_path: Path) -> None:
     output = tmp_path / "walk.json"
     strict = replace(SMALL, bounds=Bounds(centre=0.02), tries=3, samples=4)
 
-    with pytest.raises(RunError, match=r"window \d of 3 failed 3 times .*lost.*the best attempt"):
+    with pytest.raises(RunError, match=r"3 failures .* window \d of 3 .*lost.*the best attempt"):
         reconstruct(job(output, strict))
 
     made = read_reconstruction(output)
@@ -365,6 +366,27 @@ def test_what_cannot_be_done_ends_with_the_best_attempt(tmp_path: Path) -> None:
     assert not made["complete"] and made["figures"] is None
     assert len(corrections.ends) == len(made["costs"])
     assert checkpoint_path(output).exists()
+
+
+def test_who_is_stuck_goes_back_twice_as_far_each_time(tmp_path: Path) -> None:
+    told: list[tuple[int, int, int]] = []
+    strict = replace(SMALL, bounds=Bounds(centre=0.05), tries=4, samples=4, kept=1, lookahead=0)
+    problem = replace(PROBLEM, duration=1.2, window=0.05)
+
+    with pytest.raises(RunError, match="4 failures"):
+        reconstruct(
+            Job(problem, 1, strict, tmp_path / "w.json"),
+            lambda now, *_: told.append((now.window, now.failures, now.stuck)),
+        )
+
+    backs = [
+        (before - window, stuck, before)
+        for (before, failed, _), (window, failures, stuck) in pairwise(told)
+        if failures > failed
+    ]
+    assert [stuck for _, stuck, _ in backs][-3:] == [1, 2, 3]
+    assert all(back == min(2**stuck, before) for back, stuck, before in backs)
+    assert max(back for back, _, _ in backs) > 2
 
 
 def test_only_a_clip_that_wraps_has_cycles() -> None:
@@ -386,7 +408,7 @@ def test_the_command_writes_a_file_and_a_table(
 
     said = capsys.readouterr()
     if code:  # so few samples may well fall
-        assert "failed" in said.err
+        assert "failures without getting any further" in said.err
     else:
         assert "centre of mass error" in said.out
     assert read_reconstruction(output)["clip"] == "kick"

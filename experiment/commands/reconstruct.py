@@ -55,9 +55,15 @@ def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParse
 def _add_search(command: argparse.ArgumentParser) -> None:
     """Add the options of how it is searched."""
     command.add_argument("--seed", type=int, default=1, help="of all random numbers (1)")
-    command.add_argument("--samples", type=int, metavar="N", help="a window (1000)")
-    command.add_argument("--kept", type=int, metavar="N", help="of them to go on from (80)")
-    command.add_argument("--window", type=float, metavar="S", help="length of a window, s (0.1)")
+    command.add_argument(
+        "--samples", type=int, metavar="N", help="a window (the preset's, or 1000)"
+    )
+    command.add_argument(
+        "--kept", type=int, metavar="N", help="of them to go on from (the preset's, or 80)"
+    )
+    command.add_argument(
+        "--window", type=float, metavar="S", help="length of a window, s (the preset's, or 0.1)"
+    )
     command.add_argument(
         "--open-loop", action="store_true", help="without the balance feedback of the preset"
     )

@@ -43,7 +43,8 @@ def write_checkpoint(path: Path, key: Mapping[str, Any], progress: Progress) -> 
         "key": dict(key),
         "levels": levels,
         "best": best,
-        "tries": sorted(progress.tries.items()),
+        "failures": progress.failures,
+        "stuck": progress.stuck,
         "samples": progress.samples,
         "nodes": [
             [
@@ -88,7 +89,8 @@ def read_checkpoint(path: Path, key: Mapping[str, Any]) -> Progress:
             nodes.append(Node(before, np.array(offset), float(cost), np.array(end)))
         return Progress(
             levels=[[nodes[number] for number in level] for level in content["levels"]],
-            tries={int(window): int(count) for window, count in content["tries"]},
+            failures=int(content["failures"]),
+            stuck=int(content["stuck"]),
             best=None if content["best"] is None else nodes[content["best"]],
             samples=int(content["samples"]),
         )

@@ -161,6 +161,7 @@ def _failed(job: Job, failure: Failure, best: Node, ends: tuple[float, ...]) -> 
     reached = ends[len(best.path) - 1] if best.path else 0.0
     costs = ", ".join("lost" if np.isinf(cost) else f"{cost:.3g}" for cost in failure.costs)
     return (
-        f"window {failure.window + 1} of {len(ends)} failed {job.settings.tries} times (its best "
-        f"samples cost: {costs}); {job.output} has the best attempt, {reached:.2f} s long"
+        f"{job.settings.tries} failures without getting any further, at last at window "
+        f"{failure.window + 1} of {len(ends)} (its best samples cost: {costs}); "
+        f"{job.output} has the best attempt, {reached:.2f} s long"
     )

@@ -6,7 +6,7 @@ way back.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +21,8 @@ _ELITE = 0.1  # share of the first round around which the second one is drawn
 _PLAIN = 0.1  # of what is kept, samples without a correction
 _NARROW = 0.3  # of the noise, in the second round
 _WORST = 150.0  # cost of a state ahead, which may still be mended
-_REACH = 12  # windows back of which snapshots are kept
+_FURTHEST_BACK = 32  # windows
+_REACH = 34  # windows back of which snapshots are kept
 
 
 @dataclass
@@ -29,7 +30,8 @@ class Progress:
     """Where a search is; all that it needs to go on, beside its problem and settings."""
 
     levels: list[list[Node]]  # of each window's kept nodes, after the first state
-    tries: dict[int, int] = field(default_factory=dict)  # failures of each window
+    failures: int = 0  # windows of which all samples were lost
+    stuck: int = 0  # of these, since the furthest window was reached
     best: Node | None = None  # of the furthest window that was reached
     samples: int = 0  # simulated so far
 
@@ -59,7 +61,10 @@ def search(
     progress: Progress,
     report: Callable[[Progress], None],
 ) -> Failure | None:
-    """Go on to the last window, or until a window has failed too often; None if all went well.
+    """Go on to the last window, or until it is stuck; None if all went well.
+
+    Where all samples of a window are lost it goes back, twice as far each time until it gets
+    further than ever: a walker that is going to fall has long been beyond help when it does.
 
     Raises:
         ActuatedCharactersError: a worker failed.
@@ -71,15 +76,18 @@ def search(
         if nodes:
             progress.levels.append(nodes)
             best = min(nodes, key=lambda node: node.cost)
-            if progress.best is None or window + 1 > len(progress.best.path) - 1:
+            furthest = 0 if progress.best is None else len(progress.best.path)
+            if window + 1 > furthest:
+                progress.stuck = 0
+            if window + 1 >= furthest:
                 progress.best = best
             prune(progress.levels, _REACH)
         else:
-            failures = progress.tries.get(window, 0) + 1
-            progress.tries[window] = failures
-            if failures >= settings.tries:
+            progress.failures += 1
+            progress.stuck += 1
+            if progress.stuck >= settings.tries:
                 return Failure(window, steps.last_costs)
-            back = min(2 ** (failures - 1), window)
+            back = min(2**progress.stuck, _FURTHEST_BACK, window)
             del progress.levels[window + 1 - back :]
         report(progress)
     return None
@@ -136,8 +144,8 @@ class _Steps:
     def next_level(self, progress: Progress) -> list[Node]:
         """The nodes that are kept of the next window; none if all samples are lost."""
         window, settings = progress.window, self._settings
-        tried = sum(progress.tries.values())
-        rng = np.random.default_rng(np.random.SeedSequence([settings.seed, window, tried]))
+        seed = [settings.seed, window, progress.failures]
+        rng = np.random.default_rng(np.random.SeedSequence(seed))
         refined = int(settings.refined * settings.samples)
         broad = max(settings.samples - refined, 1)
         parents = self._some(progress.levels[-1], broad)

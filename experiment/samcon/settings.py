@@ -46,7 +46,7 @@ class Settings:
     kept: int = 80  # of them, at most
     window: float = 0.1  # s
     seed: int = 1
-    tries: int = 6  # of one window, going back further each time
+    tries: int = 6  # failures without getting any further, going back further each time
     lookahead: int = 3  # windows beyond it, left to the feedback, whose costs count too
     refined: float = 0.5  # share of the samples that are drawn around the best of the others
     # largest offset of each joint that is corrected, rad or m, one number a degree of freedom
