@@ -60,8 +60,13 @@ def pushes_within(texts: Sequence[str], plan: Plan) -> list[PlannedPush]:
     Raises:
         ConfigurationError: as `parsed_push`.
     """
-    end = plan.ticks / plan.simulator.integer("rate")
-    return [parsed_push(text, plan) for text in texts if not _parts(text)[-1] >= end]
+    rate = plan.simulator.integer("rate")
+    times = [_parts(text)[-1] for text in texts]
+    return [
+        parsed_push(text, plan)
+        for text, time in zip(texts, times, strict=True)
+        if not (math.isfinite(time) and round(time * rate) >= plan.ticks)
+    ]
 
 
 def _parts(text: str) -> tuple[str, tuple[float, float, float], float]:
@@ -73,7 +78,7 @@ def _parts(text: str) -> tuple[str, tuple[float, float, float], float]:
         x, y, z, time = (float(number) for number in found.groups()[1:])
     except ValueError:
         raise ConfigurationError(
-            f"--push {text}: write it as LINK:FX,FY,FZ@S, such as chest:100,0,0@1.5"
+            f"push {text}: write it as LINK:FX,FY,FZ@S, such as chest:100,0,0@1.5"
         ) from None
     return found[1], (x, y, z), time
 

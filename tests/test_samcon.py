@@ -21,6 +21,7 @@ from experiment.cli import main
 from experiment.loop import ticks_in_process
 from experiment.metrics import StateHash
 from experiment.samcon import cost
+from experiment.samcon import search as samcon_search
 from experiment.samcon.checkpoint import checkpoint_path
 from experiment.samcon.features import Features, end_effectors
 from experiment.samcon.problem import Problem, Windows
@@ -368,14 +369,26 @@ def test_what_cannot_be_done_ends_with_the_best_attempt(tmp_path: Path) -> None:
     assert checkpoint_path(output).exists()
 
 
-def test_who_is_stuck_goes_back_twice_as_far_each_time(tmp_path: Path) -> None:
-    told: list[tuple[int, int, int]] = []
-    strict = replace(SMALL, bounds=Bounds(centre=0.05), tries=4, samples=4, kept=1, lookahead=0)
+STRICT = replace(SMALL, bounds=Bounds(centre=0.05), tries=4, samples=4, kept=1, lookahead=0)
+"""With them a walk of 1.2 s gets stuck."""
+
+
+def stuck(output: Path, *, resume: bool = False) -> Job:
     problem = replace(PROBLEM, duration=1.2, window=0.05)
+    return Job(problem, 1, STRICT, output, resume=resume)
+
+
+@pytest.mark.parametrize("furthest", [32, 4])
+def test_who_is_stuck_goes_back_twice_as_far_each_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, furthest: int
+) -> None:
+    monkeypatch.setattr(samcon_search, "_FURTHEST_BACK", furthest)
+    monkeypatch.setattr(samcon_search, "_REACH", furthest - 1)  # some have to be simulated again
+    told: list[tuple[int, int, int]] = []
 
     with pytest.raises(RunError, match="4 failures"):
         reconstruct(
-            Job(problem, 1, strict, tmp_path / "w.json"),
+            stuck(tmp_path / "w.json"),
             lambda now, *_: told.append((now.window, now.failures, now.stuck)),
         )
 
@@ -385,8 +398,26 @@ def test_who_is_stuck_goes_back_twice_as_far_each_time(tmp_path: Path) -> None:
         if failures > failed
     ]
     assert [stuck for _, stuck, _ in backs][-3:] == [1, 2, 3]
-    assert all(back == min(2**stuck, before) for back, stuck, before in backs)
+    assert all(back == min(2**stuck, furthest, before) for back, stuck, before in backs)
     assert max(back for back, _, _ in backs) > 2
+
+
+def test_who_is_stuck_resumes_to_the_same_end(tmp_path: Path) -> None:
+    whole, parts = tmp_path / "whole.json", tmp_path / "parts.json"
+
+    def stop(progress: Progress, *_: float) -> None:
+        if progress.stuck == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(RunError, match="4 failures") as found:
+        reconstruct(stuck(whole))
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct(stuck(parts), stop)
+    with pytest.raises(RunError) as resumed:
+        reconstruct(stuck(parts, resume=True))
+
+    assert str(resumed.value).replace("parts", "whole") == str(found.value)
+    assert parts.read_text() == whole.read_text()
 
 
 def test_only_a_clip_that_wraps_has_cycles() -> None:

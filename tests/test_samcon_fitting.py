@@ -14,6 +14,7 @@ from controller_node.feedback_gains import FeedbackGains
 from experiment.cli import main
 from experiment.loop import ticks_in_process
 from experiment.planned_push import planned_push
+from experiment.samcon import trials
 from experiment.samcon.features import Features
 from experiment.samcon.fitting import State, fitted
 from experiment.samcon.gain_space import Gains, GainSpace, names
@@ -120,6 +121,35 @@ def test_a_fit_never_ends_with_a_worse_feedback_than_it_began_with() -> None:
         best = better
 
 
+def test_a_fit_of_longer_and_longer_runs_is_no_worse_at_the_last(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(trials, "_FIRST_RUN", 0.1)  # s, two windows
+    told: list[State] = []
+
+    best = fitted(PROBLEM, SETTINGS, Fit(9 * 16), 1, told.append)
+
+    assert [state.level.windows for state in told][::4] == [2, 3, 4]
+    assert told[-1].cost == mean_cost(best) <= mean_cost(PROBLEM.feedback)
+
+
+def test_runs_of_one_window_get_longer_as_well() -> None:
+    long = replace(PROBLEM, window=8.0)
+
+    first = Trials(long, SETTINGS, Fit(16)).first_level()
+
+    assert first.windows == 1
+    assert first.harder(Fit(16), 3).windows == 2
+
+
+def test_planned_pushes_are_not_those_of_the_trials() -> None:
+    pushed = replace(PROBLEM, pushes=("root:500,0,0@0.05",))
+
+    cost, _ = Trials(pushed, SETTINGS, Fit(16)).test(LEVEL, PROBLEM.feedback)
+
+    assert cost == mean_cost(PROBLEM.feedback)
+
+
 def test_a_motion_is_the_same_a_quarter_further_and_not_an_eighth() -> None:
     def cost(turn: float) -> float:
         turned = replace(PROBLEM, simulator={"placement": [0.0, 0.0, 0.0, turn * np.pi]})
@@ -185,6 +215,8 @@ def test_what_was_fitted_is_resumed_with(tmp_path: Path) -> None:
         (("--fit-push", "5"), "--fit-push is for --fit"),
         (("--fit", "16", "--fit-assistance", "-1"), "--fit-assistance is -1"),
         (("--fit", "16", "--fit-push", "nan"), "--fit-push is nan"),
+        (("--fit", "16", "--fit-headings", "9"), "--fit-headings is 9; it must be 1 to 8"),
+        (("--fit-headings", "2"), "--fit-headings is for --fit"),
         (("--seed", "-1"), "seed is -1; it must be 0 to 4294967294"),
         (("--seed", "4294967295"), "seed is 4294967295"),
     ],

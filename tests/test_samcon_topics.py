@@ -8,14 +8,13 @@ import pytest
 import yaml
 
 from experiment.cli import main
+from experiment.planned_push import pushes_within
 from experiment.samcon.problem import Problem
 from experiment.samcon.reconstruction import Job, reconstruct
 from experiment.samcon.settings import preset
 from msgs_config.character_loading import load_character
 
 DURATION = 0.3  # s
-
-
 PUSHES = ("chest:150,0,0@0.1", "root:0,100,0@0.25")
 
 
@@ -127,6 +126,20 @@ def test_pushes_that_were_known_come_again_unless_others_are_given(tmp_path: Pat
     assert short == hash_of(unpushed, tmp_path / "3", *one, "--duration", "0.2")
 
 
+def test_pushes_that_would_begin_at_the_end_or_later_are_left_out() -> None:
+    plan = Problem("humanoid", "kick", 0.2, 0.1).plan()
+
+    assert not pushes_within(["root:1,0,0@0.199", "root:1,0,0@0.2", "root:1,0,0@9"], plan)
+    assert len(pushes_within(["root:1,0,0@0.197"], plan)) == 1
+
+
+def test_no_push_goes_with_no_other(kick: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pushes = ("--push", "none", "--push", PUSHES[0])
+
+    assert main(["run", "--clip", str(kick), *pushes, "--in-process"]) != 0
+    assert "--push none goes with no other" in capsys.readouterr().err
+
+
 def without_pushes(file: Path) -> dict[str, Any]:
     """The content of a file that says nothing of its pushes, as older ones did not."""
     content: dict[str, Any] = json.loads(file.read_text())
@@ -148,11 +161,12 @@ def test_joints_that_are_commanded_decide_on_the_roots_assistance(
 @pytest.mark.parametrize(
     ("made", "reason"),
     [
-        ({"duration": "long"}, "Reconstruction must have 'duration', 'complete', and '"),
+        ({"duration": "long"}, "Reconstruction must have 'duration', 'complete', '"),
         ({"duration": 10**400}, "Reconstruction must have 'duration'"),
         ({"parameters": {"sim_node": {}}}, "Reconstruction must have 'duration'"),
         ({"duration": 0.0}, "duration is 0.0 s"),
-        ({"pushes": 7}, "Reconstruction must have 'duration'"),
+        ({"pushes": 7}, "and 'pushes' as texts"),
+        ({"pushes": "root:1,0,0@0.1"}, "and 'pushes' as texts"),
         ({"pushes": ["tail:1,0,0@0.1"]}, "unknown link 'tail'"),
         ({"pushes": ["root"]}, "write it as LINK:FX,FY,FZ@S"),
     ],

@@ -4,7 +4,7 @@
 motion. `Corrections` has the names of the degrees of freedom corrected (`dofs`), the ends of the
 windows in s (`ends`) and a row of offsets for each of them, rad or m (`offsets`). `Feedback` has
 gains by name (`feedback_gains.py`). What made the file stands in `Reconstruction`; what is tracked
-does not depend on it, but a run takes its length and its parameters from there.
+does not depend on it, but a run takes its length, its parameters and its pushes from there.
 """
 
 import json
@@ -92,12 +92,16 @@ def read_found_with(character: Character, name_or_path: str) -> FoundWith | None
         duration = float(made["duration"])
         if not made["complete"]:
             duration = min(duration, float(max(content[CORRECTIONS]["ends"], default=0.0)))
-        pushes = tuple(str(push) for push in made.get("pushes", ()))
-        found = FoundWith(duration, dict(sides["sim_node"]), dict(sides["controller_node"]), pushes)
+        pushes = made.get("pushes", [])
+        if not isinstance(pushes, list) or not all(isinstance(push, str) for push in pushes):
+            raise TypeError
+        found = FoundWith(
+            duration, dict(sides["sim_node"]), dict(sides["controller_node"]), tuple(pushes)
+        )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ClipError(
-            f"{path}: {RECONSTRUCTION} must have 'duration', 'complete', and 'parameters' of "
-            "sim_node and of controller_node"
+            f"{path}: {RECONSTRUCTION} must have 'duration', 'complete', 'parameters' of sim_node "
+            "and of controller_node, and 'pushes' as texts, if any"
         ) from error
     return found
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:  # it takes a second to import
 
 _SUFFIX = ".json"
 _CHARACTER = "humanoid"
-_MOST_HEADINGS = 8  # each has an engine in each process
 
 
 def add_reconstruct(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -202,6 +201,8 @@ def _job(options: argparse.Namespace) -> "Job":
         {"rate": options.rate, "command_delay_ticks": options.delay_ticks},
         options.push,
     )
+    if options.push:  # what is wrong with them is said before anything begins
+        problem.planned_pushes(problem.plan())
     job = Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
     if options.resume and not options.open_loop:  # it may have been fitted before
         return job.with_feedback(read_feedback(checkpoint_path(output)))
@@ -210,6 +211,8 @@ def _job(options: argparse.Namespace) -> "Job":
 
 def _check_fit(options: argparse.Namespace) -> None:
     """Raise ConfigurationError where --fit cannot be used."""
+    from experiment.samcon.workers import MOST_ENGINES
+
     if options.fit < 0:
         raise ConfigurationError(f"--fit is {options.fit}; it must be 0 or more")
     for name, most in (("fit_assistance", 1.0), ("fit_push", 1000.0)):
@@ -218,10 +221,12 @@ def _check_fit(options: argparse.Namespace) -> None:
             raise ConfigurationError(f"{option} is {value:g}; it must be 0 to {most:g}")
         if value and not options.fit:
             raise ConfigurationError(f"{option} is for --fit, which says how many are tried")
-    if not 1 <= options.fit_headings <= _MOST_HEADINGS:
+    if not 1 <= options.fit_headings <= MOST_ENGINES:
         raise ConfigurationError(
-            f"--fit-headings is {options.fit_headings}; it must be 1 to {_MOST_HEADINGS}"
+            f"--fit-headings is {options.fit_headings}; it must be 1 to {MOST_ENGINES}"
         )
+    if options.fit_headings > 1 and not options.fit:
+        raise ConfigurationError("--fit-headings is for --fit, which says how many are tried")
     if not options.fit:
         return
     if options.open_loop:

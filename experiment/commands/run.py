@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # it takes a second to import
 
 _NODES = ("sim_node", "controller_node")
 _DURATION = 10.0  # s
+_NO_PUSH = "none"
 _RECORDING = {  # options, and the recorder's parameters
     "storage": "storage",
     "compression": "compression",
@@ -98,8 +99,9 @@ def _add_tracked(run: argparse.ArgumentParser) -> None:
     tracked = run.add_mutually_exclusive_group()
     tracked.add_argument(
         "--clip",
-        help="track this motion clip: a name or a file. One by `reconstruct` brings the "
-        "length and the parameters that it was found with; --duration and --set take precedence",
+        help="track this motion clip: a name or a file. One by `reconstruct` brings the length, "
+        "the parameters and the pushes that it was found with; --duration, --set and --push take "
+        "precedence",
     )
     tracked.add_argument(
         "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
@@ -149,6 +151,8 @@ def _run(options: argparse.Namespace) -> None:
     prepare_directory(directory, overwrite=options.overwrite)
     for note in (*plan.notes, *in_the_way):
         print(note)
+    if pushes and not options.push:
+        print(f"{options.clip} brings {len(pushes)} pushes (--push none: without them)")
     with progress_bar(f"{plan.character.name}: {motion}", plan.ticks, "ticks") as bar:
 
         def progress(ticks: int) -> None:
@@ -251,7 +255,9 @@ def _pushes(texts: list[str], plan: "Plan", found_in: "FoundWith | None") -> "li
     """Those of `--push`; without any, those with which a reconstruction was found."""
     from experiment.planned_push import parsed_push, pushes_within
 
-    if texts == ["none"]:
+    if _NO_PUSH in texts:
+        if set(texts) != {_NO_PUSH}:
+            raise ConfigurationError(f"--push {_NO_PUSH} goes with no other --push")
         return []
     if texts or found_in is None:
         return [parsed_push(text, plan) for text in texts]

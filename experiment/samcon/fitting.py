@@ -75,8 +75,9 @@ def fitted(
                 tested, held = trials.test(level, middle)
                 harder = level.harder(fit, trials.windows)
                 if held and harder != level:
-                    level, best = harder, middle
-                    least, _ = trials.test(level, best)
+                    level = harder
+                    costs = [trials.test(level, gains)[0] for gains in (best, middle)]
+                    best, least = (best, middle)[int(np.argmin(costs))], min(costs)
                 elif tested < least:
                     best, least = middle, tested
             report(State(population * POPULATION, level, least))

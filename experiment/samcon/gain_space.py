@@ -13,18 +13,18 @@ Gains: TypeAlias = Mapping[str, float]
 
 _USUAL = {"centre_vx": 0.2, "centre_vy": 0.2, "centre_vz": 0.2, "one": 0.1, "side": 0.1}
 _SPIN = 0.2
-_DIGITS = 3  # of gains, as they stand in files
+_DIGITS = 3  # of gains, for who reads them
 
 # what has something to do with what: about x it leans sideways, about y it turns, about z ahead
 _SIDEWAYS = ("centre_y", "centre_vy", "arm_y", "tilt_x", "spin_x", "one", "side")
 _AHEAD = ("centre_x", "centre_vx", "arm_x", "tilt_z", "spin_z", "one")
 _CANDIDATES = {
     "hip_x": _SIDEWAYS,
-    "hip_y": ("centre_y", "tilt_y", "spin_y"),
+    "hip_y": ("centre_y", "tilt_y", "spin_y", "one", "side"),
     "hip_z": _AHEAD,
-    "knee": ("centre_z", "centre_vz", "one"),
+    "knee": ("centre_z", "centre_vz", "centre_vx", "one"),
     "ankle_x": _SIDEWAYS,
-    "ankle_y": ("tilt_y", "spin_y"),
+    "ankle_y": ("tilt_y", "spin_y", "one"),
     "ankle_z": _AHEAD,
 }
 
@@ -55,7 +55,7 @@ class GainSpace:
         return vector
 
     def gains(self, vector: FloatArray) -> Gains:
-        """The gains of a vector, in as many digits as files have."""
+        """The gains of a vector, rounded to what is worth reading."""
         values = (vector * self._usual).tolist()
         return {
             name: float(f"{value:.{_DIGITS}g}")

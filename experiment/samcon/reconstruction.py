@@ -84,7 +84,8 @@ def reconstruct(
     checkpoint is removed when all is done, and stays in any other case.
 
     Raises:
-        RunError: a window failed for good; the file has what was found until there.
+        RunError: it failed too often without getting any further; the file has what was found
+            until there.
         SimulationError: the file's run is not what was found.
         ActuatedCharactersError: a name or value is wrong.
     """

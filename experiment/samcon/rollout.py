@@ -133,7 +133,7 @@ class Rollout:
         self._share = problem.feedforward
         self._needed: dict[int, FloatArray] = {}  # of the inverse dynamics, by window
         self._planned = problem.planned_pushes(plan)
-        self._pushes = push_schedule(plan, self._planned)
+        self._pushes = push_schedule(plan, ())
         self._simulation = self._fresh()
         self._episode_ns = self._simulation.actors[0].state.stamp_ns
 

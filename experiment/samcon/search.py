@@ -63,8 +63,9 @@ def search(
 ) -> Failure | None:
     """Go on to the last window, or until it is stuck; None if all went well.
 
-    Where all samples of a window are lost it goes back, twice as far each time until it gets
-    further than ever: a walker that is going to fall has long been beyond help when it does.
+    Where all samples of a window are lost it goes back, twice as far each time (at most 32
+    windows) until it gets further than ever: a walker that is going to fall has long been beyond
+    help when it does.
 
     Raises:
         ActuatedCharactersError: a worker failed.

@@ -59,7 +59,8 @@ class Level:
             less = self.assistance * _WEAKER
             return replace(self, assistance=less if less >= _WEAKEST else 0.0)
         if self.windows < windows:
-            return replace(self, windows=min(int(self.windows * _LONGER), windows))
+            longer = max(int(self.windows * _LONGER), self.windows + 1)
+            return replace(self, windows=min(longer, windows))
         return replace(self, push=fit.push)
 
 
@@ -99,7 +100,7 @@ class Trials:
 
     def first_level(self) -> Level:
         """Where a fit begins."""
-        windows = min(round(_FIRST_RUN / self._problem.window), self.windows)
+        windows = min(max(round(_FIRST_RUN / self._problem.window), 1), self.windows)
         is_last = windows == self.windows and not self._fit.assistance
         return Level(self._fit.assistance, windows, self._fit.push if is_last else 0.0)
 
@@ -183,12 +184,11 @@ def tried(settings: Settings, problem: Problem, windows: int, gains: Gains, run:
 
 
 def _bare(problem: Problem, assistance: float, heading: float) -> Problem:
-    """A problem without its feedback, lest an engine is made for each; with what makes it easier.
+    """A problem without its feedback, lest an engine is made for each, and without its pushes.
 
-    What it is tried with is another one anyway: it is turned, and some of the root's assistance
-    may help it.
+    It is turned to a heading, and some of the root's assistance may help.
     """
-    bare = replace(problem, feedback={})
+    bare = replace(problem, feedback={}, pushes=())
     if heading:
         turned = {"placement": [0.0, 0.0, 0.0, heading]}
         bare = replace(bare, simulator={**problem.simulator, **turned})

@@ -18,7 +18,8 @@ from msgs_config.errors import ConfigurationError
 
 _TASKS_A_WORKER = 4  # a window; more of them spread the work better, and cost more each
 
-_KEPT = 8  # engines of a process; a fit has one for each heading
+MOST_ENGINES = 8
+"""A process keeps at most so many; a fit has one for each heading."""
 
 _rollouts: dict[str, Rollout] = {}
 _one_at_a_time = threading.Lock()
@@ -78,7 +79,7 @@ def rollout_of(problem: Problem) -> Rollout:
     key = repr(problem)
     found = _rollouts.pop(key, None)
     if found is None:
-        while len(_rollouts) >= _KEPT:
+        while len(_rollouts) >= MOST_ENGINES:
             _rollouts.pop(next(iter(_rollouts))).close()
         found = Rollout(problem)
     _rollouts[key] = found  # the last one that was asked for is the last to go
