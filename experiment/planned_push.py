@@ -61,10 +61,9 @@ def pushes_within(texts: Sequence[str], plan: Plan) -> list[PlannedPush]:
         ConfigurationError: as `parsed_push`.
     """
     rate = plan.simulator.integer("rate")
-    times = [_parts(text)[-1] for text in texts]
     return [
-        parsed_push(text, plan)
-        for text, time in zip(texts, times, strict=True)
+        planned_push(plan, link, force, time)
+        for link, force, time in map(_parts, texts)
         if not (math.isfinite(time) and round(time * rate) >= plan.ticks)
     ]
 

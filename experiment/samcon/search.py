@@ -22,7 +22,7 @@ _PLAIN = 0.1  # of what is kept, samples without a correction
 _NARROW = 0.3  # of the noise, in the second round
 _WORST = 150.0  # cost of a state ahead, which may still be mended
 _FURTHEST_BACK = 32  # windows
-_REACH = 34  # windows back of which snapshots are kept
+_REACH = _FURTHEST_BACK + 2  # windows back of which snapshots are kept
 
 
 @dataclass

@@ -101,8 +101,7 @@ class Trials:
     def first_level(self) -> Level:
         """Where a fit begins."""
         windows = min(max(round(_FIRST_RUN / self._problem.window), 1), self.windows)
-        is_last = windows == self.windows and not self._fit.assistance
-        return Level(self._fit.assistance, windows, self._fit.push if is_last else 0.0)
+        return Level(self._fit.assistance, windows, push=0.0)
 
     def costs(self, level: Level, feedbacks: Sequence[Gains], draw: int) -> list[float]:
         """The mean costs of a window of feedbacks, in order, in runs that a number draws."""
