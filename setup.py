@@ -20,7 +20,7 @@ setup(
     package_data={
         "msgs_config": ["fastdds.xml", "characters/*.yaml", "characters/*.urdf"],
         "controller_node": ["keyframes/*.yaml"],
-        "experiment": ["samcon/*.yaml"],
+        "experiment": ["samcon/*.yaml", "samcon/*.json"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),

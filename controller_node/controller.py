@@ -58,8 +58,9 @@ class Controller:
     """Inverse dynamics in ticks: `(q, v, desired state) -> effort`.
 
     A function of what the state's message holds and of the tick, so that the same state always
-    gets the same answer; only the law `pid` and a behaviour that reacts remember the ticks before,
-    and a trajectory or strengths that were taken hold until the episode ends.
+    gets the same answer; only the law `pid`, a behaviour that reacts and a clip's window feedback
+    remember the ticks before, and a trajectory or strengths that were taken hold until the episode
+    ends.
     """
 
     def __init__(
@@ -186,6 +187,8 @@ class Controller:
         self.mode = None
         self._episode_ns = episode_ns
         self._reference = self._own_reference
+        if isinstance(self._reference, RespondingReference):
+            self._reference.begin_episode()
         self._law = make_law(self._settings.law, self._plant)
         self._next = None
 

@@ -10,11 +10,11 @@ Yin 2016, "Guided Learning of Control Graphs" (feedback linear in such features,
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
@@ -98,6 +98,9 @@ class Feedback:
         of_sides = np.multiply.outer(self._sides, matrices[:, :, -1])
         self._of_sides = of_sides.swapaxes(0, 1)  # (2, 2, 7)
 
+    def begin_episode(self) -> None:
+        """Nothing: it has no memory."""
+
     def response(self, time: float, position: FloatArray, velocity: FloatArray) -> FloatArray:
         """What is added to the tracking errors (n,) of a state at a time in s, rad."""
         wanted, state = self._known(time), self._balance(position, velocity)
@@ -158,34 +161,43 @@ class Feedback:
         )
 
 
+class Responding(Protocol):
+    """A feedback: a function of time and state, and of what it has seen of the episode."""
+
+    def begin_episode(self) -> None:
+        """Forget what was seen."""
+
+    def response(self, time: float, position: FloatArray, velocity: FloatArray) -> FloatArray:
+        """What is added to the tracking errors (n,) of a state at a time in s, rad."""
+
+
 class RespondingReference:
     """A reference with feedback: its desired states, and the response to the state it is in."""
 
-    def __init__(self, reference: Reference, feedback: Feedback) -> None:
-        self._reference, self._feedback = reference, feedback
+    def __init__(self, reference: Reference, *feedbacks: Responding) -> None:
+        """Responses of several feedbacks add up."""
+        self._reference, self._feedbacks = reference, feedbacks
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state."""
         return self._reference.sample(time)
 
+    def begin_episode(self) -> None:
+        """Have the feedbacks forget what they have seen."""
+        for feedback in self._feedbacks:
+            feedback.begin_episode()
+
     def response(self, time: float, position: FloatArray, velocity: FloatArray) -> FloatArray:
         """What is added to the tracking errors (n,) of a state at a time in s, rad."""
-        return self._feedback.response(time, position, velocity)
+        first, *others = (one.response(time, position, velocity) for one in self._feedbacks)
+        for other in others:
+            first = first + other
+        return first
 
 
-def responding(
-    character: Character, reference: Reference, motion: Reference, gains: Mapping[str, float]
-) -> Reference:
-    """A reference with feedback about a motion; without gains the reference itself.
-
-    Raises:
-        CharacterError: the character has not the legs for it.
-        ConfigurationError: a gain is unknown or no number.
-    """
-    if not any(gains.values()):
-        return reference
-    feedback = Feedback(character, motion, FeedbackGains.of(gains))
-    return RespondingReference(reference, feedback)
+def responding(reference: Reference, feedbacks: Sequence[Responding]) -> Reference:
+    """A reference with feedbacks; without any the reference itself."""
+    return RespondingReference(reference, *feedbacks) if feedbacks else reference
 
 
 def _arm(balance: _Balance, swings: tuple[float, float]) -> tuple[float, float]:

@@ -169,9 +169,22 @@ def test_a_response_is_an_error_more_to_the_law(law: str) -> None:
     np.testing.assert_array_equal(reference.position, same.position)
 
 
-def test_without_gains_there_is_no_feedback() -> None:
-    assert responding(HUMANOID, WALK, WALK, {}) is WALK
-    assert responding(HUMANOID, WALK, WALK, {"swing.hip_z.tilt_x": 0.0}) is WALK
+def test_without_feedback_a_reference_is_itself() -> None:
+    assert responding(WALK, []) is WALK
+
+
+def test_responses_of_several_feedbacks_add_up() -> None:
+    one, other = (
+        Feedback(HUMANOID, WALK, FeedbackGains.of({f"stance.{joint}.one": gain}))
+        for joint, gain in (("hip_x", 0.1), ("knee", -0.2))
+    )
+    state = WALK.sample(LEFT_SWINGS)
+    seen = LEFT_SWINGS, state.configuration.position, state.velocity
+
+    both = RespondingReference(WALK, one, other).response(*seen)
+
+    np.testing.assert_array_equal(both, one.response(*seen) + other.response(*seen))
+    assert np.count_nonzero(both) == 2
 
 
 def test_gains_stand_where_their_names_say() -> None:

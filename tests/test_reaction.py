@@ -12,8 +12,8 @@ from controller_node.behaviours.base import Mode, ModeReport
 from controller_node.behaviours.give_way import GiveWay, softened
 from controller_node.controller import Controller
 from controller_node.dynamics import DynamicsModel
-from controller_node.feedback import responding
-from controller_node.feedback_gains import FEATURES, OUTPUTS
+from controller_node.feedback import Feedback, responding
+from controller_node.feedback_gains import FEATURES, OUTPUTS, FeedbackGains
 from controller_node.laws import GainArrays, Instant
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
@@ -383,7 +383,7 @@ def test_a_joint_without_gains_does_not_count_in_their_mean() -> None:
 def test_a_reference_with_feedback_is_refused_in_a_line() -> None:
     gains = {f"{leg}.{OUTPUTS[0]}.{FEATURES[0]}": 0.5 for leg in ("stance", "swing")}
     clip = ClipReference(LAYOUT, read_clip(HUMANOID, "walk"))
-    reference = responding(HUMANOID, clip, clip, gains)
+    reference = responding(clip, [Feedback(HUMANOID, clip, FeedbackGains.of(gains))])
     parameters = for_controller.PARAMETERS + for_controller.character_parameters(HUMANOID)
 
     def made(behaviour: str) -> Controller:

@@ -20,7 +20,7 @@ from experiment.samcon.fitting import State, fitted
 from experiment.samcon.gain_space import Gains, GainSpace, names
 from experiment.samcon.problem import Problem
 from experiment.samcon.reconstruction import Job, duration_of, reconstruct
-from experiment.samcon.rollout import Branch, Rollout
+from experiment.samcon.rollout import Rollout
 from experiment.samcon.search import Progress
 from experiment.samcon.settings import preset
 from experiment.samcon.trials import Fit, Level, Trials
@@ -173,9 +173,7 @@ def test_a_push_in_a_trial_is_that_of_a_run() -> None:
     problem = replace(PROBLEM, feedback={}, feedforward=0.0)
     push = planned_push(problem.plan(), "chest", (200.0, 0.0, 0.0), 0.05)
     with closing(Rollout(problem)) as rollout:
-        nothing = np.zeros((1, SIZE))
-        branch = Branch(None, 0, nothing[:0], nothing[0], nothing, 3, pushes=(push,))
-        (ends,) = rollout.expand(branch).features
+        ends = rollout.follow(np.zeros((len(rollout.windows), SIZE)), [push])
 
     *_, last = ticks_in_process(problem.plan(), [push])
     *_, unpushed = ticks_in_process(problem.plan())

@@ -3,7 +3,8 @@
 `Loop` and `Frames` are those of the clip (`clip_file.py`), so that whatever reads clips reads the
 motion. `Corrections` has the names of the degrees of freedom corrected (`dofs`), the ends of the
 windows in s (`ends`) and a row of offsets for each of them, rad or m (`offsets`). `Feedback` has
-gains by name (`feedback_gains.py`). What made the file stands in `Reconstruction`; what is tracked
+gains by name (`feedback_gains.py`), `WindowFeedback` those of each window of a cycle
+(`window_gains.py`). What made the file stands in `Reconstruction`; what is tracked
 does not depend on it, but a run takes its length, its parameters and its pushes from there.
 """
 
@@ -19,6 +20,7 @@ import numpy as np
 from controller_node.feedback_gains import checked_gains
 from controller_node.references.clip_file import clip_path
 from controller_node.references.corrected import Corrections
+from controller_node.window_gains import WindowGains, window_gains
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import ClipError, ConfigurationError, LayoutError
@@ -26,6 +28,7 @@ from msgs_config.files import read_text
 from msgs_config.joint_layout import ROOT, JointLayout
 
 CORRECTIONS, FEEDBACK, RECONSTRUCTION = "Corrections", "Feedback", "Reconstruction"
+WINDOW_FEEDBACK = "WindowFeedback"
 SUFFIX = ".json"
 
 _LARGEST_OFFSET = 1e3  # rad or m; more is a mistake
@@ -62,6 +65,24 @@ def read_feedback(character: Character, name_or_path: str) -> dict[str, float]:
         return checked_gains(gains)
     except ConfigurationError as error:
         raise ClipError(f"{path}: {FEEDBACK}: {error}") from error
+
+
+def read_window_feedback(character: Character, name_or_path: str) -> WindowGains | None:
+    """The window feedback in a clip's file, None if it has none.
+
+    Raises:
+        ClipError: there is no such clip, or the feedback is malformed.
+    """
+    if not name_or_path.endswith(SUFFIX):
+        return None
+    path = clip_path(character, name_or_path)
+    content = _content(path).get(WINDOW_FEEDBACK)
+    if content is None:
+        return None
+    try:
+        return window_gains(content)
+    except ConfigurationError as error:
+        raise ClipError(f"{path}: {WINDOW_FEEDBACK}: {error}") from error
 
 
 @dataclass(frozen=True)
@@ -125,6 +146,7 @@ def write_corrected(
     corrections: Corrections,
     reconstruction: Mapping[str, object],
     feedback: Mapping[str, float] | None = None,
+    by_window: WindowGains | None = None,
 ) -> None:
     """Write a clip's content with corrections; the file is there at once, or as it was before.
 
@@ -143,6 +165,7 @@ def write_corrected(
             "offsets": corrections.offsets[:, layout.indices(dofs)].tolist(),
         },
         FEEDBACK: dict(feedback or {}),
+        **({} if by_window is None else {WINDOW_FEEDBACK: by_window.content()}),
         RECONSTRUCTION: dict(reconstruction),
         "Frames": motion.get("Frames"),
     }

@@ -3,6 +3,7 @@
 import argparse
 import os
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,14 +65,19 @@ def _add_search(command: argparse.ArgumentParser) -> None:
         "--window", type=float, metavar="S", help="length of a window, s (the preset's, or 0.1)"
     )
     command.add_argument(
-        "--open-loop", action="store_true", help="without the balance feedback of the preset"
+        "--open-loop", action="store_true", help="without the feedbacks of the preset"
+    )
+    command.add_argument(
+        "--window-feedback",
+        metavar="FILE",
+        help="of `fit-feedback`, or the name of a shipped one, or none (the preset's)",
     )
     command.add_argument(
         "--fit",
         type=int,
         default=0,
         metavar="N",
-        help="fit the feedback first: try N of them, in sixteens (0)",
+        help="fit the balance feedback first: try N of them, in sixteens; it then acts alone (0)",
     )
     command.add_argument(
         "--fit-assistance",
@@ -164,8 +170,9 @@ def _fitted(job: "Job", fit: "Fit", bar: Progress) -> "Job":
 
 def _job(options: argparse.Namespace) -> "Job":
     """What is to be done; raises ActuatedCharactersError where options cannot be used."""
-    from experiment.samcon.checkpoint import checkpoint_path, read_feedback
-    from experiment.samcon.problem import Problem
+    from experiment.samcon.checkpoint import checkpoint_path, read_feedbacks
+    from experiment.samcon.gains_file import check_cycle, read_gains
+    from experiment.samcon.problem import Problem, windows_a_cycle
     from experiment.samcon.reconstruction import Job, duration_of
     from experiment.samcon.settings import preset
 
@@ -186,27 +193,40 @@ def _job(options: argparse.Namespace) -> "Job":
     _check_fit(options)
     given = {name: getattr(options, name) for name in ("samples", "kept", "window", "seed")}
     if options.open_loop:
-        given["feedback"] = {}
+        given |= {"feedback": {}, "window_feedback": ""}
+    elif options.fit or options.window_feedback == "none":
+        given["window_feedback"] = ""
+    else:
+        given["window_feedback"] = options.window_feedback
     settings = preset(
         options.character,
         options.clip,
         options.rate,
         **{name: value for name, value in given.items() if value is not None},
     )
+    if options.resume and not options.open_loop:  # they may have been fitted, or named, before
+        gains, by_window = read_feedbacks(checkpoint_path(output))
+        settings = replace(settings, feedback=gains)
+        if options.window_feedback is None:
+            settings = replace(settings, window_feedback=by_window)
+    duration = duration_of(options.character, options.clip, options.cycles)
+    windows = read_gains(settings.window_feedback).windows if settings.window_feedback else None
+    if windows is not None and options.window is None:
+        settings = settings.dividing(duration / options.cycles, windows)
     problem = Problem.of(
         options.character,
         options.clip,
-        duration_of(options.character, options.clip, options.cycles),
+        duration,
         settings,
         {"rate": options.rate, "command_delay_ticks": options.delay_ticks},
         options.push,
     )
-    if options.push:  # what is wrong with them is said before anything begins
-        problem.planned_pushes(problem.plan())
-    job = Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
-    if options.resume and not options.open_loop:  # it may have been fitted before
-        return job.with_feedback(read_feedback(checkpoint_path(output)))
-    return job
+    # what is wrong is said before anything begins
+    plan = problem.plan()
+    problem.planned_pushes(plan)
+    if windows is not None:
+        check_cycle(windows, windows_a_cycle(len(problem.windows(plan)), options.cycles))
+    return Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
 
 
 def _check_fit(options: argparse.Namespace) -> None:
@@ -227,6 +247,10 @@ def _check_fit(options: argparse.Namespace) -> None:
         )
     if options.fit_headings > 1 and not options.fit:
         raise ConfigurationError("--fit-headings is for --fit, which says how many are tried")
+    if options.window_feedback not in (None, "none") and (options.fit or options.open_loop):
+        raise ConfigurationError(
+            "--window-feedback acts beside the preset's feedback; --fit and --open-loop do without"
+        )
     if not options.fit:
         return
     if options.open_loop:

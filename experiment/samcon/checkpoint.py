@@ -59,14 +59,15 @@ def write_checkpoint(path: Path, key: Mapping[str, Any], progress: Progress) -> 
     write_whole(path, json.dumps(content))
 
 
-def read_feedback(path: Path) -> Gains:
-    """The feedback with which a checkpoint's search was made.
+def read_feedbacks(path: Path) -> tuple[Gains, str]:
+    """The feedback with which a checkpoint's search was made, and its window feedback.
 
     Raises:
         RecordingError: there is none, or it cannot be read.
     """
     try:
-        return checked_gains(json.loads(path.read_text(encoding="utf-8"))["key"]["feedback"])
+        key = json.loads(path.read_text(encoding="utf-8"))["key"]
+        return checked_gains(key["feedback"]), str(key["window_feedback"])
     except OSError as error:
         raise RecordingError(f"cannot resume from {path}: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError, ConfigurationError) as error:

@@ -10,6 +10,7 @@ from experiment.plan import Plan, make_plan
 from experiment.planned_push import PlannedPush, parsed_push
 from experiment.samcon.settings import Settings
 from msgs_config.arrays import IntArray
+from msgs_config.errors import ConfigurationError
 from msgs_config.tick_clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 
 
@@ -24,6 +25,7 @@ class Problem:
     simulator: Mapping[str, object] = field(default_factory=dict)
     controller: Mapping[str, object] = field(default_factory=dict)
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name
+    window_feedback: str = ""  # name or path of its gains; empty: without
     feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
     pushes: tuple[str, ...] = ()  # LINK:FX,FY,FZ@S, which the search knows beforehand
 
@@ -46,6 +48,7 @@ class Problem:
             simulator or {},
             settings.gains,
             settings.feedback,
+            settings.window_feedback,
             settings.feedforward,
             tuple(pushes),
         )
@@ -53,6 +56,10 @@ class Problem:
     def planned_pushes(self, plan: Plan) -> tuple[PlannedPush, ...]:
         """The pushes of its plan. Raises ConfigurationError if one is wrong."""
         return tuple(parsed_push(text, plan) for text in self.pushes)
+
+    def windows(self, plan: Plan) -> "Windows":
+        """The windows of its plan."""
+        return Windows(plan.ticks, plan.simulator.integer("rate"), self.window)
 
     def plan(self, clip: str | None = None) -> Plan:
         """The run, of the motion itself or of another clip; the root is not driven.
@@ -109,3 +116,17 @@ class Windows:
         clock = TickClock(self.rate_hz)
         since_ns = clock.stamp_ns(FIRST_TICK + tick) - clock.stamp_ns(FIRST_TICK)
         return since_ns / NANOSECONDS_PER_SECOND
+
+
+def windows_a_cycle(windows: int, cycles: int) -> int:
+    """Windows of each of some equal cycles, of which a window feedback has as many.
+
+    Raises:
+        ConfigurationError: they are not equally many.
+    """
+    if windows % cycles:
+        raise ConfigurationError(
+            f"{cycles} cycles are {windows} windows; for a window feedback all cycles must have "
+            "equally many"
+        )
+    return windows // cycles

@@ -13,6 +13,7 @@ from controller_node.references.corrected import Corrections
 from controller_node.references.corrected_file import write_corrected
 from experiment.samcon.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
 from experiment.samcon.gain_space import Gains
+from experiment.samcon.gains_file import digest, read_gains
 from experiment.samcon.problem import Problem
 from experiment.samcon.rollout import Rollout
 from experiment.samcon.search import Failure, Progress, first_progress, result, search
@@ -49,11 +50,13 @@ class Job:
 
     @property
     def key(self) -> dict[str, Any]:
-        """What a checkpoint must agree on."""
-        return {**asdict(self.problem), **self.settings.content()}
+        """What a checkpoint must agree on. Raises ConfigurationError if a file is not there."""
+        name = self.problem.window_feedback
+        content = {"window feedback's content": digest(read_gains(name)) if name else ""}
+        return {**asdict(self.problem), **self.settings.content(), **content}
 
     def with_feedback(self, gains: Gains) -> "Job":
-        """The same with another feedback."""
+        """The same with another balance feedback."""
         return replace(
             self,
             problem=replace(self.problem, feedback=gains),
@@ -89,16 +92,16 @@ def reconstruct(
         SimulationError: the file's run is not what was found.
         ActuatedCharactersError: a name or value is wrong.
     """
-    checkpoint = checkpoint_path(job.output)
+    checkpoint, key = checkpoint_path(job.output), job.key
     with Workers(job.problem, job.workers, job.cluster) as workers:
         rollout = rollout_of(job.problem)
         progress = first_progress(rollout)
         if job.resume:
-            progress = read_checkpoint(checkpoint, job.key)
+            progress = read_checkpoint(checkpoint, key)
         pace = _Pace(progress.samples)
 
         def after_window(progress: Progress) -> None:
-            write_checkpoint(checkpoint, job.key, progress)
+            write_checkpoint(checkpoint, key, progress)
             report(progress, len(rollout.windows), pace.after(progress.samples))
 
         report(progress, len(rollout.windows), 0.0)
@@ -152,9 +155,14 @@ def _write(
         "figures": None if figures is None else asdict(figures),
     }
     corrections = Corrections(rollout.windows.ends[: len(path)], best.offsets)
-    clip = clip_path(character, job.problem.clip)
     write_corrected(
-        job.output, clip, character.layout, corrections, reconstruction, job.problem.feedback
+        job.output,
+        clip_path(character, job.problem.clip),
+        character.layout,
+        corrections,
+        reconstruction,
+        job.problem.feedback,
+        rollout.window_gains,
     )
 
 

@@ -1,25 +1,29 @@
 """Simulates samples: the same simulation and the same controller as a run, window by window."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from controller_node.controller import Controller
-from controller_node.feedback import Feedback, RespondingReference
+from controller_node.feedback import Feedback, Responding, responding
 from controller_node.feedback_gains import FeedbackGains
 from controller_node.parameters import make_controller
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.corrected import Offset
+from controller_node.window_feedback import Deviations, WindowFeedback
+from controller_node.window_gains import WindowGains
 from experiment.planned_push import PlannedPush, push_schedule
 from experiment.samcon import cost
 from experiment.samcon.features import Features
 from experiment.samcon.feedforward import Feedforward
-from experiment.samcon.problem import Problem, Windows
+from experiment.samcon.gains_file import read_gains
+from experiment.samcon.problem import Problem
 from experiment.samcon.settings import Bounds, Settings
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.joint_layout import Configuration
+from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from sim_node.parameters import make_role, make_settings
 from sim_node.simulation import Simulation, Snapshot
 
@@ -36,8 +40,6 @@ class Branch:
     before: FloatArray  # (n,) offset of the window before the path, zeros if there is none
     samples: FloatArray  # (s, n) offsets to try in the window after the path
     lookahead: int = 0  # windows without a correction that are simulated after that, to look
-    bounds: Bounds | None = None  # beyond which a sample is not followed any further
-    pushes: tuple[PlannedPush, ...] = ()  # upon each of the samples, beside the problem's
 
 
 @dataclass(frozen=True)
@@ -118,10 +120,16 @@ class Rollout:
         plan = problem.plan()
         self.plan = plan
         self.layout = plan.character.layout
-        self.windows = Windows(plan.ticks, plan.simulator.integer("rate"), problem.window)
+        self.windows = problem.windows(plan)
         self.features = Features(plan.character)
         self._trial = Trial(plan.reference)
         self._feedback: Feedback | None = None
+        self._deviations: dict[tuple[str, ...], Deviations] = {}  # by what is moved
+        self._by_window: WindowFeedback | None = None
+        self.window_gains: WindowGains | None = None
+        if problem.window_feedback:
+            self.window_gains = read_gains(problem.window_feedback)
+            self._by_window = self._window_feedback(self.window_gains)
         self._controller = self._responding(problem.feedback)
         self._feedforward = Feedforward(
             plan.character,
@@ -141,20 +149,36 @@ class Rollout:
         """End the engine."""
         self._simulation.close()
 
-    def act(self, gains: Mapping[str, float]) -> None:
-        """Have other gains of the feedback than the problem's."""
+    def act(self, gains: Mapping[str, float], by_window: WindowGains | None = None) -> None:
+        """Have other feedbacks than the problem's."""
+        self._by_window = None if by_window is None else self._window_feedback(by_window)
         self._controller = self._responding(gains)
+
+    def deviations(self, dofs: tuple[str, ...]) -> Deviations:
+        """How the character deviates from the motion: what a window feedback looks at."""
+        if dofs not in self._deviations:
+            self._deviations[dofs] = Deviations(self.plan.character, self.plan.reference, dofs)
+        return self._deviations[dofs]
+
+    def _window_feedback(self, gains: WindowGains) -> WindowFeedback:
+        return WindowFeedback(self.deviations(gains.dofs), gains, self.windows.ends)
 
     def _responding(self, gains: Mapping[str, float]) -> Controller:
         plan = self.plan
-        if not any(gains.values()):
-            return make_controller(plan.character, self._trial, plan.controller)
-        found = FeedbackGains.of(gains)
-        if self._feedback is None:
-            known = plan.ticks + 1
-            self._feedback = Feedback(plan.character, plan.reference, found, known_ticks=known)
-        reference = RespondingReference(self._trial, self._feedback.with_gains(found))
-        return make_controller(plan.character, reference, plan.controller)
+        feedbacks: list[Responding] = []
+        if any(gains.values()):
+            found = FeedbackGains.of(gains)
+            if self._feedback is None:
+                known = plan.ticks + 1
+                self._feedback = Feedback(plan.character, plan.reference, found, known_ticks=known)
+            feedbacks.append(self._feedback.with_gains(found))
+        if self._by_window is not None:
+            feedbacks.append(self._by_window)
+        return make_controller(plan.character, responding(self._trial, feedbacks), plan.controller)
+
+    def time_of(self, push: PlannedPush) -> float:
+        """Time in s of a push since the first state."""
+        return (push.stamp_ns - self._episode_ns) / NANOSECONDS_PER_SECOND
 
     def desired(self, window: int) -> FloatArray:
         """The features (f,) of the motion at a window's end."""
@@ -180,9 +204,8 @@ class Rollout:
 
     def expand(self, branch: Branch) -> Expansion:
         """Try a branch's samples."""
-        if branch.snapshot is None:  # only a new world returns to a state without a step
-            self._simulation.close()
-            self._simulation = self._fresh()
+        if branch.snapshot is None:
+            self._begin_anew()
         else:
             self._simulation.take_over(branch.snapshot)
         simulation = self._simulation
@@ -196,31 +219,51 @@ class Rollout:
         rows = np.full((len(branch.samples), 1 + branch.lookahead, self.features.width), np.nan)
         for row, sample in zip(rows, branch.samples, strict=True):
             simulation.restore(saved)
-            self._pushes = push_schedule(self.plan, (*self._planned, *branch.pushes))
-            self._try(window, before, Offset(self.layout, sample), row, branch.bounds)
+            self._pushes = push_schedule(self.plan, self._planned)
+            ahead = range(window + 1, min(window + len(row), len(self.windows)))
+            offsets = [sample, *(self.plain(later) for later in ahead)]
+            self._follow(window, before, offsets, row)
         simulation.forget(saved)
         return Expansion(snapshot, start, rows)
 
-    def _try(
+    def follow(
+        self, offsets: FloatArray, pushes: Sequence[PlannedPush] = (), bounds: Bounds | None = None
+    ) -> FloatArray:
+        """A run from the first state with offsets (w, n) of its windows: features (w, f) at ends.
+
+        The pushes come beside the problem's. Once it is lost the features are NaN.
+        """
+        self._begin_anew()
+        self._pushes = push_schedule(self.plan, (*self._planned, *pushes))
+        rows = np.full((len(offsets), self.features.width), np.nan)
+        self._follow(0, None, list(offsets), rows, bounds)
+        return rows
+
+    def _begin_anew(self) -> None:
+        """Return to the first state: only a new world returns to a state without a step."""
+        self._simulation.close()
+        self._simulation = self._fresh()
+
+    def _follow(
         self,
         window: int,
         before: Offset | None,
-        offset: Offset,
+        offsets: Sequence[FloatArray],
         rows: FloatArray,
-        bounds: Bounds | None,
+        bounds: Bounds | None = None,
     ) -> None:
-        """Fill in the features (1 + l, f) that an offset leads to, as far as it goes well."""
-        for row in rows[: len(self.windows) - window]:
+        """Fill in the features (w, f) that offsets lead to, as far as it goes well."""
+        for row, numbers in zip(rows, offsets, strict=False):
+            offset = Offset(self.layout, numbers)
             try:
                 self._advance(window, before, offset)
             except SimulationError:
                 return
             row[:] = self._features()
             if bounds is not None and self._is_lost(window, row, bounds):
+                row[:] = np.nan
                 return
             window, before = window + 1, offset
-            if window < len(self.windows):
-                offset = Offset(self.layout, self.plain(window))
 
     def _is_lost(self, window: int, row: FloatArray, bounds: Bounds) -> bool:
         rows, desired = row[np.newaxis], self.desired(window)

@@ -52,6 +52,7 @@ class Settings:
     # largest offset of each joint that is corrected, rad or m, one number a degree of freedom
     noise: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name; none: without
+    window_feedback: str = ""  # name or path of its gains; empty: without
     feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
     gains: Mapping[str, float] = field(default_factory=dict)  # of the controller, by parameter
     weights: Weights = Weights()
@@ -63,6 +64,10 @@ class Settings:
         for name, widths in self.noise.items():
             largest[layout.joint(name).entries] = widths
         return largest
+
+    def dividing(self, cycle: float, windows: int | None = None) -> "Settings":
+        """The same with so many windows a cycle of a length in s, or as many as there are about."""
+        return replace(self, window=cycle / (windows or max(round(cycle / self.window), 1)))
 
     def content(self) -> dict[str, Any]:
         """The settings as JSON has them."""
@@ -122,6 +127,10 @@ def settings_from(content: Mapping[str, Any]) -> Settings:
             raise ConfigurationError(
                 f"{name} is {getattr(settings, name)}; it must be {least} to {most}"
             )
+    if not isinstance(settings.window_feedback, str):
+        raise ConfigurationError(
+            f"window_feedback is {settings.window_feedback!r}; it must be text"
+        )
     if not 0.0 <= settings.feedforward <= 10.0:
         raise ConfigurationError(f"feedforward is {settings.feedforward}; it must be 0 to 10")
     if not 0.0 < settings.window <= 10.0:

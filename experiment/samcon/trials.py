@@ -12,10 +12,10 @@ from math import cos, pi, sin
 import joblib
 import numpy as np
 
+from experiment.plan import Plan
 from experiment.planned_push import PlannedPush, planned_push
 from experiment.samcon.gain_space import Gains
 from experiment.samcon.problem import Problem
-from experiment.samcon.rollout import Branch
 from experiment.samcon.settings import Settings
 from experiment.samcon.workers import leave_interrupts_to_the_parent, rollout_of
 from msgs_config.arrays import FloatArray
@@ -31,7 +31,7 @@ _ASSISTANCE = {"root": (1000.0, 100.0), "root_r": (1000.0, 100.0)}
 _LONGER = 1.4  # runs, each time
 _FIRST_RUN = 3.8  # s
 _PUSH_EVERY = 2.0  # s
-_QUARTER = 0.5 * pi  # rad, after which the engine's friction is the same again
+QUARTER = 0.5 * pi  # rad, after which the engine's friction is the same again
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Trials:
     def _runs(self, level: Level, seed: list[int], count: int) -> list[Run]:
         """So many runs at each heading; where there are pushes, every other one is pushed."""
         rng = np.random.default_rng(np.random.SeedSequence(seed))
-        headings = np.arange(self._fit.headings) * _QUARTER / self._fit.headings
+        headings = np.arange(self._fit.headings) * QUARTER / self._fit.headings
         return [
             Run(
                 heading,
@@ -132,19 +132,10 @@ class Trials:
         ]
 
     def _pushes(self, level: Level, rng: np.random.Generator) -> tuple[PlannedPush, ...]:
-        """Pushes on the root, each two seconds, from random sides."""
         if not level.push:
             return ()
         end = level.windows * self._problem.duration / self.windows
-        root = self._plan.character.links[0].name
-        held = self._plan.simulator.number("wrench_duration")
-        times = np.arange(rng.uniform(0.5, _PUSH_EVERY), end - held, _PUSH_EVERY).tolist()
-        sides = rng.uniform(-np.pi, np.pi, len(times)).tolist()
-        force = level.push / held
-        return tuple(
-            planned_push(self._plan, root, (force * cos(side), force * sin(side), 0.0), time)
-            for time, side in zip(times, sides, strict=True)
-        )
+        return random_pushes(self._plan, rng, level.push, end)
 
     def _tried(self, level: Level, pairs: Sequence[tuple[Gains, Run]]) -> list[Tried]:
         work = [
@@ -158,6 +149,29 @@ class Trials:
         )
 
 
+def random_pushes(
+    plan: Plan, rng: np.random.Generator, push: float, end: float
+) -> tuple[PlannedPush, ...]:
+    """Pushes of so many N s on the root, each two seconds until a time in s, from random sides."""
+    root = plan.character.links[0].name
+    held = plan.simulator.number("wrench_duration")
+    times = np.arange(rng.uniform(0.5, _PUSH_EVERY), end - held, _PUSH_EVERY).tolist()
+    sides = rng.uniform(-np.pi, np.pi, len(times)).tolist()
+    force = push / held
+    return tuple(
+        planned_push(plan, root, (force * cos(side), force * sin(side), 0.0), time)
+        for time, side in zip(times, sides, strict=True)
+    )
+
+
+def turned(problem: Problem, heading: float) -> Problem:
+    """A problem whose motion begins at a heading in rad."""
+    if not heading:
+        return problem
+    placement = {"placement": [0.0, 0.0, 0.0, heading]}
+    return replace(problem, simulator={**problem.simulator, **placement})
+
+
 def _tried_in_process(
     settings: Settings, problem: Problem, windows: int, gains: Gains, run: Run
 ) -> Tried:
@@ -169,10 +183,9 @@ def tried(settings: Settings, problem: Problem, windows: int, gains: Gains, run:
     """A feedback's run over the first windows of a problem."""
     rollout = rollout_of(problem)
     rollout.act(gains)
-    nothing = np.zeros(rollout.layout.size)
-    sample = (rollout.plain(0) + run.nudge)[np.newaxis]
-    branch = Branch(None, 0, sample[:0], nothing, sample, windows - 1, settings.bounds, run.pushes)
-    (ends,) = rollout.expand(branch).features
+    offsets = np.array([rollout.plain(window) for window in range(windows)])
+    offsets[0] += run.nudge
+    ends = rollout.follow(offsets, run.pushes, settings.bounds)
     total = 0.0
     for window, end in enumerate(ends):
         (value,) = rollout.costs(window, end[np.newaxis], settings).tolist()
@@ -187,10 +200,7 @@ def _bare(problem: Problem, assistance: float, heading: float) -> Problem:
 
     It is turned to a heading, and some of the root's assistance may help.
     """
-    bare = replace(problem, feedback={}, pushes=())
-    if heading:
-        turned = {"placement": [0.0, 0.0, 0.0, heading]}
-        bare = replace(bare, simulator={**problem.simulator, **turned})
+    bare = turned(replace(problem, feedback={}, window_feedback="", pushes=()), heading)
     if not assistance:
         return bare
     gains = {

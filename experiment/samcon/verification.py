@@ -10,7 +10,7 @@ from controller_node.dynamics import DynamicsModel
 from experiment.loop import ticks_in_process
 from experiment.metrics import Measurement
 from experiment.plan import Plan
-from experiment.samcon.problem import Problem, Windows
+from experiment.samcon.problem import Problem
 from experiment.samcon.tree import Node
 from msgs_config import configuration
 from msgs_config.arrays import FloatArray
@@ -41,7 +41,7 @@ def verified(problem: Problem, file: Path, best: Node) -> Figures:
         SimulationError: the states are not those of the search, to the bit.
     """
     plan, motion = problem.plan(str(file)), problem.plan().reference
-    windows = Windows(plan.ticks, plan.simulator.integer("rate"), problem.window)
+    windows = problem.windows(plan)
     ends = dict(zip(windows.bounds[1:].tolist(), best.path, strict=False))
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     measurement = Measurement(known)
