@@ -78,7 +78,7 @@ def _numbers(name: str, content: object, shape: Sequence[int | None]) -> FloatAr
     """Numbers of a shape, in which None is any length."""
     try:
         numbers: FloatArray = np.array(content, dtype=float)
-        if np.array(content).dtype.kind not in "fiu":  # texts and truths would become numbers
+        if np.array(content).dtype.kind not in "fiu":  # texts would become numbers
             raise TypeError
     except (ValueError, TypeError, OverflowError) as error:
         raise ConfigurationError(f"window feedback: {name} must be rows of numbers") from error

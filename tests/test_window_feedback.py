@@ -209,7 +209,7 @@ def test_a_controller_that_begins_an_episode_has_forgotten_the_one_before() -> N
         reference = RespondingReference(WALK, feedback(some_gains(size=0.1)))
         acting = make_controller(HUMANOID, reference, values)
         found = []
-        for count, (tick, first) in enumerate(pairs):
+        for count, (tick, first) in enumerate(pairs, 1):
             position, velocity = state((tick - first) / 240, nothing)
             position[0] += 0.02 * count * (tick != 510)
             stamped = StampedState(clock.stamp_ns(tick), position, velocity, None)

@@ -74,7 +74,7 @@ def add_fit_feedback(commands: "argparse._SubParsersAction[argparse.ArgumentPars
 
 
 def _fit_feedback(options: argparse.Namespace) -> None:
-    from experiment.samcon.gains_file import read_gains, write_gains
+    from experiment.samcon.gains_file import check_joints, read_gains, write_gains
     from experiment.samcon.problem import Problem
     from experiment.samcon.reconstruction import duration_of
     from experiment.samcon.settings import preset
@@ -88,6 +88,10 @@ def _fit_feedback(options: argparse.Namespace) -> None:
     settings = settings.dividing(duration / options.cycles, windows)
     simulator = {"rate": options.rate, "command_delay_ticks": options.delay_ticks}
     problem = Problem.of(options.character, options.clip, duration, settings, simulator)
+    plan = problem.plan()  # what is wrong is said before anything begins
+    problem.windows(plan)
+    if first is not None:
+        check_joints(options.first, first, plan.character.layout)
     fit = WindowFit(options.rounds, options.push, options.headings)
     bar = Progress(
         TextColumn("{task.description}", markup=False),
@@ -124,6 +128,8 @@ def _checked(options: argparse.Namespace) -> int:
         raise ConfigurationError(f"--output is {output}; it must end in .json")
     if not output.absolute().parent.is_dir():
         raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
+    if output.is_dir():
+        raise ConfigurationError(f"--output is {output}; it is a directory")
     if output.exists() and not options.overwrite:
         raise ConfigurationError(f"{output} exists; --overwrite replaces it")
     workers: int = options.workers if options.workers is not None else os.cpu_count() or 1

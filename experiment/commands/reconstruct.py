@@ -70,7 +70,8 @@ def _add_search(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--window-feedback",
         metavar="FILE",
-        help="of `fit-feedback`, or the name of a shipped one, or none (the preset's)",
+        help="of `fit-feedback` for the same motion, rate and delay, or the name of a shipped one, "
+        "or none (the preset's)",
     )
     command.add_argument(
         "--fit",
@@ -171,7 +172,7 @@ def _fitted(job: "Job", fit: "Fit", bar: Progress) -> "Job":
 def _job(options: argparse.Namespace) -> "Job":
     """What is to be done; raises ActuatedCharactersError where options cannot be used."""
     from experiment.samcon.checkpoint import checkpoint_path, read_feedbacks
-    from experiment.samcon.gains_file import check_cycle, read_gains
+    from experiment.samcon.gains_file import check_cycle, check_joints, read_gains
     from experiment.samcon.problem import Problem, windows_a_cycle
     from experiment.samcon.reconstruction import Job, duration_of
     from experiment.samcon.settings import preset
@@ -205,14 +206,14 @@ def _job(options: argparse.Namespace) -> "Job":
         **{name: value for name, value in given.items() if value is not None},
     )
     if options.resume and not options.open_loop:  # they may have been fitted, or named, before
-        gains, by_window = read_feedbacks(checkpoint_path(output))
+        gains, name = read_feedbacks(checkpoint_path(output))
         settings = replace(settings, feedback=gains)
         if options.window_feedback is None:
-            settings = replace(settings, window_feedback=by_window)
+            settings = replace(settings, window_feedback=name)
     duration = duration_of(options.character, options.clip, options.cycles)
-    windows = read_gains(settings.window_feedback).windows if settings.window_feedback else None
-    if windows is not None and options.window is None:
-        settings = settings.dividing(duration / options.cycles, windows)
+    by_window = read_gains(settings.window_feedback) if settings.window_feedback else None
+    if by_window is not None and options.window is None:
+        settings = settings.dividing(duration / options.cycles, by_window.windows)
     problem = Problem.of(
         options.character,
         options.clip,
@@ -224,8 +225,10 @@ def _job(options: argparse.Namespace) -> "Job":
     # what is wrong is said before anything begins
     plan = problem.plan()
     problem.planned_pushes(plan)
-    if windows is not None:
-        check_cycle(windows, windows_a_cycle(len(problem.windows(plan)), options.cycles))
+    windows = len(problem.windows(plan))
+    if by_window is not None:
+        check_joints(settings.window_feedback, by_window, plan.character.layout)
+        check_cycle(by_window.windows, windows_a_cycle(windows, options.cycles))
     return Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
 
 

@@ -14,6 +14,8 @@ from experiment.samcon.search import Progress
 from experiment.samcon.tree import Node
 from msgs_config.errors import ConfigurationError, RecordingError
 
+_MALFORMED = (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError)
+
 
 def checkpoint_path(output: Path) -> Path:
     """Where the checkpoint of a result is."""
@@ -67,10 +69,13 @@ def read_feedbacks(path: Path) -> tuple[Gains, str]:
     """
     try:
         key = json.loads(path.read_text(encoding="utf-8"))["key"]
-        return checked_gains(key["feedback"]), str(key["window_feedback"])
+        gains, by_window = key["feedback"], key["window_feedback"]
+        if not isinstance(gains, dict) or not isinstance(by_window, str):
+            raise TypeError
+        return checked_gains(gains), by_window
     except OSError as error:
         raise RecordingError(f"cannot resume from {path}: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, ConfigurationError) as error:
+    except (*_MALFORMED, ConfigurationError) as error:
         raise RecordingError(f"{path}: not a checkpoint that can be resumed") from error
 
 
@@ -97,7 +102,7 @@ def read_checkpoint(path: Path, key: Mapping[str, Any]) -> Progress:
         )
     except OSError as error:
         raise RecordingError(f"cannot resume from {path}: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except _MALFORMED as error:
         raise RecordingError(f"{path}: not a checkpoint that can be resumed") from error
 
 

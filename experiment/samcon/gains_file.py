@@ -6,8 +6,9 @@ from pathlib import Path
 
 from controller_node.references.corrected_file import write_whole
 from controller_node.window_gains import WindowGains, window_gains
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, LayoutError
 from msgs_config.files import read_text
+from msgs_config.joint_layout import ROOT, JointLayout
 
 SHIPPED = Path(__file__).parent
 SUFFIX = ".json"
@@ -35,10 +36,25 @@ def read_gains(name_or_path: str) -> WindowGains:
 
 
 def write_gains(path: Path, gains: WindowGains) -> None:
-    """Write a window feedback; the file is there at once. Raises ClipError if it cannot be."""
-    content = gains.content()
+    """Write a window feedback; the file is there at once.
+
+    Raises:
+        ClipError: it cannot be written.
+        ConfigurationError: a gain is not finite, or beyond reason.
+    """
+    content = window_gains(gains.content()).content()  # what cannot be read is not written
     lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(content[name])}" for name in content)
     write_whole(path, f"{{\n{lines}\n}}\n")
+
+
+def check_joints(name: str, gains: WindowGains, layout: JointLayout) -> None:
+    """Raise ConfigurationError if a feedback's degrees of freedom are not a character's to move."""
+    try:
+        moved = layout.indices(gains.dofs)
+        if layout.has_floating_base and layout.mask((ROOT,))[moved].any():
+            raise LayoutError(f"'{ROOT}' is moved; it has no motor")
+    except LayoutError as error:
+        raise ConfigurationError(f"window feedback {name}: {error}") from error
 
 
 def check_cycle(windows: int, wanted: int) -> None:

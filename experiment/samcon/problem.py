@@ -8,6 +8,7 @@ import numpy as np
 
 from experiment.plan import Plan, make_plan
 from experiment.planned_push import PlannedPush, parsed_push
+from experiment.samcon.gains_file import digest, read_gains
 from experiment.samcon.settings import Settings
 from msgs_config.arrays import IntArray
 from msgs_config.errors import ConfigurationError
@@ -26,6 +27,7 @@ class Problem:
     controller: Mapping[str, object] = field(default_factory=dict)
     feedback: Mapping[str, float] = field(default_factory=dict)  # gains by name
     window_feedback: str = ""  # name or path of its gains; empty: without
+    window_digest: str = ""  # of their content, which all processes must have
     feedforward: float = 0.0  # share of the offsets of the motion's inverse dynamics to begin with
     pushes: tuple[str, ...] = ()  # LINK:FX,FY,FZ@S, which the search knows beforehand
 
@@ -49,6 +51,7 @@ class Problem:
             settings.gains,
             settings.feedback,
             settings.window_feedback,
+            digest(read_gains(settings.window_feedback)) if settings.window_feedback else "",
             settings.feedforward,
             tuple(pushes),
         )
@@ -58,8 +61,14 @@ class Problem:
         return tuple(parsed_push(text, plan) for text in self.pushes)
 
     def windows(self, plan: Plan) -> "Windows":
-        """The windows of its plan."""
-        return Windows(plan.ticks, plan.simulator.integer("rate"), self.window)
+        """The windows of its plan. Raises ConfigurationError if some would have no tick."""
+        rate = plan.simulator.integer("rate")
+        windows = Windows(plan.ticks, rate, self.window)
+        if len(windows) > plan.ticks:
+            raise ConfigurationError(
+                f"window is {self.window:.3g} s; it must be a tick or more, {1.0 / rate:.3g} s"
+            )
+        return windows
 
     def plan(self, clip: str | None = None) -> Plan:
         """The run, of the motion itself or of another clip; the root is not driven.

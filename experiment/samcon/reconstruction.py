@@ -13,7 +13,6 @@ from controller_node.references.corrected import Corrections
 from controller_node.references.corrected_file import write_corrected
 from experiment.samcon.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
 from experiment.samcon.gain_space import Gains
-from experiment.samcon.gains_file import digest, read_gains
 from experiment.samcon.problem import Problem
 from experiment.samcon.rollout import Rollout
 from experiment.samcon.search import Failure, Progress, first_progress, result, search
@@ -50,10 +49,8 @@ class Job:
 
     @property
     def key(self) -> dict[str, Any]:
-        """What a checkpoint must agree on. Raises ConfigurationError if a file is not there."""
-        name = self.problem.window_feedback
-        content = {"window feedback's content": digest(read_gains(name)) if name else ""}
-        return {**asdict(self.problem), **self.settings.content(), **content}
+        """What a checkpoint must agree on."""
+        return {**asdict(self.problem), **self.settings.content()}
 
     def with_feedback(self, gains: Gains) -> "Job":
         """The same with another balance feedback."""

@@ -49,7 +49,7 @@ def regulator(
         value, slope, unit = value * scale, slope * scale, unit * scale
         gains[phase] = model.largest[:, np.newaxis] * gain / model.spreads
         constants[phase] = model.largest * constant
-    return WindowGains(dofs, model.largest, _rounded(constants), _rounded(gains))
+    return WindowGains(dofs, model.largest, rounded(constants), rounded(gains))
 
 
 def _stage(
@@ -79,7 +79,7 @@ def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
-def _rounded(numbers: FloatArray) -> FloatArray:
+def rounded(numbers: FloatArray) -> FloatArray:
     """Numbers with the digits that a file of them needs."""
-    rounded = [float(f"{number:.{_DIGITS}g}") for number in numbers.ravel().tolist()]
-    return np.array(rounded).reshape(numbers.shape)
+    values = [float(f"{number:.{_DIGITS}g}") for number in numbers.ravel().tolist()]
+    return np.array(values).reshape(numbers.shape)

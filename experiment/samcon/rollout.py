@@ -17,11 +17,11 @@ from experiment.planned_push import PlannedPush, push_schedule
 from experiment.samcon import cost
 from experiment.samcon.features import Features
 from experiment.samcon.feedforward import Feedforward
-from experiment.samcon.gains_file import read_gains
+from experiment.samcon.gains_file import digest, read_gains
 from experiment.samcon.problem import Problem
 from experiment.samcon.settings import Bounds, Settings
 from msgs_config.arrays import FloatArray
-from msgs_config.errors import SimulationError
+from msgs_config.errors import ConfigurationError, SimulationError
 from msgs_config.joint_layout import Configuration
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from sim_node.parameters import make_role, make_settings
@@ -129,6 +129,10 @@ class Rollout:
         self.window_gains: WindowGains | None = None
         if problem.window_feedback:
             self.window_gains = read_gains(problem.window_feedback)
+            if problem.window_digest not in ("", digest(self.window_gains)):
+                raise ConfigurationError(
+                    f"window feedback {problem.window_feedback} is not what it was at the start"
+                )
             self._by_window = self._window_feedback(self.window_gains)
         self._controller = self._responding(problem.feedback)
         self._feedforward = Feedforward(
