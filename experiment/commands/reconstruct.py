@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # it takes a second to import
     from experiment.samcon.fitting import State as FitState
     from experiment.samcon.reconstruction import Job, Reconstruction
     from experiment.samcon.search import Progress as SearchProgress
+    from experiment.samcon.settings import Settings
     from experiment.samcon.trials import Fit
 
 _SUFFIX = ".json"
@@ -171,45 +172,16 @@ def _fitted(job: "Job", fit: "Fit", bar: Progress) -> "Job":
 
 def _job(options: argparse.Namespace) -> "Job":
     """What is to be done; raises ActuatedCharactersError where options cannot be used."""
-    from experiment.samcon.checkpoint import checkpoint_path, read_feedbacks
     from experiment.samcon.gains_file import check_cycle, check_joints, read_gains
     from experiment.samcon.problem import Problem, windows_a_cycle
     from experiment.samcon.reconstruction import Job, duration_of
-    from experiment.samcon.settings import preset
 
-    output: Path = options.output
-    if output.suffix != _SUFFIX:
-        raise ConfigurationError(f"--output is {output}; it must end in {_SUFFIX}, as clips do")
-    if not output.absolute().parent.is_dir():
-        raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
-    if not options.resume and not options.overwrite:
-        for file in (output, checkpoint_path(output)):
-            if file.exists():
-                raise ConfigurationError(
-                    f"{file} exists; --resume goes on, --overwrite begins anew"
-                )
     workers = options.workers if options.workers is not None else os.cpu_count() or 1
     if workers < 1:
         raise ConfigurationError(f"--workers is {workers}; it must be 1 or more")
+    _check_output(options)
     _check_fit(options)
-    given = {name: getattr(options, name) for name in ("samples", "kept", "window", "seed")}
-    if options.open_loop:
-        given |= {"feedback": {}, "window_feedback": ""}
-    elif options.fit or options.window_feedback == "none":
-        given["window_feedback"] = ""
-    else:
-        given["window_feedback"] = options.window_feedback
-    settings = preset(
-        options.character,
-        options.clip,
-        options.rate,
-        **{name: value for name, value in given.items() if value is not None},
-    )
-    if options.resume and not options.open_loop:  # they may have been fitted, or named, before
-        gains, name = read_feedbacks(checkpoint_path(output))
-        settings = replace(settings, feedback=gains)
-        if options.window_feedback is None:
-            settings = replace(settings, window_feedback=name)
+    settings = _settings(options)
     duration = duration_of(options.character, options.clip, options.cycles)
     by_window = read_gains(settings.window_feedback) if settings.window_feedback else None
     if by_window is not None and options.window is None:
@@ -229,7 +201,52 @@ def _job(options: argparse.Namespace) -> "Job":
     if by_window is not None:
         check_joints(settings.window_feedback, by_window, plan.character.layout)
         check_cycle(by_window.windows, windows_a_cycle(windows, options.cycles))
-    return Job(problem, options.cycles, settings, output, workers, options.cluster, options.resume)
+    return Job(
+        problem, options.cycles, settings, options.output, workers, options.cluster, options.resume
+    )
+
+
+def _settings(options: argparse.Namespace) -> "Settings":
+    """Those of the preset, but for what is given, and for the feedbacks of what is resumed."""
+    from experiment.samcon.checkpoint import checkpoint_path, read_feedbacks
+    from experiment.samcon.settings import preset
+
+    given = {name: getattr(options, name) for name in ("samples", "kept", "window", "seed")}
+    if options.open_loop:
+        given |= {"feedback": {}, "window_feedback": ""}
+    elif options.fit or options.window_feedback == "none":
+        given["window_feedback"] = ""
+    else:
+        given["window_feedback"] = options.window_feedback
+    settings = preset(
+        options.character,
+        options.clip,
+        options.rate,
+        **{name: value for name, value in given.items() if value is not None},
+    )
+    if not options.resume or options.open_loop:
+        return settings
+    gains, name = read_feedbacks(checkpoint_path(options.output))  # fitted, or named, before
+    settings = replace(settings, feedback=gains)
+    if options.window_feedback is None:
+        settings = replace(settings, window_feedback=name)
+    return settings
+
+
+def _check_output(options: argparse.Namespace) -> None:
+    """Raise ConfigurationError where the result cannot be written."""
+    from experiment.samcon.checkpoint import checkpoint_path
+
+    output: Path = options.output
+    if output.suffix != _SUFFIX:
+        raise ConfigurationError(f"--output is {output}; it must end in {_SUFFIX}, as clips do")
+    if not output.absolute().parent.is_dir():
+        raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
+    if options.resume or options.overwrite:
+        return
+    for file in (output, checkpoint_path(output)):
+        if file.exists():
+            raise ConfigurationError(f"{file} exists; --resume goes on, --overwrite begins anew")
 
 
 def _check_fit(options: argparse.Namespace) -> None:
