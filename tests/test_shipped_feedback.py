@@ -11,7 +11,8 @@ from experiment.samcon.gains_file import read_gains
 from experiment.samcon.problem import Problem
 from experiment.samcon.reconstruction import duration_of
 from experiment.samcon.settings import preset
-from experiment.samcon.window_trials import WindowRun, WindowTrials, headings
+from experiment.samcon.trials import headings
+from experiment.samcon.window_trials import WindowRun, WindowTrials
 
 FAST = preset("humanoid", "walk", 480, samples=1, kept=1, lookahead=0)
 LATE = {"rate": 480, "command_delay_ticks": 1}

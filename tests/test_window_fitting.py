@@ -14,8 +14,9 @@ from experiment.samcon.gains_file import read_gains
 from experiment.samcon.problem import Problem
 from experiment.samcon.rollout import Rollout
 from experiment.samcon.settings import preset
+from experiment.samcon.trials import headings
 from experiment.samcon.window_fitting import WindowFit, WindowFitState, fitted_windows
-from experiment.samcon.window_trials import WindowRun, WindowTrials, headings
+from experiment.samcon.window_trials import WindowRun, WindowTrials
 from msgs_config.errors import ConfigurationError, RunError
 
 SETTINGS = preset("humanoid", "walk", 240, window=0.0667, feedback={}, window_feedback="")

@@ -1,12 +1,12 @@
 """The command `actuated_characters fit-feedback`: a window feedback for a motion that repeats."""
 
 import argparse
-import os
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from experiment.commands.checks import check_output, worker_count
+from experiment.commands.progress import search_bar
 from msgs_config.errors import ConfigurationError
 
 _LEAST_ROUNDS, _MOST_ROUNDS = 1, 1000
@@ -93,14 +93,7 @@ def _fit_feedback(options: argparse.Namespace) -> None:
     if first is not None:
         check_joints(options.first, first, plan.character.layout)
     fit = WindowFit(options.rounds, options.push, options.headings)
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.completed:.0f}/{task.total:.0f}"),
-        TextColumn("{task.fields[state]}", markup=False),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
+    bar = search_bar()
     task = bar.add_task(
         f"{options.character}: {options.clip}", total=fit.rounds, state="looks around"
     )
@@ -124,17 +117,10 @@ def _checked(options: argparse.Namespace) -> int:
     from experiment.samcon.workers import MOST_ENGINES
 
     output: Path = options.output
-    if output.suffix != ".json":
-        raise ConfigurationError(f"--output is {output}; it must end in .json")
-    if not output.absolute().parent.is_dir():
-        raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
-    if output.is_dir():
-        raise ConfigurationError(f"--output is {output}; it is a directory")
+    check_output(output)
     if output.exists() and not options.overwrite:
         raise ConfigurationError(f"{output} exists; --overwrite replaces it")
-    workers: int = options.workers if options.workers is not None else os.cpu_count() or 1
     for name, value, least, most in (
-        ("workers", workers, 1, 10_000),
         ("rounds", options.rounds, _LEAST_ROUNDS, _MOST_ROUNDS),
         ("cycles", options.cycles, 2, 1000),
         ("headings", options.headings, 1, MOST_ENGINES),
@@ -142,4 +128,4 @@ def _checked(options: argparse.Namespace) -> int:
     ):
         if not least <= value <= most:
             raise ConfigurationError(f"--{name} is {value:g}; it must be {least:g} to {most:g}")
-    return workers
+    return worker_count(options.workers)

@@ -1,4 +1,4 @@
-"""The progress bar of the sub-commands that count what they have done."""
+"""The progress bars of the sub-commands."""
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -17,3 +17,15 @@ def progress_bar(description: str, total: int, unit: str, *, transient: bool = F
     )
     bar.add_task(description, total=total)
     return bar
+
+
+def search_bar() -> Progress:
+    """A bar on standard error whose tasks say in a field `state` how well it goes."""
+    return Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+        TextColumn("{task.fields[state]}", markup=False),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )

@@ -1,7 +1,6 @@
 """The command `actuated_characters reconstruct`: captured motion with joint torques alone."""
 
 import argparse
-import os
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -9,19 +8,21 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from experiment.commands.checks import check_output, worker_count
+from experiment.commands.progress import search_bar
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
+    from rich.progress import Progress
+
     from experiment.samcon.fitting import State as FitState
     from experiment.samcon.reconstruction import Job, Reconstruction
     from experiment.samcon.search import Progress as SearchProgress
     from experiment.samcon.settings import Settings
     from experiment.samcon.trials import Fit
 
-_SUFFIX = ".json"
 _CHARACTER = "humanoid"
 
 
@@ -128,14 +129,7 @@ def _reconstruct(options: argparse.Namespace) -> None:
     from experiment.samcon.trials import Fit
 
     job = _job(options)
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.completed:.0f}/{task.total:.0f}"),
-        TextColumn("{task.fields[state]}", markup=False),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
+    bar = search_bar()
     task = bar.add_task(f"{job.problem.character}: {job.problem.clip}", total=1, state="begins")
 
     def report(progress: "SearchProgress", windows: int, rate: float) -> None:
@@ -151,7 +145,7 @@ def _reconstruct(options: argparse.Namespace) -> None:
     _report(job, found)
 
 
-def _fitted(job: "Job", fit: "Fit", bar: Progress) -> "Job":
+def _fitted(job: "Job", fit: "Fit", bar: "Progress") -> "Job":
     """The job with a feedback that has been fitted to its motion."""
     from experiment.samcon.fitting import fitted
 
@@ -176,9 +170,7 @@ def _job(options: argparse.Namespace) -> "Job":
     from experiment.samcon.problem import Problem, windows_a_cycle
     from experiment.samcon.reconstruction import Job, duration_of
 
-    workers = options.workers if options.workers is not None else os.cpu_count() or 1
-    if workers < 1:
-        raise ConfigurationError(f"--workers is {workers}; it must be 1 or more")
+    workers = worker_count(options.workers)
     _check_output(options)
     _check_fit(options)
     settings = _settings(options)
@@ -238,10 +230,7 @@ def _check_output(options: argparse.Namespace) -> None:
     from experiment.samcon.checkpoint import checkpoint_path
 
     output: Path = options.output
-    if output.suffix != _SUFFIX:
-        raise ConfigurationError(f"--output is {output}; it must end in {_SUFFIX}, as clips do")
-    if not output.absolute().parent.is_dir():
-        raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
+    check_output(output)
     if options.resume or options.overwrite:
         return
     for file in (output, checkpoint_path(output)):

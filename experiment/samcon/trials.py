@@ -31,7 +31,7 @@ _ASSISTANCE = {"root": (1000.0, 100.0), "root_r": (1000.0, 100.0)}
 _LONGER = 1.4  # runs, each time
 _FIRST_RUN = 3.8  # s
 _PUSH_EVERY = 2.0  # s
-QUARTER = 0.5 * pi  # rad, after which the engine's friction is the same again
+_QUARTER = 0.5 * pi  # rad, after which the engine's friction is the same again
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,6 @@ class Trials:
     def _runs(self, level: Level, seed: list[int], count: int) -> list[Run]:
         """So many runs at each heading; where there are pushes, every other one is pushed."""
         rng = np.random.default_rng(np.random.SeedSequence(seed))
-        headings = np.arange(self._fit.headings) * QUARTER / self._fit.headings
         return [
             Run(
                 heading,
@@ -128,7 +127,7 @@ class Trials:
                 self._pushes(level, rng) if number % 2 else (),
             )
             for number in range(count)
-            for heading in headings.tolist()
+            for heading in headings(self._fit.headings)
         ]
 
     def _pushes(self, level: Level, rng: np.random.Generator) -> tuple[PlannedPush, ...]:
@@ -147,6 +146,11 @@ class Trials:
         return list(
             self._parallel(joblib.delayed(_tried_in_process)(self._settings, *one) for one in work)
         )
+
+
+def headings(count: int) -> list[float]:
+    """Headings in rad within a quarter turn, after which the engine's friction is the same."""
+    return [index * _QUARTER / count for index in range(count)]
 
 
 def random_pushes(

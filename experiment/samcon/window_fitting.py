@@ -20,7 +20,8 @@ from experiment.samcon.identification import Transitions, identified
 from experiment.samcon.problem import Problem
 from experiment.samcon.regulator import regulator, rounded
 from experiment.samcon.settings import Settings
-from experiment.samcon.window_trials import WindowRun, WindowTrials, headings
+from experiment.samcon.trials import headings
+from experiment.samcon.window_trials import WindowRun, WindowTrials
 from experiment.samcon.workers import some_processes
 
 _FIRST_RUNS = 40  # at each heading, which look around

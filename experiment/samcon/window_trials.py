@@ -19,7 +19,7 @@ from experiment.samcon.identification import Transitions
 from experiment.samcon.problem import Problem, windows_a_cycle
 from experiment.samcon.rollout import Rollout
 from experiment.samcon.settings import Settings
-from experiment.samcon.trials import QUARTER, random_pushes, turned
+from experiment.samcon.trials import random_pushes, turned
 from experiment.samcon.workers import leave_interrupts_to_the_parent, rollout_of
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
@@ -88,11 +88,6 @@ class WindowTrials:
             return [one(gains, run) for gains, run in pairs]
         work = (joblib.delayed(_in_process)(one, gains, run) for gains, run in pairs)
         return list(self._parallel(work))
-
-
-def headings(count: int) -> list[float]:
-    """Headings in rad within a quarter turn, after which the engine's friction is the same."""
-    return [index * QUARTER / count for index in range(count)]
 
 
 def _in_process(one: "partial[WindowTried]", gains: WindowGains, run: WindowRun) -> WindowTried:
