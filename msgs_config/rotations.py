@@ -6,11 +6,12 @@ Products go through `einsum`, which uses no BLAS: the last bits of a BLAS depend
 it picks, and what the simulator reads must not.
 """
 
-from math import factorial
+import math
 
 import numpy as np
 
 from msgs_config.arrays import FloatArray
+from msgs_config.geometry import elementary
 
 IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
 _TINY = 1e-150  # keeps 0 / 0 away; the product with a vector of length zero is zero all the same
@@ -85,8 +86,10 @@ def exp(rotation_vector: FloatArray) -> FloatArray:
     """Unit quaternions xyzw (..., 4) of rotation vectors (..., 3) in rad."""
     half_angle = 0.5 * _length(rotation_vector)
     q_xyzw = np.empty((*rotation_vector.shape[:-1], 4))
-    q_xyzw[..., :3] = rotation_vector * (0.5 * np.sin(half_angle) / np.maximum(half_angle, _TINY))
-    q_xyzw[..., 3:] = np.cos(half_angle)
+    q_xyzw[..., :3] = rotation_vector * (
+        0.5 * elementary.sin(half_angle) / np.maximum(half_angle, _TINY)
+    )
+    q_xyzw[..., 3:] = elementary.cos(half_angle)
     return q_xyzw
 
 
@@ -98,7 +101,7 @@ def log(q_xyzw: FloatArray) -> FloatArray:
     """
     axis, w = q_xyzw[..., :3], q_xyzw[..., 3:]
     sine = _length(axis)
-    angle = 2.0 * np.arctan2(sine, np.abs(w))
+    angle = 2.0 * elementary.arctan2(sine, np.abs(w))
     return axis * np.copysign(angle / np.maximum(sine, _TINY), w)
 
 
@@ -112,7 +115,7 @@ def right_jacobian_inverse(rotation_vector: FloatArray) -> FloatArray:
     """
     angle = _length(rotation_vector)[..., np.newaxis]
     half = np.maximum(0.5 * angle, 0.5 * _SMALL)
-    closed = (1.0 - half / np.tan(half)) / (4.0 * half * half)
+    closed = (1.0 - half / elementary.tan(half)) / (4.0 * half * half)
     series = 1.0 / 12.0 + angle * angle / 720.0  # where the closed form would lose its digits
     cross = _cross_matrix(rotation_vector)
     squared = np.einsum("...ij,...jk->...ik", cross, cross)
@@ -167,13 +170,13 @@ def _jacobian_coefficients(
 
     Up to half a turn by their power series: there, at small angles, the closed forms lose digits.
     """
-    powers = np.minimum(square, _SERIES_END) ** _EXPONENTS
+    powers = elementary.power(np.minimum(square, _SERIES_END), _EXPONENTS)
     a, b, a_slope, b_slope = np.einsum("ij,...j->i...", _JACOBIAN_SERIES, powers)[..., np.newaxis]
     large = square > _SERIES_END
     if large.any():
         square = np.maximum(square, _SERIES_END)
         angle, fourth = np.sqrt(square), square * square
-        sine, versine = np.sin(angle), 1.0 - np.cos(angle)
+        sine, versine = elementary.sin(angle), 1.0 - elementary.cos(angle)
         a = np.where(large, versine / square, a)
         b = np.where(large, (angle - sine) / (angle * square), b)
         a_slope = np.where(large, (angle * sine - 2.0 * versine) / fourth, a_slope)
@@ -185,8 +188,8 @@ def _jacobian_coefficients(
 def _jacobian_series() -> FloatArray:
     """Coefficients (4, 15) of the powers of a^2 in A, B, `dA/da / a` and `dB/da / a`."""
     order = range(_EXPONENTS.size + 1)
-    a = np.array([(-1.0) ** k / factorial(2 * k + 2) for k in order])
-    b = np.array([(-1.0) ** k / factorial(2 * k + 3) for k in order])
+    a = np.array([(-1.0) ** k / math.factorial(2 * k + 2) for k in order])
+    b = np.array([(-1.0) ** k / math.factorial(2 * k + 3) for k in order])
     rise = 2.0 * np.arange(1, len(order))  # d/da / a of a^(2 k) is 2 k a^(2 k - 2)
     return np.array([a[:-1], b[:-1], rise * a[1:], rise * b[1:]])
 
@@ -220,13 +223,13 @@ def angle_between(a_xyzw: FloatArray, b_xyzw: FloatArray) -> FloatArray:
 def yaw(q_xyzw: FloatArray) -> FloatArray:
     """Angle (...) in rad, -pi to pi, about the parent's z: the twist of swing and twist."""
     z, w = q_xyzw[..., 2], q_xyzw[..., 3]
-    angle: FloatArray = 2.0 * np.arctan2(z * np.copysign(1.0, w), np.abs(w))
+    angle: FloatArray = 2.0 * elementary.arctan2(z * np.copysign(1.0, w), np.abs(w))
     return angle
 
 
 def about_z(angle: float) -> FloatArray:
     """The quaternion xyzw (4,) of a turn by `angle` rad about z."""
-    return np.array([0.0, 0.0, np.sin(0.5 * angle), np.cos(0.5 * angle)])
+    return np.array([0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle)])
 
 
 ABOUT_X_QUARTER_TURN_XYZW = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])

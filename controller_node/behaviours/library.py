@@ -19,6 +19,7 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.geometry import elementary
 
 _RATE = 30.0  # samples a second
 _WINDOW = 7  # samples, 0.2 s
@@ -135,7 +136,7 @@ class MotionLibrary:
         by_x, by_y, by_z = self._weighted
         along = np.einsum("fk,k->f", by_x, x) + np.einsum("fk,k->f", by_y, y)
         across = np.einsum("fk,k->f", by_x, y) - np.einsum("fk,k->f", by_y, x)
-        turns = np.arctan2(across, along)
+        turns = elementary.arctan2(across, along)
         square = self._squares + np.einsum("k,k->", self._weights, x * x + y * y + z * z)
         square -= 2.0 * (np.hypot(along, across) + np.einsum("fk,k->f", by_z, z))
         arcs = self._angles(_flat([window.turns_xyzw[np.newaxis]])[:, 0], turns) * self._lengths
@@ -152,9 +153,9 @@ class MotionLibrary:
         theirs = self._turns
         same = theirs[0] * x + theirs[1] * y + theirs[2] * z + theirs[3] * w
         turned = theirs[0] * y - theirs[1] * x - theirs[2] * w + theirs[3] * z
-        same *= np.cos(0.5 * about_z)[:, np.newaxis]
-        turned *= np.sin(0.5 * about_z)[:, np.newaxis]
-        angles: FloatArray = 2.0 * np.arccos(np.minimum(np.abs(same + turned), 1.0))
+        same *= elementary.cos(0.5 * about_z)[:, np.newaxis]
+        turned *= elementary.sin(0.5 * about_z)[:, np.newaxis]
+        angles: FloatArray = 2.0 * elementary.arccos(np.minimum(np.abs(same + turned), 1.0))
         return angles
 
     def predicted(self, position: FloatArray, velocity: FloatArray) -> Window:

@@ -44,7 +44,7 @@ class Posture:
         up, wanted = (
             rotations.rotate(self._from_upright(q), _UP) for q in (root_xyzw, reference_xyzw)
         )
-        return float(np.arccos(np.clip(np.einsum("i,i->", up, wanted), -1.0, 1.0)))
+        return math.acos(min(max(float(np.einsum("i,i->", up, wanted)), -1.0), 1.0))
 
     def has_fallen(self, body: Configuration, target: Configuration) -> bool:
         """Whether the root of a body is far below a target's, or far from as upright."""

@@ -15,6 +15,7 @@ import numpy as np
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
+from msgs_config.geometry import elementary
 from msgs_config.joint_layout import Configuration, JointLayout
 
 _TINY = 1e-150  # keeps 0 / 0 away
@@ -94,7 +95,7 @@ def _rotation_vector(
 ) -> tuple[FloatArray, ...]:
     """The components of `rotations.log`."""
     sine = np.sqrt(x * x + y * y + z * z)
-    angle = 2.0 * np.arctan2(sine, np.abs(w))
+    angle = 2.0 * elementary.arctan2(sine, np.abs(w))
     factor = np.copysign(angle / np.maximum(sine, _TINY), w)
     return x * factor, y * factor, z * factor
 

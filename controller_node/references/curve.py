@@ -8,6 +8,7 @@ import numpy as np
 from controller_node.references.base import ReferenceState
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
+from msgs_config.geometry import elementary
 from msgs_config.joint_layout import Configuration, JointLayout
 
 # The coefficients of u, u^2, ... of a polynomial on 0 <= u <= 1 that begins at zero, a row each;
@@ -92,7 +93,7 @@ class Curve:
         """Times in s and values of a hinge or slider at shares (m,) of each segment, (p - 1, m)."""
         begins = np.array(self._knot_times[:-1])[:, np.newaxis]
         durations = np.diff(self._knot_times)[:, np.newaxis]
-        powers = shares ** np.arange(1.0, _DEGREE + 1.0)[:, np.newaxis]
+        powers = elementary.power(shares, np.arange(1.0, _DEGREE + 1.0)[:, np.newaxis])
         moved = np.einsum("sd,dm->sm", self._coefficients[:, :, entry], powers)
         return begins + durations * shares, self._positions[:, entry, np.newaxis] + moved
 

@@ -10,6 +10,7 @@ import numpy as np
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.geometry import elementary
 from msgs_config.joint_layout import Configuration, JointLayout
 
 # Coefficients of 1, u, ... u^5 of three quintics on 0 <= u <= 1 that end at rest at zero, a row
@@ -88,7 +89,7 @@ class Offset:
         """The offset, its rate and its second rate, (3, n)."""
         per_second = 1.0 / self._duration
         u = max(time - self._start, 0.0) * per_second
-        powers = u ** np.arange(6.0)
+        powers = elementary.power(np.array(u), np.arange(6.0))
         first = np.arange(1.0, 6.0) * powers[:5]
         second = np.arange(2.0, 6.0) * np.arange(1.0, 5.0) * powers[:4]
         shares = np.array(

@@ -1,0 +1,1 @@
+"""Geometry for both sides: the numbers between a message and the next state."""
