@@ -13,7 +13,7 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
 
-.PHONY: help venv demo test bench soak kills long-recording format clean distclean
+.PHONY: help venv demo test hashes bench soak kills long-recording format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -29,6 +29,9 @@ test: .venv/.installed-test ## Check style and types, run the tests
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto
+
+hashes: .venv/.installed-test ## Renew the golden hashes, after a change that is meant to alter states
+	$(BIN)/python tests/golden.py
 
 bench: .venv/.installed ## Measure speed
 	$(BIN)/python -m benchmarks

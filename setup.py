@@ -37,9 +37,9 @@ setup(
     install_requires=[
         "joblib>=1.4,<2",
         "matplotlib>=3.6,<4",
-        "mujoco-core>=4.0,<5",
+        "mujoco-core==4.0.1",  # exactly: another engine may have other last bits
         "numpy>=1.26,<3",
-        "pybullet>=3.2.7,<3.3",
+        "pybullet==3.2.7",  # exactly, likewise
         "PyYAML>=6.0,<7",
         "rich>=13.7,<16",
         "rosbags>=0.11.9,<0.12",

@@ -4,6 +4,7 @@ import numpy as np
 
 from controller_node.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointLayout
 from msgs_config.probe import Probe
 
@@ -21,7 +22,7 @@ def check_agreement(model: DynamicsModel, layout: JointLayout, probe: Probe) -> 
         CharacterError: they differ by more than 1 %; says in what, by how much, and where to look.
     """
     model.update(probe.position, probe.velocity)
-    measured = [*(model.mass_matrix() @ probe.acceleration), probe.kinetic_energy]
+    measured = [*fixed_order.apply(model.mass_matrix(), probe.acceleration), probe.kinetic_energy]
     expected = [*(probe.effort - model.bias_force()), model.kinetic_energy()]
     size = np.maximum(np.abs(measured), np.abs(expected))
     differences = np.abs(np.subtract(measured, expected)) / np.maximum(size, _TINY)

@@ -15,6 +15,7 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character, ShapeType
 from msgs_config.errors import CharacterError, one_of
+from msgs_config.geometry import fixed_order
 
 _ROOT_ENTRIES = 6  # of the floating base, the first ones
 _LEAST_LOAD = 1.0  # N on the feet together, where the law would have them pull
@@ -102,14 +103,14 @@ class Balance:
             self._feet, ground.points, ground.forces, ground.moments, strict=True
         ):
             jacobian = model.point_jacobian(foot, point)
-            effort -= np.einsum("ij,i->j", jacobian, np.concatenate((force, moment)))
+            effort -= fixed_order.apply(jacobian.T, np.concatenate((force, moment)))
         effort[:_ROOT_ENTRIES] = 0.0
         return effort * self._footing(model)
 
     def _footing(self, model: DynamicsModel) -> float:
         """1 while a foot can be flat on the ground, 0 when both are tilted too far."""
         _, axes = model.link_frames(self._feet)
-        level = float(np.einsum("fj,fj->f", axes[:, 2], self._normals).max())
+        level = float(fixed_order.dot(axes[:, 2], self._normals).max())
         return min(max((level - _NO_FOOTING) / (_FULL_FOOTING - _NO_FOOTING), 0.0), 1.0)
 
     def ground_wrenches(self, model: DynamicsModel, gains: BalanceGains) -> GroundWrenches:
@@ -119,7 +120,7 @@ class Balance:
         so bends at the hips who cannot stand otherwise.
         """
         origins, axes = model.link_frames(self._feet)
-        points = origins + rotations.apply(axes, self._centres)
+        points = origins + fixed_order.apply(axes, self._centres)
         middle, across = 0.5 * (points[0] + points[1]), points[1] - points[0]
         arm = model.centre_of_mass() - middle
         force = _virtual_force(model, arm, gains)
@@ -127,7 +128,7 @@ class Balance:
         shift = _shift(moment, across, float(force[2]))
         moment -= shift * cross(across, force)
         shares = np.array(((0.5 - shift,), (0.5 + shift,)))
-        edges = np.einsum("fij,fjk->fki", axes, self._edges)  # now as rows
+        edges = fixed_order.product(axes, self._edges).swapaxes(-1, -2)  # now as rows
         limits = shares * force[2] * self._half_lengths[:, ::-1]
         return GroundWrenches(points, shares * force, _bearable(shares * moment, edges, limits))
 
@@ -148,7 +149,7 @@ def _virtual_force(model: DynamicsModel, offset: FloatArray, gains: BalanceGains
     force = -gains.stiffness * offset - gains.damping * velocity
     vertical = model.weight - gains.damping * float(velocity[2])
     force[2] = max(min(vertical, _MOST_LOAD * model.weight), _LEAST_LOAD)
-    horizontal, bound = float(np.hypot(force[0], force[1])), gains.friction * float(force[2])
+    horizontal, bound = float(fixed_order.norm(force[:2])), gains.friction * float(force[2])
     if horizontal > bound:
         force[:2] *= bound / horizontal
     return force
@@ -172,10 +173,9 @@ def _bearable(moments: FloatArray, edges: FloatArray, limits: FloatArray) -> Flo
     With each at most its limit (2, 2) in N m, the load times half the other edge's length, the
     centre of pressure is inside the sole.
     """
-    about_edges = rotations.apply(edges, moments)
+    about_edges = fixed_order.apply(edges, moments)
     bounded = np.minimum(np.maximum(about_edges, -limits), limits)
-    bearable: FloatArray = np.einsum("fki,fk->fi", edges, bounded)
-    return bearable
+    return fixed_order.apply(edges.swapaxes(-1, -2), bounded)
 
 
 def _link(character: Character, name: str) -> int:
@@ -195,7 +195,7 @@ def _sole(character: Character, model: DynamicsModel, foot: int, axes: FloatArra
         raise CharacterError(f"{character.file}: the foot '{link.name}' has no box, so no sole")
     pose, half = boxes[0].pose, 0.5 * np.array(boxes[0].size)
     turn = rotations.matrix(np.array(pose.orientation_xyzw))
-    heights = rotations.apply(turn.T, axes[2])  # of the box's axes above its middle
+    heights = fixed_order.apply(turn.T, axes[2])  # of the box's axes above its middle
     normal = int(np.argmax(np.abs(heights)))
     up = np.copysign(1.0, heights[normal]) * turn[:, normal]
     others = [axis for axis in range(3) if axis != normal]

@@ -10,7 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.joint_layout import JointLayout
 
 Solver: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
 """`(force, added) -> a`: the acceleration (n,) of `(M + diag(added)) a = force`."""
@@ -49,16 +50,16 @@ def winds_up(
     effort: FloatArray,  # (n,) that the integral takes part in, not clipped
     clipped: FloatArray,  # (n,) what the limits leave of it
     error: FloatArray,  # (n,)
-    vector_starts: IntArray,  # (b,) first entry of each physical vector
+    layout: JointLayout,
 ) -> BoolArray:
     """Which entries' (n,) integrals must not grow: of vectors that the error drives beyond limits.
 
     That is anti-windup by conditional integration: Astrom and Hagglund 2006, "Advanced PID
     Control", section 3.5.
     """
-    beyond = np.add.reduceat(np.abs(effort - clipped), vector_starts) > 0.0
-    further = np.add.reduceat(effort * error, vector_starts) > 0.0
-    return np.repeat(beyond & further, np.diff(vector_starts, append=len(effort)))
+    beyond = layout.vector_sums(np.abs(effort - clipped)) > 0.0
+    further = layout.vector_sums(effort * error) > 0.0
+    return np.repeat(beyond & further, layout.vector_lengths)
 
 
 def stable_pd_effort(

@@ -6,6 +6,7 @@ import numpy as np
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character, Joint, Link
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType
 
 _GRAVITY = 9.81
@@ -121,7 +122,8 @@ class DynamicsModel:
     def kinetic_energy(self) -> float:
         """Kinetic energy of the state taken over, J."""
         velocity = self._data.qvel
-        return float(0.5 * velocity @ self.mass_matrix() @ velocity)
+        momentum = fixed_order.apply(self.mass_matrix(), velocity)
+        return 0.5 * float(fixed_order.dot(velocity, momentum))
 
     def link_poses(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m, quaternions xyzw (links, 4) of the link frames in the world."""
@@ -155,7 +157,7 @@ class DynamicsModel:
 
     def centre_of_mass_velocity(self) -> FloatArray:
         """Velocity (3,) of the centre of mass in the world, m/s."""
-        return rotations.apply(self.centre_of_mass_jacobian(), self._data.qvel)
+        return fixed_order.apply(self.centre_of_mass_jacobian(), self._data.qvel)
 
     def link_frames(self, links: IntArray) -> tuple[FloatArray, FloatArray]:
         """Origins (k, 3) in m and axes (k, 3, 3), as columns, of some link frames in the world.

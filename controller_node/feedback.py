@@ -25,6 +25,7 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character, Joint
 from msgs_config.errors import CharacterError
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType
 
 _LIFTED = 0.06  # m by which one foot is above the other when it alone swings
@@ -121,7 +122,7 @@ class Feedback:
                 1.0,
             )
         )
-        outputs = rotations.apply(self._gains, features).reshape(2, -1)
+        outputs = fixed_order.apply(self._gains, features).reshape(2, -1)
         stance, swing = outputs[:, np.newaxis] + self._of_sides
         wish = wanted.shares[0] * stance + wanted.shares[1] * swing
         response = np.zeros(self._layout.size)

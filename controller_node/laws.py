@@ -150,7 +150,7 @@ class Pid:
         grown = self._integral + elapsed * error
         effort = self._effort(error, velocity_error, grown, gains)
         clipped = layout.clipped(effort, gains.effort_limits)
-        stays = winds_up(effort, clipped, error, layout.vector_starts)
+        stays = winds_up(effort, clipped, error, layout)
         self._integral = np.where(stays, self._integral, grown)
 
     def _effort(

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
+from msgs_config.geometry import fixed_order
 
 BALANCE_FEATURES = 12
 """Of the centre of mass (3), its velocity (3), the root's tilt (3) and spin (3)."""
@@ -39,7 +39,7 @@ class WindowGains:
     def offset(self, window: int, features: FloatArray) -> FloatArray:
         """The response (m,) in rad of a run's window to features (12 + 2 m) at its beginning."""
         row = window % self.windows
-        wish = self.constants[row] + rotations.apply(self.gains[row], features)
+        wish = self.constants[row] + fixed_order.apply(self.gains[row], features)
         bounded: FloatArray = np.minimum(np.maximum(wish, -self.largest), self.largest)
         return bounded
 

@@ -14,6 +14,7 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import CommandError, ConfigurationError, RecordingError, one_of
+from msgs_config.geometry import fixed_order
 from msgs_config.shared_parameters import PLANE
 from msgs_config.throw import Throw, natural_radius
 from msgs_config.tick_clock import TickClock
@@ -143,7 +144,7 @@ def _planned(plan: Plan, aim: Aim) -> tuple[PlannedThrow, tuple[str, ...]]:
     position = plan.reference.sample(aim.at).configuration.position
     origin = _direction(character, position, aim.side)
     impact = find_impact(character, position, aim.target, origin, aim.size, aim.distance)
-    way = aim.distance - float((impact.centre - impact.target) @ origin)
+    way = aim.distance - float(fixed_order.dot(impact.centre - impact.target, origin))
     ticks = max(round(way / aim.speed * rate), 1)
     first = round(aim.at * rate) - ticks
     if first < 0:

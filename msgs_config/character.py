@@ -4,6 +4,7 @@ Both sides build theirs from this one description: the simulator its body, the c
 model of the dynamics. All frames are URDF link frames; lengths in m, masses in kg.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -200,7 +201,7 @@ class Character:
     @property
     def mass(self) -> float:
         """Mass of all links together, kg."""
-        return float(sum(link.mass for link in self.links))
+        return math.fsum(link.mass for link in self.links)
 
     @property
     def moving_joints(self) -> list[Joint]:

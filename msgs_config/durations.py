@@ -1,5 +1,6 @@
 """The last durations of something that happens again and again, and what is typical of them."""
 
+import math
 from array import array
 from collections.abc import Iterable
 
@@ -25,7 +26,7 @@ class Durations:
 
     def mean(self) -> float | None:
         """Their mean in s; None without any."""
-        return float(np.mean(self._ring)) if self._ring else None
+        return math.fsum(self._ring) / len(self._ring) if self._ring else None
 
     def percentiles_us(self, name: str, percentiles: Iterable[float]) -> dict[str, float]:
         """Percentiles in microseconds, under `NAME_us_pP`; nothing without any duration."""

@@ -10,6 +10,7 @@ import numpy as np
 from msgs_config import rotations
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import LayoutError, one_of
+from msgs_config.geometry import fixed_order
 
 ROOT = "root"
 """Name of the floating base's joint to the world."""
@@ -197,9 +198,20 @@ class JointLayout:
 
     def norms(self, entries: FloatArray) -> FloatArray:
         """Length (..., b) of each physical vector among the entries (..., n), in their unit."""
-        squares: FloatArray = np.add.reduceat(entries * entries, self.vector_starts, axis=-1)
-        lengths: FloatArray = np.sqrt(squares)
+        lengths: FloatArray = np.sqrt(self.vector_sums(entries * entries))
         return lengths
+
+    def vector_sums(self, entries: FloatArray) -> FloatArray:
+        """The sum (..., b) of each physical vector's entries, of (..., n)."""
+        padded = np.concatenate((entries, np.zeros((*entries.shape[:-1], 1))), axis=-1)
+        return fixed_order.total(padded.take(self._vector_entries, axis=-1))
+
+    @cached_property
+    def _vector_entries(self) -> IntArray:
+        """Entries (b, 3) of each physical vector; one of a single entry has n, twice, beside it."""
+        entries = self.vector_starts[:, np.newaxis] + np.arange(3)
+        inside = np.arange(3) < self.vector_lengths[:, np.newaxis]
+        return np.where(inside, entries, self.size)
 
     def clipped(self, effort: FloatArray, limits: FloatArray) -> FloatArray:
         """Effort (n,) with each vector's length at most its limit (b,), the direction kept."""

@@ -2,8 +2,6 @@
 
 A quaternion `q` of shape (..., 4) turns coordinates of the child frame into the parent frame.
 `exp` and `log` below are those of SO(3) (Solà, Deray and Atchuthan 2018, "A micro Lie theory").
-Products go through `einsum`, which uses no BLAS: the last bits of a BLAS depend on the kernels that
-it picks, and what the simulator reads must not.
 """
 
 import math
@@ -11,7 +9,7 @@ import math
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.geometry import elementary
+from msgs_config.geometry import elementary, fixed_order
 
 IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
 _TINY = 1e-150  # keeps 0 / 0 away; the product with a vector of length zero is zero all the same
@@ -19,37 +17,32 @@ _TINY = 1e-150  # keeps 0 / 0 away; the product with a vector of length zero is 
 _SMALL = 1e-2  # rad
 _SERIES_END = 10.0  # rad^2, just over half a turn, where 15 terms give all digits
 
-
-def _product_table() -> FloatArray:
-    """The table (4, 4, 4): of a's component, b's component, and the Hamilton product's."""
-    table = np.zeros((4, 4, 4))
-    x, y, z, w = range(4)
-    for i, j, k in ((x, y, z), (y, z, x), (z, x, y)):
-        table[i, j, k], table[j, i, k] = 1.0, -1.0  # i j = k, j i = -k
-        table[w, i, i] = table[i, w, i] = 1.0
-        table[i, i, w] = -1.0
-    table[w, w, w] = 1.0
-    return table
-
-
-def _matrix_table(product: FloatArray) -> FloatArray:
-    """The table (4, 4, 3, 3) that takes the products of q's components to its rotation matrix.
-
-    Column j of the matrix is the vector part of `q e_j q^-1`.
-    """
-    turned: FloatArray = np.einsum("pjm,mqk->pqkj", product, product * _CONJUGATE[:, np.newaxis])
-    return turned[:, :, :3, :3].copy()
-
-
 _CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
-_PRODUCT = _product_table()
-_MATRIX = _matrix_table(_PRODUCT)
+
+# The Hamilton product `a b`, a row a component: which of b's goes with a's x, y, z and w; its sign.
+_PARTNERS = np.array([[3, 2, 1, 0], [2, 3, 0, 1], [1, 0, 3, 2], [0, 1, 2, 3]])
+_PARTNER_SIGNS = np.array([[1, 1, -1, 1], [-1, 1, 1, 1], [1, -1, 1, 1], [-1, -1, -1, 1]]) * 1.0
+
+# The rotation matrix of q, a row an entry: which of the products xx, xy, xz, xw, yx, ... ww; signs.
+_PAIRS = np.array(
+    [
+        *([0, 5, 10, 15], [1, 4, 11, 14], [2, 7, 8, 13]),
+        *([1, 4, 11, 14], [0, 5, 10, 15], [3, 6, 9, 12]),
+        *([2, 7, 8, 13], [3, 6, 9, 12], [0, 5, 10, 15]),
+    ]
+)
+_PAIR_SIGNS = 1.0 * np.array(
+    [
+        *([1, -1, -1, 1], [1, 1, -1, -1], [1, 1, 1, 1]),
+        *([1, 1, 1, 1], [-1, 1, -1, 1], [-1, 1, 1, -1]),
+        *([1, -1, 1, -1], [1, 1, 1, 1], [-1, -1, 1, 1]),
+    ]
+)
 
 
 def multiply(a_xyzw: FloatArray, b_xyzw: FloatArray) -> FloatArray:
     """Hamilton product `a b`: turn by b first, then by a; (..., 4) each, broadcast."""
-    product: FloatArray = np.einsum("...i,...j,ijk->...k", a_xyzw, b_xyzw, _PRODUCT)
-    return product
+    return fixed_order.apply(b_xyzw.take(_PARTNERS, axis=-1) * _PARTNER_SIGNS, a_xyzw)
 
 
 def conjugate(q_xyzw: FloatArray) -> FloatArray:
@@ -60,26 +53,20 @@ def conjugate(q_xyzw: FloatArray) -> FloatArray:
 
 def matrix(q_xyzw: FloatArray) -> FloatArray:
     """Rotation matrices (..., 3, 3): their columns are the child's axes in the parent frame."""
-    axes: FloatArray = np.einsum("...i,...j,ijkl->...kl", q_xyzw, q_xyzw, _MATRIX)
-    return axes
-
-
-def apply(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Each vector (..., m) multiplied by its matrix (..., k, m): (..., k)."""
-    product: FloatArray = np.einsum("...ij,...j->...i", matrices, vectors)
-    return product
+    shape = q_xyzw.shape[:-1]
+    pairs = (q_xyzw[..., :, np.newaxis] * q_xyzw[..., np.newaxis, :]).reshape(*shape, 16)
+    entries = fixed_order.total(pairs.take(_PAIRS, axis=-1) * _PAIR_SIGNS)
+    return entries.reshape(*shape, 3, 3)
 
 
 def _length(vectors: FloatArray) -> FloatArray:
     """Lengths (..., 1) of vectors (..., m)."""
-    squares: FloatArray = np.einsum("...i,...i->...", vectors, vectors)
-    lengths: FloatArray = np.sqrt(squares)[..., np.newaxis]
-    return lengths
+    return fixed_order.norm(vectors)[..., np.newaxis]
 
 
 def rotate(q_xyzw: FloatArray, vector: FloatArray) -> FloatArray:
     """Vectors (..., 3) given in the child frame, in the parent frame; same unit as given."""
-    return apply(matrix(q_xyzw), vector)
+    return fixed_order.apply(matrix(q_xyzw), vector)
 
 
 def exp(rotation_vector: FloatArray) -> FloatArray:
@@ -118,9 +105,10 @@ def right_jacobian_inverse(rotation_vector: FloatArray) -> FloatArray:
     closed = (1.0 - half / elementary.tan(half)) / (4.0 * half * half)
     series = 1.0 / 12.0 + angle * angle / 720.0  # where the closed form would lose its digits
     cross = _cross_matrix(rotation_vector)
-    squared = np.einsum("...ij,...jk->...ik", cross, cross)
     inverse: FloatArray = (
-        np.eye(3) + 0.5 * cross + np.where(angle < _SMALL, series, closed) * squared
+        np.eye(3)
+        + 0.5 * cross
+        + np.where(angle < _SMALL, series, closed) * fixed_order.product(cross, cross)
     )
     return inverse
 
@@ -139,10 +127,9 @@ def angular_motion(
     r, u = rotation_vector, rate
     along, speed = _dot(r, u), _dot(u, u)
     a, b, a_slope, b_slope = _jacobian_coefficients(_dot(r, r))
-    cross = _cross_matrix(r)
     rates = np.array((u, second_rate))
-    once = apply(cross, rates)
-    twice = apply(cross, once)
+    once = fixed_order.cross(r, rates)
+    twice = fixed_order.cross(r, once)
     velocity, acceleration = rates - a * once + b * twice
     acceleration += b * (speed * r - along * u)  # u x (r x u)
     acceleration -= along * (a_slope * once[0] - b_slope * twice[0])
@@ -158,9 +145,9 @@ def rotation_vector_rates(
     with the rotation vectors, which are in rad and of norm below 2 pi.
     """
     inverse = right_jacobian_inverse(rotation_vector)
-    rate = apply(inverse, velocity)
+    rate = fixed_order.apply(inverse, velocity)
     _, convective = angular_motion(rotation_vector, rate, np.zeros_like(rate))
-    return rate, apply(inverse, acceleration - convective)
+    return rate, fixed_order.apply(inverse, acceleration - convective)
 
 
 def _jacobian_coefficients(
@@ -170,8 +157,8 @@ def _jacobian_coefficients(
 
     Up to half a turn by their power series: there, at small angles, the closed forms lose digits.
     """
-    powers = elementary.power(np.minimum(square, _SERIES_END), _EXPONENTS)
-    a, b, a_slope, b_slope = np.einsum("ij,...j->i...", _JACOBIAN_SERIES, powers)[..., np.newaxis]
+    powers = fixed_order.powers(np.minimum(square, _SERIES_END), _JACOBIAN_SERIES.shape[-1])
+    a, b, a_slope, b_slope = np.moveaxis(fixed_order.apply(_JACOBIAN_SERIES, powers), -1, 0)
     large = square > _SERIES_END
     if large.any():
         square = np.maximum(square, _SERIES_END)
@@ -185,29 +172,26 @@ def _jacobian_coefficients(
     return a, b, a_slope, b_slope
 
 
-def _jacobian_series() -> FloatArray:
-    """Coefficients (4, 15) of the powers of a^2 in A, B, `dA/da / a` and `dB/da / a`."""
-    order = range(_EXPONENTS.size + 1)
+def _jacobian_series(terms: int) -> FloatArray:
+    """Coefficients (4, terms) of the powers of a^2 in A, B, `dA/da / a` and `dB/da / a`."""
+    order = range(terms + 1)
     a = np.array([(-1.0) ** k / math.factorial(2 * k + 2) for k in order])
     b = np.array([(-1.0) ** k / math.factorial(2 * k + 3) for k in order])
     rise = 2.0 * np.arange(1, len(order))  # d/da / a of a^(2 k) is 2 k a^(2 k - 2)
     return np.array([a[:-1], b[:-1], rise * a[1:], rise * b[1:]])
 
 
+_JACOBIAN_SERIES = _jacobian_series(15)
+
+
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
     """Scalar products (..., 1) of vectors (..., m)."""
-    product: FloatArray = np.einsum("...i,...i->...", a, b)[..., np.newaxis]
-    return product
+    return fixed_order.dot(a, b)[..., np.newaxis]
 
 
 def _cross_matrix(vectors: FloatArray) -> FloatArray:
     """Matrices (..., 3, 3) whose product with u is the vector product `v x u`."""
-    matrices: FloatArray = np.einsum("...i,ijk->...kj", vectors, _PRODUCT[:3, :3, :3])
-    return matrices
-
-
-_EXPONENTS = np.arange(15.0)
-_JACOBIAN_SERIES = _jacobian_series()
+    return fixed_order.cross(vectors[..., np.newaxis, :], np.eye(3)).swapaxes(-1, -2)
 
 
 def normalised(q_xyzw: FloatArray) -> FloatArray:

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite, pi
+from math import isfinite, pi, pow
 
 import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import CommandError, one_of
+from msgs_config.geometry import fixed_order
 
 MASS, RADIUS = "mass", "radius"
 POSITION = ("x", "y", "z")
@@ -38,7 +39,7 @@ class Throw:
             value = getattr(self, name)
             if not least <= value <= most:
                 raise CommandError(f"{name} is {value:g}; it must be {least:g} to {most:g}")
-        speed = float(np.linalg.norm(self.velocity))
+        speed = float(fixed_order.norm(np.array(self.velocity)))
         if speed > _FASTEST:
             raise CommandError(f"its speed is {speed:g} m/s; it must be at most {_FASTEST:g} m/s")
         if max(map(abs, self.position)) > _FARTHEST:
@@ -75,4 +76,4 @@ def throw_of(names: Sequence[str], values: Sequence[float]) -> Throw:
 
 def natural_radius(mass: float) -> float:
     """The radius in m of a ball of a mass in kg that has `DENSITY`; 0 of what is no mass."""
-    return float((3.0 * max(mass, 0.0) / (4.0 * pi * DENSITY)) ** (1.0 / 3.0))
+    return pow(3.0 * max(mass, 0.0) / (4.0 * pi * DENSITY), 1.0 / 3.0)

@@ -15,6 +15,7 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.bullet import load_urdf, pybullet
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType
 from sim_node import frames
 from sim_node.links import Links
@@ -123,7 +124,7 @@ class Body:
             turned = rotations.log(turns)
         if self._balls:
             motion = np.array((turned, velocity[self._ball_entries]))
-            motion = rotations.apply(self._ball_turns, motion)
+            motion = fixed_order.apply(self._ball_turns, motion)
             position[self._ball_entries], velocity[self._ball_entries] = motion
         return position, velocity
 
@@ -137,8 +138,8 @@ class Body:
             zip(
                 self._balls,
                 zip(
-                    rotations.exp(rotations.apply(back, position[self._ball_entries])),
-                    rotations.apply(back, velocity[self._ball_entries]),
+                    rotations.exp(fixed_order.apply(back, position[self._ball_entries])),
+                    fixed_order.apply(back, velocity[self._ball_entries]),
                     strict=True,
                 ),
                 strict=True,
@@ -159,7 +160,7 @@ class Body:
         joint_effort = effort.copy()
         if self._balls:
             back = np.swapaxes(self._ball_turns, -1, -2)
-            joint_effort[self._ball_entries] = rotations.apply(back, effort[self._ball_entries])
+            joint_effort[self._ball_entries] = fixed_order.apply(back, effort[self._ball_entries])
         values = joint_effort.tolist()
         pybullet.setJointMotorControlMultiDofArray(
             self._body,

@@ -1,8 +1,8 @@
 """One frame's rotation in plain numbers: on so few of them a fraction of the time of arrays.
 
 Quaternions are xyzw; axes are rows of a rotation matrix, which turn coordinates of the child frame
-into the parent frame. Sums are in the order in which `msgs_config.rotations` has them on vectors of
-a processor of today, so that either gives the same doubles.
+into the parent frame. Sums have the order of `msgs_config.geometry.fixed_order`, so that a rotation
+of `msgs_config.rotations` gives the same doubles.
 """
 
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ def to_parent(turn: Axes, vector: Sequence[float]) -> Triple:
     """A vector of the child frame, in the parent frame."""
     x, y, z = vector
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = turn
-    return (ax * x + az * z + ay * y, bx * x + bz * z + by * y, cx * x + cz * z + cy * y)
+    return (ax * x + ay * y + az * z, bx * x + by * y + bz * z, cx * x + cy * y + cz * z)
 
 
 def to_child(turn: Axes, vector: Sequence[float]) -> Triple:

@@ -11,6 +11,7 @@ from msgs_config import rotations
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.bullet import pybullet
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 from sim_node.contacts import TouchedLinks
 from sim_node.pushes import Push
 
@@ -56,7 +57,8 @@ class Links:
             )
             turn, linear, angular = self._inertial_motion(number)
             spin = rotations.rotate(rotations.conjugate(turn), angular)  # about principal axes
-            energy += 0.5 * float(mass * (linear * linear).sum() + (spin * spin * inertia).sum())
+            moving = mass * fixed_order.dot(linear, linear)
+            energy += 0.5 * float(moving + fixed_order.dot(spin * spin, np.array(inertia)))
         return energy
 
     def _inertial_motion(self, number: int) -> tuple[FloatArray, FloatArray, FloatArray]:

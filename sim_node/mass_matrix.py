@@ -12,6 +12,7 @@ import numpy as np
 from msgs_config import rotations
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType
 
 _TURNING = (JointType.REVOLUTE, JointType.SPHERICAL, JointType.FLOATING)
@@ -63,7 +64,7 @@ class MassMatrix:
     def at(self, position: FloatArray) -> FloatArray:
         """The mass matrix (n, n) at a position (n,) in message form."""
         axes, origins = self._frames(position)
-        centres = origins + rotations.apply(axes, self._centres)
+        centres = origins + fixed_order.apply(axes, self._centres)
         turns = np.einsum("lij,ljn->in", axes, self._turns)  # each entry is one link's own
         slides = np.einsum("lij,ljn->in", axes, self._slides)
         arms = centres[:, :, np.newaxis] - origins[self._owners].T
@@ -80,13 +81,13 @@ class MassMatrix:
         turned = rotations.matrix(rotations.exp(np.einsum("lin,n->li", self._turns, position)))
         slid = np.einsum("lin,n->li", self._slides, position)
         turned = np.einsum("lij,ljk->lik", self._fixed, turned)
-        moved = self._offsets + rotations.apply(self._fixed, slid)
+        moved = self._offsets + fixed_order.apply(self._fixed, slid)
         axes, origins = np.empty_like(turned), np.zeros_like(moved)
         axes[0] = np.eye(3)
         for index, parent in enumerate(self._parents):
             if parent >= 0:
                 axes[index] = np.einsum("ij,jk->ik", axes[parent], turned[index])
-                origins[index] = origins[parent] + rotations.apply(axes[parent], moved[index])
+                origins[index] = origins[parent] + fixed_order.apply(axes[parent], moved[index])
         return axes, origins
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 from sim_node.mass_matrix import MassMatrix, yielding
 
 _TINY = 1e-150  # keeps 0 / 0 away
@@ -79,7 +80,7 @@ class PassiveForces:
         step = self._step_s
         turns = self._nearer_way(position[self._entries])
         jacobian = rotations.right_jacobian_inverse(turns)
-        rates = rotations.apply(jacobian, velocity[self._entries])
+        rates = fixed_order.apply(jacobian, velocity[self._entries])
         outward = np.copysign(1.0, 2.0 * (turns + step * rates) - self._lower - self._upper)
         excess = outward * (turns - np.where(outward > 0.0, self._upper, self._lower))
         rates = outward * rates

@@ -6,6 +6,7 @@ from controller_node.laws import GainArrays
 from controller_node.strength import limits_of
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType
 
 _REACH = 3.0  # joints, from the struck link to those that are as firm as before
@@ -30,7 +31,7 @@ class GiveWay:
         # one inertia a joint, so that a ball joint stays as firm in all directions
         self._inertias = np.ones(layout.size)
         for joint in turning:
-            self._inertias[joint.entries] = float(mass_diagonal[joint.entries].mean())
+            self._inertias[joint.entries] = float(fixed_order.mean(mass_diagonal[joint.entries]))
         self._heads = np.array([joint.start for joint in turning], dtype=np.intp)
         self._layout = layout
 
@@ -60,8 +61,9 @@ class GiveWay:
         heads = self._heads[gains[self._heads] > 0.0]
         if not len(heads):
             return gains
-        shares = self._inertias / self._inertias[heads].mean()
-        return np.where(self._turning & (gains > 0.0), shares * gains[heads].mean(), gains)
+        shares = self._inertias / fixed_order.mean(self._inertias[heads])
+        by_inertia = shares * fixed_order.mean(gains[heads])
+        return np.where(self._turning & (gains > 0.0), by_inertia, gains)
 
 
 def softened(character: Character, struck: int, softness: float) -> FloatArray:

@@ -15,6 +15,7 @@ import numpy as np
 from controller_node.behaviours.hull import Hull
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 
 WINDOW = 1.0 / 60.0  # s
 _GROUND_MARGIN = 0.03  # m, above the ground, z = 0
@@ -56,8 +57,8 @@ class HitDetector:
         centres = self._hull.centres(origins, turns_xyzw)
         where, self._before = centres if self._before is None else self._before, centres
         self._recent.append(self._period * self._unexplained(contacts[:, :3], where))
-        impulses = np.sqrt((np.sum(self._recent, axis=0) ** 2).sum(axis=1))
-        total = float(impulses.sum())
+        impulses = fixed_order.norm(fixed_order.total(np.array(self._recent), axis=0))
+        total = float(fixed_order.total(impulses))
         return Hit(int(impulses.argmax()), total) if total > 0.0 else None
 
     def _unexplained(self, forces: FloatArray, centres: FloatArray) -> FloatArray:
@@ -74,17 +75,17 @@ class HitDetector:
             groups = _groups(reach)
         for group in groups:
             links = touched[group]
-            rest = forces[links].sum(axis=0)
+            rest = fixed_order.total(forces[links], axis=0)
             if grounded[group].any():
                 rest = beyond_cone(rest, _FRICTION)
-            struck = links[int(np.argmax(forces[links] @ rest))]
+            struck = links[int(np.argmax(fixed_order.dot(forces[links], rest)))]
             unexplained[struck] = rest
         return unexplained
 
 
 def beyond_cone(force: FloatArray, friction: float) -> FloatArray:
     """What is left of a force (3,) without its projection on the upright friction cone."""
-    sideways, up = float(np.hypot(force[0], force[1])), float(force[2])
+    sideways, up = float(fixed_order.norm(force[:2])), float(force[2])
     if sideways <= friction * up:
         return np.zeros(3)
     if friction * sideways + up <= 0.0:  # nearer to the cone's tip than to its side

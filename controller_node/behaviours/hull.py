@@ -5,6 +5,7 @@ import numpy as np
 from msgs_config import rotations
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character import Character, Link, Shape, ShapeType
+from msgs_config.geometry import fixed_order
 
 _MOST_SPHERES = 12  # along one shape
 
@@ -31,7 +32,7 @@ class Hull:
     def centres(self, origins: FloatArray, turns_xyzw: FloatArray) -> FloatArray:
         """Centres (s, 3) of the spheres, m, where link frames are at (links, 3) and (links, 4)."""
         axes = rotations.matrix(turns_xyzw)[self._owners]
-        return origins[self._owners] + rotations.apply(axes, self._centres)
+        return origins[self._owners] + fixed_order.apply(axes, self._centres)
 
     def lowest(self, centres: FloatArray) -> FloatArray:
         """The height (links,) in m that a link reaches down to; infinite without shapes."""
@@ -49,7 +50,7 @@ class Hull:
         for one in range(len(links)):
             for other in range(one):
                 apart = centres[chosen[one], np.newaxis] - centres[chosen[other]]
-                gaps = np.sqrt((apart * apart).sum(axis=-1))
+                gaps = fixed_order.norm(apart)
                 gaps -= self._radii[chosen[one], np.newaxis] + self._radii[chosen[other]]
                 near = bool(gaps.size) and float(gaps.min()) < margin
                 near = near and not self._adjacent[links[one], links[other]]
@@ -79,7 +80,7 @@ def _spheres(link: Link, shape: Shape) -> tuple[FloatArray, float]:
     elif shape.type is ShapeType.BOX:
         axis = int(np.argmax(shape.size))
         others = np.delete(np.array(shape.size), axis)
-        half, radius = 0.5 * shape.size[axis], 0.5 * float(np.linalg.norm(others))
+        half, radius = 0.5 * shape.size[axis], 0.5 * float(fixed_order.norm(others))
     else:  # capsule, cylinder: radius, length
         half, radius, axis = 0.5 * shape.size[1], shape.size[0], 2
     count = min(int(np.ceil(2.0 * half / max(radius, 1e-6))) + 1, _MOST_SPHERES)

@@ -17,9 +17,9 @@ from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import available_clips, read_clip
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
+from msgs_config.character import Character, Vector
 from msgs_config.errors import ConfigurationError, one_of
-from msgs_config.geometry import elementary
+from msgs_config.geometry import elementary, fixed_order
 
 _RATE = 30.0  # samples a second
 _WINDOW = 7  # samples, 0.2 s
@@ -73,7 +73,7 @@ class MotionLibrary:
         self._layout = character.layout
         self._model = DynamicsModel(character)
         masses = np.array([link.mass for link in character.links])
-        self._weights = np.tile(masses / (_WINDOW * masses.sum()), _WINDOW)  # (k,), k = w links
+        self._weights = np.tile(masses / (_WINDOW * character.mass), _WINDOW)  # (k,), k = w links
         self._lengths = np.tile(_lengths(character), _WINDOW)  # (k,)
         self.references = dict[str, Reference]()
         self._durations = dict[str, float]()
@@ -102,7 +102,7 @@ class MotionLibrary:
         """Keep windows component by component, as a search reads them from end to end."""
         places = _flat([window.positions for window in windows])
         self._weighted = places * self._weights  # (3, f, k), of f moments
-        self._squares = np.einsum("ifk,ifk->f", self._weighted, places)  # (f,)
+        self._squares = fixed_order.total(fixed_order.dot(self._weighted, places), axis=0)  # (f,)
         self._turns = _flat([window.turns_xyzw for window in windows])  # (4, f, k)
 
     def __len__(self) -> int:
@@ -134,13 +134,14 @@ class MotionLibrary:
         """
         x, y, z = _flat([window.positions[np.newaxis]])[:, 0]
         by_x, by_y, by_z = self._weighted
-        along = np.einsum("fk,k->f", by_x, x) + np.einsum("fk,k->f", by_y, y)
-        across = np.einsum("fk,k->f", by_x, y) - np.einsum("fk,k->f", by_y, x)
+        along = fixed_order.dot(by_x, x) + fixed_order.dot(by_y, y)
+        across = fixed_order.dot(by_x, y) - fixed_order.dot(by_y, x)
         turns = elementary.arctan2(across, along)
-        square = self._squares + np.einsum("k,k->", self._weights, x * x + y * y + z * z)
-        square -= 2.0 * (np.hypot(along, across) + np.einsum("fk,k->f", by_z, z))
+        square = self._squares + fixed_order.dot(self._weights, x * x + y * y + z * z)
+        moved = np.sqrt(along * along + across * across)
+        square -= 2.0 * (moved + fixed_order.dot(by_z, z))
         arcs = self._angles(_flat([window.turns_xyzw[np.newaxis]])[:, 0], turns) * self._lengths
-        square += np.einsum("fk,k->f", arcs * arcs, self._weights)
+        square += fixed_order.dot(arcs * arcs, self._weights)
         return np.sqrt(np.maximum(square, 0.0)), turns
 
     def _angles(self, turns_xyzw: FloatArray, about_z: FloatArray) -> FloatArray:
@@ -224,10 +225,14 @@ def _names(character: Character, clips: Sequence[str]) -> list[str]:
 
 def _lengths(character: Character) -> FloatArray:
     """Length (links,) of each link in m: to its farthest child, or through its centre of mass."""
-    lengths = [2.0 * float(np.linalg.norm(link.inertial_pose.position)) for link in character.links]
+    lengths = [2.0 * _length(link.inertial_pose.position) for link in character.links]
     for link in character.links:
         if link.parent >= 0:
-            far = float(np.linalg.norm(link.joint.pose_in_parent.position))
+            far = _length(link.joint.pose_in_parent.position)
             lengths[link.parent] = max(lengths[link.parent], far)
     clipped: FloatArray = np.maximum(np.array(lengths), _SHORTEST)
     return clipped
+
+
+def _length(vector: Vector) -> float:
+    return float(fixed_order.norm(np.array(vector)))

@@ -8,6 +8,7 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import Configuration
 
 _UP = np.array((0.0, 0.0, 1.0))
@@ -44,7 +45,7 @@ class Posture:
         up, wanted = (
             rotations.rotate(self._from_upright(q), _UP) for q in (root_xyzw, reference_xyzw)
         )
-        return math.acos(min(max(float(np.einsum("i,i->", up, wanted)), -1.0), 1.0))
+        return math.acos(min(max(float(fixed_order.dot(up, wanted)), -1.0), 1.0))
 
     def has_fallen(self, body: Configuration, target: Configuration) -> bool:
         """Whether the root of a body is far below a target's, or far from as upright."""

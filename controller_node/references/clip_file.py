@@ -15,6 +15,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import ClipError, one_of
 from msgs_config.files import read_text
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType
 
 _ROOT_COLUMNS = 8  # duration, position, quaternion
@@ -137,7 +138,7 @@ def _root_upright(
 
 def _quaternions(path: Path, joint: str, values_wxyz: FloatArray) -> FloatArray:
     """Unit quaternions xyzw; captured ones are rounded, and some shipped ones badly so."""
-    lengths = np.linalg.norm(values_wxyz, axis=1)
+    lengths = fixed_order.norm(values_wxyz)
     if lengths.min() < _SHORTEST_QUATERNION:
         raise ClipError(
             f"{path}: frame {lengths.argmin()}: the quaternion of '{joint}' has length "

@@ -8,7 +8,7 @@ import numpy as np
 from controller_node.references.base import ReferenceState
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.geometry import elementary
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import Configuration, JointLayout
 
 # The coefficients of u, u^2, ... of a polynomial on 0 <= u <= 1 that begins at zero, a row each;
@@ -93,8 +93,8 @@ class Curve:
         """Times in s and values of a hinge or slider at shares (m,) of each segment, (p - 1, m)."""
         begins = np.array(self._knot_times[:-1])[:, np.newaxis]
         durations = np.diff(self._knot_times)[:, np.newaxis]
-        powers = elementary.power(shares, np.arange(1.0, _DEGREE + 1.0)[:, np.newaxis])
-        moved = np.einsum("sd,dm->sm", self._coefficients[:, :, entry], powers)
+        powers = fixed_order.powers(shares, _DEGREE + 1)[:, 1:].T
+        moved = fixed_order.product(self._coefficients[:, :, entry], powers)
         return begins + durations * shares, self._positions[:, entry, np.newaxis] + moved
 
     def _polynomials(self, segment: int, time: float) -> FloatArray:
@@ -111,8 +111,7 @@ class Curve:
                 [0.0, 2.0 * second, 6.0 * second * u, 12.0 * second * u2, 20.0 * second * u3],
             ]
         )
-        values: FloatArray = np.einsum("ij,jk->ik", basis, self._coefficients[segment])
-        return values
+        return fixed_order.product(basis, self._coefficients[segment])
 
     def _at_rest(self, configurations: Configuration, knot: int) -> ReferenceState:
         position = configurations.position[knot].copy()
@@ -151,5 +150,5 @@ def _coefficients(layout: JointLayout, knots: Knots) -> FloatArray:
             conditions += [squares * accelerations[:-1], squares * second_rates]
             table = _QUINTIC
     coefficients = np.zeros((len(ends), _DEGREE, layout.size))
-    coefficients[:, : len(table)] = np.einsum("dc,csn->sdn", table, np.array(conditions))
+    coefficients[:, : len(table)] = fixed_order.product(table, np.stack(conditions, axis=1))
     return coefficients

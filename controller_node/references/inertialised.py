@@ -10,7 +10,7 @@ import numpy as np
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.geometry import elementary
+from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import Configuration, JointLayout
 
 # Coefficients of 1, u, ... u^5 of three quintics on 0 <= u <= 1 that end at rest at zero, a row
@@ -57,9 +57,9 @@ class Offset:
             rate[entries], second_rate[entries] = rotations.rotation_vector_rates(
                 turned,
                 relative,
-                wanted.acceleration[entries] - acceleration + np.cross(relative, velocity),
+                wanted.acceleration[entries] - acceleration + fixed_order.cross(relative, velocity),
             )
-        self._initial = np.array([apart, duration * rate, duration**2 * second_rate])
+        self._initial = np.array([apart, duration * rate, duration * duration * second_rate])
 
     def is_over(self, time: float) -> bool:
         """Whether the offset is gone at a time in s."""
@@ -82,25 +82,24 @@ class Offset:
                 turned, rate[entries], second_rate[entries]
             )
             velocity[entries] = back + spin
-            acceleration[entries] = second_back + second_spin - np.cross(spin, back)
+            acceleration[entries] = second_back + second_spin - fixed_order.cross(spin, back)
         return ReferenceState(Configuration(position, orientations), velocity, acceleration)
 
     def _at(self, time: float) -> FloatArray:
         """The offset, its rate and its second rate, (3, n)."""
         per_second = 1.0 / self._duration
         u = max(time - self._start, 0.0) * per_second
-        powers = elementary.power(np.array(u), np.arange(6.0))
+        powers = fixed_order.powers(np.array(u), 6)
         first = np.arange(1.0, 6.0) * powers[:5]
         second = np.arange(2.0, 6.0) * np.arange(1.0, 5.0) * powers[:4]
         shares = np.array(
             [
-                np.einsum("ij,j->i", _DECAY, powers),
-                np.einsum("ij,j->i", _DECAY[:, 1:], first) * per_second,
-                np.einsum("ij,j->i", _DECAY[:, 2:], second) * per_second**2,
+                fixed_order.apply(_DECAY, powers),
+                fixed_order.apply(_DECAY[:, 1:], first) * per_second,
+                fixed_order.apply(_DECAY[:, 2:], second) * (per_second * per_second),
             ]
         )
-        values: FloatArray = np.einsum("ij,jk->ik", shares, self._initial)
-        return values
+        return fixed_order.product(shares, self._initial)
 
 
 def _turned_back(

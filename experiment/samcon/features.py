@@ -6,6 +6,7 @@ from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 
 
 class Features:
@@ -40,7 +41,7 @@ class Features:
         """
         if not self._floating:
             return np.zeros(3)
-        momentum = rotations.apply(self._model.mass_matrix()[:6], velocity)
+        momentum = fixed_order.apply(self._model.mass_matrix()[:6], velocity)
         about_root = rotations.rotate(rotations.exp(position[3:6]), momentum[3:])
         return about_root - np.cross(centre - position[:3], momentum[:3])
 

@@ -14,9 +14,9 @@ import numpy as np
 from controller_node.dynamics import DynamicsModel
 from controller_node.laws import GainArrays
 from controller_node.references.base import Reference
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 from sim_node.mass_matrix import yielding
 
 _APART = 0.05  # s from a time, between which its acceleration is measured: clips have 30 frames/s
@@ -83,4 +83,4 @@ class Feedforward:
         rows = np.vstack((weights[:, np.newaxis] * roots, needed))
         # W J M^-1 needed is its last column; a LAPACK's last bits would be the processor's
         wrenches = yielding(mobility, rows)[:-1, -1]
-        return rotations.apply(jacobians.T, wrenches)
+        return fixed_order.apply(jacobians.T, wrenches)

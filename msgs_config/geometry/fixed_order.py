@@ -1,0 +1,63 @@
+"""Sums and products of arrays whose additions have one order, from the first index to the last.
+
+The last bits of a sum depend on the order of its additions. numpy chooses that of `sum`, `dot`, `@`
+and `einsum` by what the processor and its BLAS offer, and a newer numpy may choose another. A
+result must depend on neither, so whatever lies between a message and the next state adds up here:
+`accumulate` keeps every partial sum, which leaves a single order.
+"""
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+
+_NEXT, _AFTER_NEXT = np.array((1, 2, 0)), np.array((2, 0, 1))  # of three axes, in a cycle
+
+
+def total(values: FloatArray, axis: int = -1) -> FloatArray:
+    """The sum of values along an axis; zero along one that is empty."""
+    if not values.shape[axis]:
+        return np.zeros(tuple(np.delete(values.shape, axis)))
+    whole: FloatArray = np.add.accumulate(values, axis=axis).take(-1, axis=axis)
+    return whole
+
+
+def mean(values: FloatArray, axis: int = -1) -> FloatArray:
+    """The mean of values along an axis, which is not empty."""
+    average: FloatArray = total(values, axis) / values.shape[axis]
+    return average
+
+
+def dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Scalar products (...) of vectors (..., m), broadcast against each other."""
+    return total(a * b)
+
+
+def norm(vectors: FloatArray) -> FloatArray:
+    """Euclidean lengths (...) of vectors (..., m)."""
+    lengths: FloatArray = np.sqrt(total(vectors * vectors))
+    return lengths
+
+
+def apply(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Each vector (..., m) multiplied by its matrix (..., k, m): (..., k)."""
+    return total(matrices * vectors[..., np.newaxis, :])
+
+
+def product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Matrix products (..., i, k) of matrices (..., i, j) and (..., j, k)."""
+    return total(a[..., np.newaxis] * b[..., np.newaxis, :, :], axis=-2)
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Vector products `a x b` (..., 3) of vectors (..., 3), broadcast against each other."""
+    crossed: FloatArray = a.take(_NEXT, axis=-1) * b.take(_AFTER_NEXT, axis=-1)
+    crossed -= a.take(_AFTER_NEXT, axis=-1) * b.take(_NEXT, axis=-1)
+    return crossed
+
+
+def powers(bases: FloatArray, count: int) -> FloatArray:
+    """The powers (..., count) of bases (...) to the exponents 0, 1, ... count - 1."""
+    factors = np.repeat(bases[..., np.newaxis], count, axis=-1)
+    factors[..., 0] = 1.0
+    products: FloatArray = np.multiply.accumulate(factors, axis=-1)
+    return products
