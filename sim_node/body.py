@@ -6,7 +6,6 @@ joint's rotation `q` in the engine is `o q o^-1` here, its velocity `w` is `o w`
 orientation `q` in the engine is `q o^-1` here.
 """
 
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.bullet import load_urdf, pybullet
 from msgs_config.character import Character
-from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType
 from sim_node import frames
 from sim_node.links import Links
@@ -51,22 +49,15 @@ class Body:
         in_order = [-1, *(numbers[link.joint.name] for link in character.links[1:])]
         self.links = Links(self._client, self._body, character, in_order)
         joints = [j for j in self._layout.joints if j.type is not JointType.FLOATING]
-        self._joint_start = self._layout.size - sum(len(j.dof_names) for j in joints)
         self._joints = [numbers[joint.name] for joint in joints]
         self._entries = [joint.entries for joint in joints]
         self._balls = [numbers[j.name] for j in joints if j.type is JointType.SPHERICAL]
-        self._scalar_entries = np.array(
-            [j.start for j in joints if j.type is not JointType.SPHERICAL], dtype=np.intp
-        )
-        self._ball_entries = self._layout.rotation_entries[int(self._floating) :]
-        widths = [4 if joint.type is JointType.SPHERICAL else 1 for joint in joints]
-        starts = np.cumsum([0, *widths])[:-1]
-        is_ball = np.array(widths) == 4
-        self._scalar_columns = starts[~is_ball]
-        self._ball_columns = starts[is_ball][:, np.newaxis] + np.arange(4)
         turns = {link.joint.name: link.inertial_pose.orientation_xyzw for link in character.links}
-        balls = [turns[j.name] for j in joints if j.type is JointType.SPHERICAL]
-        self._ball_turns = rotations.matrix(np.array(balls).reshape(-1, 4))
+        # of each joint; the axes of a ball joint's inertial frame in its link's
+        self._axes = [
+            frames.axes(turns[joint.name]) if joint.type is JointType.SPHERICAL else None
+            for joint in joints
+        ]
 
     def _remove_motors_and_damping(self, friction: float) -> None:
         """Take away what the engine adds of its own, and set the friction."""
@@ -104,49 +95,35 @@ class Body:
 
     def read(self) -> tuple[FloatArray, FloatArray]:
         """Position and velocity (n,), message form."""
-        position, velocity = np.empty(self._layout.size), np.empty(self._layout.size)
+        position: list[float] = []
+        velocity: list[float] = []
+        if self._floating:
+            origin, motion, turn = self._read_base()
+            position += (*origin, *frames.rotation_vector(turn))
+            velocity += motion
         states: tuple[Any, ...] = ()
         if self._joints:
             states = pybullet.getJointStatesMultiDof(
                 self._body, self._joints, physicsClientId=self._client
             )
-        joint_positions = np.array(
-            list(chain.from_iterable(state[0] for state in states)), dtype=float
-        )
-        position[self._scalar_entries] = joint_positions[self._scalar_columns]
-        velocity[self._joint_start :] = list(chain.from_iterable(state[1] for state in states))
-        turns = joint_positions[self._ball_columns]
-        if self._floating:  # its rotation and the ball joints' are worked out together
-            position[:3], velocity[:6], base_turn = self._read_base()
-            turned = rotations.log(np.array((base_turn, *turns.tolist())))
-            position[3:6], turned = turned[0], turned[1:]
-        elif self._balls:
-            turned = rotations.log(turns)
-        if self._balls:
-            motion = np.array((turned, velocity[self._ball_entries]))
-            motion = fixed_order.apply(self._ball_turns, motion)
-            position[self._ball_entries], velocity[self._ball_entries] = motion
-        return position, velocity
+        for (value, speed, *_), axes in zip(states, self._axes, strict=True):
+            if axes is not None:
+                value = frames.to_parent(axes, frames.rotation_vector(value))
+                speed = frames.to_parent(axes, speed)
+            position += value
+            velocity += speed
+        return np.array(position), np.array(velocity)
 
     def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
         """Put the character into a state given as `read` gives it."""
         if self._floating:
             self._place_base(position[:3], rotations.exp(position[3:6]))
             self._set_base_velocity(velocity[:3], velocity[3:6])
-        back = np.swapaxes(self._ball_turns, -1, -2)
-        balls = dict(
-            zip(
-                self._balls,
-                zip(
-                    rotations.exp(fixed_order.apply(back, position[self._ball_entries])),
-                    fixed_order.apply(back, velocity[self._ball_entries]),
-                    strict=True,
-                ),
-                strict=True,
-            )
-        )
-        for index, entries in zip(self._joints, self._entries, strict=True):
-            value, speed = balls.get(index, (position[entries], velocity[entries]))
+        for index, entries, axes in zip(self._joints, self._entries, self._axes, strict=True):
+            value, speed = position[entries].tolist(), velocity[entries].tolist()
+            if axes is not None:
+                value = rotations.exp(np.array(frames.to_child(axes, value))).tolist()
+                speed = frames.to_child(axes, speed)
             pybullet.resetJointStateMultiDof(
                 self._body,
                 index,
@@ -157,16 +134,16 @@ class Body:
 
     def apply(self, effort: FloatArray) -> None:
         """Apply a generalised effort (n,) during the engine's next step, and only then."""
-        joint_effort = effort.copy()
-        if self._balls:
-            back = np.swapaxes(self._ball_turns, -1, -2)
-            joint_effort[self._ball_entries] = fixed_order.apply(back, effort[self._ball_entries])
-        values = joint_effort.tolist()
+        values = effort.tolist()
+        forces = [
+            values[entries] if axes is None else frames.to_child(axes, values[entries])
+            for entries, axes in zip(self._entries, self._axes, strict=True)
+        ]
         pybullet.setJointMotorControlMultiDofArray(
             self._body,
             self._joints,
             pybullet.TORQUE_CONTROL,
-            forces=[values[entries] for entries in self._entries],
+            forces=forces,
             physicsClientId=self._client,
         )
         if self._floating and any(values[:6]):

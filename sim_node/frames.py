@@ -5,8 +5,12 @@ into the parent frame. Sums have the order of `msgs_config.geometry.fixed_order`
 of `msgs_config.rotations` gives the same doubles.
 """
 
+import math
 from collections.abc import Sequence
 from typing import TypeAlias
+
+_TINY = 1e-150  # keeps 0 / 0 away
+_SMALL_HALF = 5e-3  # rad
 
 Triple: TypeAlias = tuple[float, float, float]
 Axes: TypeAlias = tuple[Triple, Triple, Triple]
@@ -56,3 +60,34 @@ def cross(a: Sequence[float], b: Sequence[float]) -> Triple:
     ax, ay, az = a
     bx, by, bz = b
     return (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+
+
+def rotation_vector(q_xyzw: Sequence[float]) -> Triple:
+    """The rotation vector in rad, of norm at most pi, of a unit quaternion."""
+    x, y, z, w = q_xyzw
+    sine = math.sqrt(x * x + y * y + z * z)
+    angle = 2.0 * math.atan2(sine, abs(w))
+    share = math.copysign(angle / max(sine, _TINY), w)
+    return (x * share, y * share, z * share)
+
+
+def right_jacobian_inverse(rotation_vector: Sequence[float]) -> Axes:
+    """The matrix that turns an angular velocity in the child frame into a rotation vector's rate.
+
+    `msgs_config.rotations` has the equation, and the same for arrays.
+    """
+    x, y, z = rotation_vector
+    xx, yy, zz = x * x, y * y, z * z
+    square = xx + yy + zz
+    half = 0.5 * math.sqrt(square)
+    if half < _SMALL_HALF:
+        c = 1.0 / 12.0 + square / 720.0  # where the closed form would lose its digits
+    else:
+        c = (1.0 - half / math.tan(half)) / square
+    hx, hy, hz = 0.5 * x, 0.5 * y, 0.5 * z
+    xy, xz, yz = c * x * y, c * x * z, c * y * z
+    return (
+        (1.0 - c * (yy + zz), xy - hz, xz + hy),
+        (xy + hz, 1.0 - c * (xx + zz), yz - hx),
+        (xz - hy, yz + hx, 1.0 - c * (xx + yy)),
+    )
