@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointLayout

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character, ShapeType
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.geometry import fixed_order
 

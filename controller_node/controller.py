@@ -8,7 +8,6 @@ from controller_node.agreement import check_agreement
 from controller_node.balance import Balance, BalanceGains
 from controller_node.behaviours.base import ModeReport, Observation, Phase
 from controller_node.behaviours.make import BehaviourChoice
-from controller_node.dynamics import DynamicsModel
 from controller_node.effort_series import EffortSeries
 from controller_node.feedback import RespondingReference
 from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
@@ -18,6 +17,7 @@ from controller_node.references.trajectory import TrajectoryPoints, TrajectoryRe
 from controller_node.strength import Strengths, StrengthSchedule, weakened
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError, ConfigurationError
 from msgs_config.probe import Probe
 from msgs_config.stamped import StampedReference, StampedState

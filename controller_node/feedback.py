@@ -18,12 +18,12 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.feedback_gains import FeedbackGains
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character, Joint
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType

@@ -8,10 +8,10 @@ from typing import TypeAlias
 import numpy as np
 
 from controller_node.control_laws import pd_effort, pid_effort, stable_pd_effort, winds_up
-from controller_node.dynamics import DynamicsModel
 from controller_node.effort_series import EffortSeries
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import ConfigurationError
 from msgs_config.joint_layout import JointLayout
 

@@ -15,12 +15,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.references.base import Reference
 from controller_node.window_gains import BALANCE_FEATURES, WindowGains
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError, LayoutError
 from msgs_config.joint_layout import ROOT, Configuration
 

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from sim_node.mobility import make_passive_forces
 from sim_node.pushes import Push
 

@@ -8,11 +8,11 @@ from controller_node.agreement import check_agreement
 from controller_node.behaviours.make import choose_behaviour
 from controller_node.behaviours.settings import check_terrain
 from controller_node.controller import check_reference
-from controller_node.dynamics import DynamicsModel
 from controller_node.motion import make_motion
 from controller_node.references.base import Reference
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import ConfigurationError
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Values, resolve

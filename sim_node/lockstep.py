@@ -74,7 +74,7 @@ class LockstepBarrier:
     def _begin(self) -> None:
         self._tick = _Tick(np.zeros_like(self._required), np.zeros(len(self._required)))
         self._filled = np.zeros_like(self._required)  # (n,) what nobody commanded
-        self._missing = int(self._required.sum())
+        self._missing = int(np.count_nonzero(self._required))
         self.conflict: str | None = None  # the first entry of the last conflict
 
     @property
@@ -106,7 +106,7 @@ class LockstepBarrier:
         if verdict is Verdict.ACCEPTED:
             self._tick.effort[indices] = effort
             self._tick.given[indices] = True
-            self._missing = int((self._required & ~self._tick.given).sum())
+            self._missing = int(np.count_nonzero(self._required & ~self._tick.given))
         return verdict
 
     def count_rejected(self) -> None:

@@ -16,16 +16,21 @@ Of the two rotation vectors of a turn, r and the longer way round, the one neare
 counts, so that nothing jumps where r does, at an angle of pi.
 """
 
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
 import numpy as np
 
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
+from msgs_config.character import Character, SoftLimit
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order
-from sim_node.mass_matrix import MassMatrix, yielding
+from sim_node import frames
+from sim_node.frames import Triple
 
-_TINY = 1e-150  # keeps 0 / 0 away
-_SWEEPS = 30
+_MOST_PIVOTS = 50
+_ROUNDING = 1e-12  # of a force, that may be wrong without consequence
 
 
 class PassiveForces:
@@ -36,20 +41,16 @@ class PassiveForces:
 
     def __init__(self, character: Character, step_s: float, mobility: FloatArray) -> None:
         """For engine steps of `step_s`; `mobility` (n, n) is the inverse mass matrix at rest."""
-        joints = [joint for joint in character.moving_joints if joint.soft_limit is not None]
-        limits = [joint.soft_limit for joint in joints if joint.soft_limit is not None]
-        slices = [character.layout.joint(joint.name).entries for joint in joints]
-        rows = [np.arange(part.start, part.stop) for part in slices]
         self._step_s = step_s
-        self._entries = np.array(rows, dtype=np.intp).reshape(-1, 3)
-        self._lower = np.array([limit.lower for limit in limits]).reshape(-1, 3)
-        self._upper = np.array([limit.upper for limit in limits]).reshape(-1, 3)
-        self._stiffness = np.array([[limit.stiffness] * 3 for limit in limits]).reshape(-1, 3)
-        self._damper = np.array([[limit.damping] * 3 for limit in limits]).reshape(-1, 3)
-        self._mass_matrix = MassMatrix(character)
+        self._limits = [
+            (character.layout.joint(joint.name).entries, joint.soft_limit)
+            for joint in character.moving_joints
+            if joint.soft_limit is not None
+        ]
+        self._model = DynamicsModel(character) if self._limits else None
         wanted = character.passive_damping()
         self._damping = bounded_damping(wanted, mobility, step_s)
-        self.active = bool(limits or wanted.any())
+        self.active = bool(self._limits or wanted.any())
         self.notes = tuple(
             f"the passive damping of '{name}' is kept at {kept:.3g} of {asked:.3g}: more would be "
             f"unstable at engine steps of {1e3 * step_s:.3g} ms, substeps make them shorter"
@@ -62,74 +63,149 @@ class PassiveForces:
     def effort(self, position: FloatArray, velocity: FloatArray) -> FloatArray:
         """The passive effort (n,) in a state, message form; N m or N."""
         effort: FloatArray = -self._damping * velocity
-        if self._near(position[self._entries], velocity[self._entries]):
-            self._hold(effort, position, velocity)
+        if self._model is None:
+            return effort
+        bounds, rows = [], []
+        turns, spins = position.tolist(), velocity.tolist()
+        for entries, limit in self._limits:
+            for bound in passed_bounds(limit, turns[entries], spins[entries], self._step_s):
+                bounds.append(bound)
+                rows.append(np.zeros(len(effort)))
+                rows[-1][entries] = bound.row
+        if bounds:
+            jacobian = np.array(rows)
+            self._model.update(position, velocity)
+            forces = complementary_forces(bounds, self._model.delassus_matrix(jacobian))
+            effort -= fixed_order.apply(jacobian.T, forces)
         return effort
 
-    def _near(self, turns: FloatArray, velocity: FloatArray) -> bool:
-        """Whether any rotation vector (b, 3) may be beyond a bound by the end of the step.
 
-        Up to two thirds of a turn it is less than twice as fast as the angular velocity (b, 3).
-        """
-        room = np.minimum(turns - self._lower, self._upper - turns)
-        farthest = 2.0 * self._step_s * np.sqrt(np.einsum("ij,ij->i", velocity, velocity))
-        return bool((room < farthest[:, np.newaxis]).any())
+class PassedBound(NamedTuple):
+    """A bound of a soft limit that a joint is beyond, or is about to pass."""
 
-    def _hold(self, effort: FloatArray, position: FloatArray, velocity: FloatArray) -> None:
-        """Add the torques of the soft limits to an effort (n,)."""
-        step = self._step_s
-        turns = self._nearer_way(position[self._entries])
-        jacobian = rotations.right_jacobian_inverse(turns)
-        rates = fixed_order.apply(jacobian, velocity[self._entries])
-        outward = np.copysign(1.0, 2.0 * (turns + step * rates) - self._lower - self._upper)
-        excess = outward * (turns - np.where(outward > 0.0, self._upper, self._lower))
-        rates = outward * rates
-        explicit = self._stiffness * (excess + step * rates) + self._damper * rates
-        beyond = (np.maximum(excess, excess + step * rates) > 0.0) & (explicit > 0.0)
-        if not beyond.any():
-            return
-        count = int(beyond.sum())
-        rows = np.zeros((count, len(effort)))
-        joints = np.nonzero(beyond)[0]
-        rows[np.arange(count)[:, np.newaxis], self._entries[joints]] = (
-            outward[beyond][:, np.newaxis] * jacobian[beyond]
-        )
-        forces = held(
-            explicit[beyond],
-            step * (self._stiffness * step + self._damper)[beyond],
-            yielding(self._mass_matrix.at(position), rows),
-        )
-        effort -= np.einsum("mn,m->n", rows, forces)
-
-    def _nearer_way(self, turns: FloatArray) -> FloatArray:
-        """Of rotation vectors (b, 3) and the longer way round those nearer to the bounds."""
-        angles = np.sqrt(np.einsum("ij,ij->i", turns, turns))[:, np.newaxis]
-        long_way = turns - turns * (2.0 * np.pi / np.maximum(angles, _TINY))
-        beyond = [
-            way - np.minimum(np.maximum(way, self._lower), self._upper) for way in (turns, long_way)
-        ]
-        here, there = (np.einsum("ij,ij->i", excess, excess) for excess in beyond)
-        return np.where((there < here)[:, np.newaxis], long_way, turns)
+    row: Triple  # of J, outwards: `de/dt = row . w` of the angular velocity w in the child frame
+    explicit: float  # N m, the force if nothing yielded
+    implicit: float  # N m s^2/rad, what each rad/s^2 of yielding takes away of it
 
 
-def held(explicit: FloatArray, implicit: FloatArray, mobility: FloatArray) -> FloatArray:
-    """Forces (m,) that hold bounds without drawing: `f = max(0, explicit - implicit A f)` of each.
+def passed_bounds(
+    limit: SoftLimit, turn: Sequence[float], spin: Sequence[float], step_s: float
+) -> Iterator[PassedBound]:
+    """The bounds that a joint is beyond, or will be in a step, and that push it back.
 
-    `explicit` (m,) are the forces if nothing yielded, `implicit` (m,) what of them a unit of
-    acceleration takes away, and `mobility` (m, m) is A, symmetrical: the acceleration that a unit
-    of each force leads to. Solved from zero by sweeps of projected Gauss-Seidel (Jourdan et al.
-    1998, for contacts).
+    Its rotation vector (3,) in rad, its angular velocity (3,) in the child frame in rad/s.
     """
-    forces = [0.0] * len(explicit)
-    wanted, taken, coupling = explicit.tolist(), implicit.tolist(), mobility.tolist()
-    for _ in range(_SWEEPS):
-        before = forces.copy()
-        for i, row in enumerate(coupling):
-            others = sum(a * f for a, f in zip(row, forces, strict=True)) - row[i] * forces[i]
-            forces[i] = max(0.0, (wanted[i] - taken[i] * others) / (1.0 + taken[i] * row[i]))
-        if forces == before:
-            break  # nothing changes any more
-    return np.array(forces)
+    x, y, z = spin
+    # up to two thirds of a turn a rotation vector is less than twice as fast
+    reach = 2.0 * step_s * math.sqrt(x * x + y * y + z * z)
+    if not _is_near(turn, limit, reach):
+        return
+    turn = closest_rotation_vector(turn, limit)
+    jacobian = frames.right_jacobian_inverse(turn)
+    rates = frames.to_parent(jacobian, spin)
+    for part, rate, row, lower, upper in zip(
+        turn, rates, jacobian, limit.lower, limit.upper, strict=True
+    ):
+        outward = math.copysign(1.0, 2.0 * (part + step_s * rate) - lower - upper)
+        excess = outward * (part - (upper if outward > 0.0 else lower))
+        following = excess + step_s * outward * rate
+        explicit = limit.stiffness * following + limit.damping * outward * rate
+        if max(excess, following) > 0.0 and explicit > 0.0:
+            across, along, about = row
+            yield PassedBound(
+                (outward * across, outward * along, outward * about),
+                explicit,
+                step_s * (limit.stiffness * step_s + limit.damping),
+            )
+
+
+def _is_near(turn: Sequence[float], limit: SoftLimit, reach: float) -> bool:
+    """Whether a component of a rotation vector (3,) is beyond a bound, or within reach of it."""
+    for part, lower, upper in zip(turn, limit.lower, limit.upper, strict=True):
+        if part < lower + reach or part > upper - reach:
+            return True
+    return False
+
+
+def closest_rotation_vector(turn: Sequence[float], limit: SoftLimit) -> Sequence[float]:
+    """Of a rotation vector (3,) and the longer way round the one nearer to a limit's bounds."""
+    x, y, z = turn
+    angle = math.sqrt(x * x + y * y + z * z)
+    if not angle:
+        return turn
+    factor = 1.0 - 2.0 * math.pi / angle
+    long_way = (factor * x, factor * y, factor * z)
+    return long_way if _squared_excess(long_way, limit) < _squared_excess(turn, limit) else turn
+
+
+def _squared_excess(turn: Sequence[float], limit: SoftLimit) -> float:
+    """The squared distance in rad^2 of a rotation vector (3,) from a limit's bounds."""
+    square = 0.0
+    for part, lower, upper in zip(turn, limit.lower, limit.upper, strict=True):
+        beyond = max(part - upper, lower - part, 0.0)
+        square += beyond * beyond
+    return square
+
+
+def complementary_forces(bounds: Sequence[PassedBound], delassus: FloatArray) -> FloatArray:
+    """Forces (m,) in N m that push at bounds and never draw: `f = max(0, explicit - implicit A f)`.
+
+    `delassus` (m, m) is A, symmetrical: the accelerations that a unit of each force leads to. With
+    all bounds pushing it is one linear system. A bound that would draw leaves it, one that lacks a
+    push enters, the first such one at a time: that finds the one solution (Murty 1974, "Note on a
+    Bard-type Scheme for Solving the Complementarity Problem").
+    """
+    coupling = [
+        [bound.implicit * entry for entry in row]
+        for bound, row in zip(bounds, delassus.tolist(), strict=True)
+    ]
+    pushing = [True] * len(bounds)
+    forces = [0.0] * len(bounds)
+    for _ in range(_MOST_PIVOTS):
+        forces = _forces_of(bounds, coupling, pushing)
+        for number, bound in enumerate(bounds):
+            if pushing[number]:
+                wrong = forces[number] < 0.0
+            else:
+                yielded = _dot(coupling[number], forces)
+                wrong = bound.explicit - yielded > _ROUNDING * bound.explicit
+            if wrong:
+                pushing[number] = not pushing[number]
+                break
+        else:
+            break
+    return np.maximum(forces, 0.0)
+
+
+def _forces_of(
+    bounds: Sequence[PassedBound], coupling: Sequence[Sequence[float]], pushing: Sequence[bool]
+) -> list[float]:
+    """The forces of the bounds that push, `(1 + coupling) f = explicit`; the others' are zero.
+
+    By elimination; the matrix is similar to a positive definite one, so no pivots are looked for.
+    """
+    chosen = [number for number, pushes in enumerate(pushing) if pushes]
+    rows = [[coupling[i][j] + (i == j) for j in chosen] + [bounds[i].explicit] for i in chosen]
+    for place, row in enumerate(rows):
+        for other in rows[place + 1 :]:
+            share = other[place] / row[place]
+            for column in range(place + 1, len(row)):
+                other[column] -= share * row[column]
+    forces = [0.0] * len(bounds)
+    for place in range(len(chosen) - 1, -1, -1):
+        row = rows[place]
+        known = row[-1]
+        for later in range(place + 1, len(chosen)):
+            known -= row[later] * forces[chosen[later]]
+        forces[chosen[place]] = known / row[place]
+    return forces
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    product = 0.0
+    for one, other in zip(a, b, strict=True):
+        product += one * other
+    return product
 
 
 def bounded_damping(damping: FloatArray, mobility: FloatArray, step_s: float) -> FloatArray:
@@ -142,6 +218,6 @@ def bounded_damping(damping: FloatArray, mobility: FloatArray, step_s: float) ->
     poses in which the inertia is less.
     """
     roots = np.sqrt(damping)
-    taken: FloatArray = step_s * roots * np.einsum("ij,j->i", np.abs(mobility), roots)
+    taken: FloatArray = step_s * roots * fixed_order.apply(np.abs(mobility), roots)
     bounded: FloatArray = damping / np.maximum(taken, 1.0)
     return bounded

@@ -12,11 +12,11 @@ from ros import ControllerClient, Processes, joint_state
 from std_msgs.msg import String
 
 from controller_node.agreement import check_agreement
-from controller_node.dynamics import DynamicsModel
 from experiment.plan import make_plan
 from msgs_config import configuration, topics
 from msgs_config.character import Character, Link
 from msgs_config.character_loading import load_character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError, MessageError
 from msgs_config.parameters import resolve
 from msgs_config.probe import Probe, read_probe

@@ -17,10 +17,10 @@ from physics import (
 
 from controller_node.balance import Balance, BalanceGains, cross
 from controller_node.control_laws import stable_pd_effort
-from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError
 from msgs_config.joint_layout import JointLayout, JointType
 from msgs_config.stamped import StampedState

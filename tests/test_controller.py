@@ -7,12 +7,12 @@ import pytest
 from physics import character, controller, run_together, simulation
 
 from controller_node.controller import Controller
-from controller_node.dynamics import DynamicsModel
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import ClockError
 from msgs_config.joint_layout import ROOT
 from msgs_config.stamped import StampedState

@@ -24,11 +24,12 @@ from physics import (
     without_self_collision,
 )
 
-from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.joint_layout import JointLayout
+from sim_node.mobility import still_settings
 from sim_node.world import WorldSettings
 
 STATES = 20
@@ -59,6 +60,44 @@ def engine_damping(whole: Character, velocity: FloatArray) -> FloatArray:
 
 def difference(layout: JointLayout, start: FloatArray, end: FloatArray) -> FloatArray:
     return layout.difference(layout.configuration(start), layout.configuration(end))
+
+
+# Yielding
+
+
+@every_character
+def test_what_joints_yield_to_each_others_efforts_is_what_the_engine_says(name: str) -> None:
+    # Arrange
+    whole, model = without_self_collision(name), DynamicsModel(character(name))
+    size = whole.layout.size
+    position, _ = random_state(whole, np.random.default_rng(1))
+    joints = np.eye(size)[6 if whole.layout.has_floating_base else 0 :]
+    with LoneWorld(whole, still_settings(gravity=0.0)) as world:
+        measured = []
+        for effort in joints:
+            world.body.set_state(position, np.zeros(size))
+            measured.append(acceleration(world, effort) @ joints.T)
+
+    # Act
+    model.update(position, np.zeros(size))
+    found = model.delassus_matrix(joints)
+
+    # Assert
+    scale = np.abs(measured).max(initial=1e-9)
+    expected = np.array(measured).reshape(found.shape)
+    np.testing.assert_allclose(found / scale, expected / scale, atol=1e-9)
+
+
+@every_character
+def test_the_delassus_matrix_is_j_inverse_m_j_transposed(name: str) -> None:
+    rng = np.random.default_rng(5)
+    for model, position, _ in random_scenes(name):
+        rows = rng.normal(size=(3, len(position)))
+
+        expected = rows @ np.linalg.solve(model.mass_matrix(), rows.T)
+
+        found = model.delassus_matrix(rows)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
 
 
 # Solving

@@ -22,10 +22,10 @@ from physics import (
     without_self_collision,
 )
 
-from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from sim_node.passive import PassiveForces
 from sim_node.world import WorldSettings
 

@@ -9,9 +9,9 @@ from struck import HUMANOID, LINKS, RATE_HZ, Throw, driver, run
 
 from controller_node.behaviours.hits import HitDetector, beyond_cone
 from controller_node.behaviours.hull import Hull
-from controller_node.dynamics import DynamicsModel
 from controller_node.references.clip_file import available_clips
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator

@@ -49,7 +49,7 @@ EDGE = {  # the files that speak ROS, beside all of experiment/
 FINDS_PACKAGES = "msgs_config/files.py"  # ament_index_python, to resolve package://
 ENGINES = {
     "pybullet": {"msgs_config/bullet.py"},
-    "mujoco": {"controller_node/dynamics.py"},
+    "mujoco": {"msgs_config/dynamics.py"},
 }
 MAY_USE_BULLET = {
     "msgs_config/character_loading.py",
@@ -148,7 +148,6 @@ KNOW_NO_ENGINE = [
     "sim_node.compositing",
     "sim_node.ground",
     "sim_node.looks",
-    "sim_node.passive",
     "sim_node.patience",
     "sim_node.surfaces",
     "sim_node.throwing",

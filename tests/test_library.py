@@ -8,11 +8,11 @@ import pytest
 from physics import character
 
 from controller_node.behaviours.library import MotionLibrary, Window
-from controller_node.dynamics import DynamicsModel
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
 from controller_node.references.moved import Carry
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 
 HUMANOID = character("humanoid")

@@ -26,12 +26,12 @@ from physics import (
     without_self_collision,
 )
 
-from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.bullet import pybullet
 from msgs_config.character import Character, Loading
 from msgs_config.character_loading import load_character
+from msgs_config.dynamics import DynamicsModel
 from sim_node.body import Body
 from sim_node.pushes import Push
 from sim_node.world import World, WorldSettings

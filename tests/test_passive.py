@@ -13,10 +13,16 @@ from controller_node.references.clip_file import available_clips, read_clip
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character, Joint, SoftLimit
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.joint_layout import JointType
-from sim_node.mass_matrix import MassMatrix
 from sim_node.mobility import make_passive_forces, measure_mobility, passing_through_itself
-from sim_node.passive import PassiveForces, bounded_damping, held
+from sim_node.passive import (
+    PassedBound,
+    PassiveForces,
+    bounded_damping,
+    closest_rotation_vector,
+    complementary_forces,
+)
 from sim_node.world import World, WorldSettings
 
 HUMANOID = character("humanoid")
@@ -201,8 +207,9 @@ def test_the_forces_are_those_of_the_motion_that_they_lead_to(step_s: float) -> 
     effort = make_passive_forces(HUMANOID, step_s).effort(position, velocity)
 
     # Assert
-    mass_matrix = MassMatrix(HUMANOID).at(position)
-    after = velocity + step_s * np.linalg.solve(mass_matrix, effort)
+    model = DynamicsModel(HUMANOID)
+    model.update(position, velocity)
+    after = velocity + step_s * np.linalg.solve(model.mass_matrix(), effort)
     rate = rotations.right_jacobian_inverse(position[entry : entry + 3]) @ after[entry : entry + 3]
     force = limit.stiffness * (0.1 + step_s * rate[0]) + limit.damping * rate[0]
     assert force > 0.0
@@ -220,21 +227,46 @@ def test_a_limb_about_to_pass_its_bound_is_slowed_in_the_step_before() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8))
-def test_held_forces_push_or_are_zero_where_nothing_is_to_be_held(seed: int, size: int) -> None:
+def test_forces_push_or_are_zero_where_nothing_is_to_be_held(seed: int, size: int) -> None:
     # Arrange
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(size, size))
-    mobility = root @ root.T + np.eye(size)
-    explicit, implicit = rng.normal(size=size), rng.uniform(0.0, 0.1, size)
+    delassus = root @ root.T + np.eye(size)
+    explicit, implicit = rng.uniform(0.1, 3.0, size), rng.uniform(0.0, 10.0, size)
+    bounds = [PassedBound((0.0, 0.0, 0.0), *pair) for pair in zip(explicit, implicit, strict=True)]
 
     # Act
-    forces = held(explicit, implicit, mobility)
+    forces = complementary_forces(bounds, delassus)
 
-    # Assert: complementarity
-    lacking = explicit - implicit * (mobility @ forces) - forces
+    # Assert: complementarity, to rounding
+    lacking = explicit - implicit * (delassus @ forces) - forces
     assert (forces >= 0.0).all()
-    np.testing.assert_allclose(lacking[forces > 0.0], 0.0, atol=1e-6)
-    assert (lacking[forces == 0.0] <= 1e-6).all()
+    np.testing.assert_allclose(lacking[forces > 0.0], 0.0, atol=1e-9)
+    assert (lacking[forces == 0.0] <= 1e-9).all()
+
+
+def test_of_two_bounds_that_push_one_another_away_only_one_pushes() -> None:
+    """A unit of the first force moves the second bound's joint back far more than is wanted."""
+    delassus = np.array([[1.0, 4.0], [4.0, 17.0]])
+    bounds = [PassedBound((1.0, 0.0, 0.0), 10.0, 1.0), PassedBound((0.0, 1.0, 0.0), 1.0, 1.0)]
+
+    forces = complementary_forces(bounds, delassus)
+
+    assert forces.tolist() == [5.0, 0.0]
+
+
+@every_ball
+def test_the_way_round_that_counts_is_the_one_nearer_to_the_bounds(ball: Joint) -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(100):
+        turn = random_rotation_vector(rng)
+        chosen = np.array(closest_rotation_vector(turn.tolist(), limit_of(ball)))
+
+        apart = np.sum(excess(limit_of(ball), chosen) ** 2)
+        assert 0.5 * limit_of(ball).stiffness * apart == pytest.approx(
+            potential(limit_of(ball), turn)
+        )
+        assert rotations.angle_between(rotations.exp(chosen), rotations.exp(turn)) < 1e-7
 
 
 def test_the_soft_limits_leave_a_tenth_of_a_radian_to_every_frame_of_every_clip() -> None:

@@ -11,7 +11,6 @@ from controller_node import parameters as for_controller
 from controller_node.behaviours.base import Mode, ModeReport
 from controller_node.behaviours.give_way import GiveWay, softened
 from controller_node.controller import Controller
-from controller_node.dynamics import DynamicsModel
 from controller_node.feedback import Feedback, responding
 from controller_node.feedback_gains import FEATURES, OUTPUTS, FeedbackGains
 from controller_node.laws import GainArrays, Instant
@@ -23,6 +22,7 @@ from controller_node.strength import strengths_of
 from experiment.loop import ticks_in_process
 from experiment.plan import make_plan
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.parameters import resolve
 from msgs_config.stamped import StampedState

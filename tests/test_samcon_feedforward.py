@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from physics import character
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.parameters import make_controller
 from controller_node.references.base import ReferenceState
 from controller_node.references.corrected import Offset
@@ -17,6 +16,7 @@ from experiment.samcon.problem import Problem
 from experiment.samcon.rollout import Branch, Expansion, Rollout
 from experiment.samcon.settings import preset
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import FIRST_TICK
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from physics import character
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.feedback_gains import FeedbackGains
 from experiment.cli import main
 from experiment.loop import ticks_in_process
@@ -26,6 +25,7 @@ from experiment.samcon.settings import preset
 from experiment.samcon.trials import Fit, Level, Trials
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 
 HUMANOID = character("humanoid")
 SIZE = HUMANOID.layout.size

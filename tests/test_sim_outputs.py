@@ -13,10 +13,10 @@ from ros import Inbox, Processes, SimulatorClient, stamp_ns, tick_of, wrench_mes
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker
 
-from controller_node.dynamics import DynamicsModel
 from msgs_config import topics
 from msgs_config.arrays import FloatArray
 from msgs_config.character import ShapeType
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.tick_clock import TickClock
 
 CLOCK = TickClock(240)

@@ -9,7 +9,6 @@ from in_process import InProcessLaboratory
 from matplotlib.figure import Figure
 from physics import character
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.effort_series import read_effort_series
 from controller_node.references.signals import SineReference
 from experiment.plan import make_plan
@@ -18,6 +17,7 @@ from experiment.studies import replay
 from experiment.studies.catalogue import load_study
 from experiment.studies.laboratory import TopicLaboratory
 from experiment.studies.study import Case, Findings
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.tick_clock import TickClock
 
 GRAVITY = 9.81

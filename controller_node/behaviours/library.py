@@ -6,18 +6,19 @@ the ground a motion happens does not count: each moment is moved to the root's p
 about z to where its links' origins are nearest (Kovar, Gleicher and Pighin 2002, "Motion Graphs").
 """
 
+import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.references.base import Reference
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import available_clips, read_clip
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character, Vector
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.geometry import elementary, fixed_order
 
@@ -123,7 +124,7 @@ class MotionLibrary:
             float(self.times[moment]),
             float(turns[moment]),
             float(distances[moment]),
-            float(np.median(distances[np.isfinite(distances)])),
+            statistics.median(distances[np.isfinite(distances)].tolist()),
         )
 
     def distances(self, window: Window) -> tuple[FloatArray, FloatArray]:

@@ -9,8 +9,8 @@ from controller_node.behaviours.library import MotionLibrary
 from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.settings import reaction_settings
-from controller_node.dynamics import DynamicsModel
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.parameters import Values
 
 _LYING = 0.5  # the part of a get-up clip in which it may begin

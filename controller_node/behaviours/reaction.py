@@ -19,7 +19,6 @@ from controller_node.behaviours.library import Match, MotionLibrary
 from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.settings import ReactionSettings
 from controller_node.behaviours.ways import BodyWay, ClipWay, OwnWay, Way
-from controller_node.dynamics import DynamicsModel
 from controller_node.laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertialisedReference, Offset
@@ -28,6 +27,7 @@ from controller_node.strength import weakened
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 
 _SEVERE = 2.0 / 3.0  # of the threshold above which it goes limp: the full reaction
 _ONTO = 0.6  # of the blend's duration, until the motion that was found is reached
@@ -164,7 +164,7 @@ class Reaction:
         """Wait until it lies still."""
         assert isinstance(self._way, BodyWay)
         self._way.state = self._body(seen)
-        still_energy = 0.5 * self._kit.character.mass * _STILL_SPEED**2
+        still_energy = 0.5 * self._kit.character.mass * _STILL_SPEED * _STILL_SPEED
         if self._kit.model.kinetic_energy() > still_energy:
             self._moved = seen.time
         still = seen.time - self._moved >= _STILL_TIME

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order
 
 

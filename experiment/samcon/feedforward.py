@@ -11,13 +11,12 @@ dynamics); the law is that of Tan, Liu and Turk 2011 (`controller_node/control_l
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.laws import GainArrays
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order
-from sim_node.mass_matrix import yielding
 
 _APART = 0.05  # s from a time, between which its acceleration is measured: clips have 30 frames/s
 _DOWN, _UP = 0.07, 0.15  # m of a foot's origin, at which it bears all of its share, and nothing
@@ -82,5 +81,23 @@ class Feedforward:
         mobility = np.einsum("wi,w,wj->ij", roots, weights, roots) + _SLIGHT * np.eye(6)
         rows = np.vstack((weights[:, np.newaxis] * roots, needed))
         # W J M^-1 needed is its last column; a LAPACK's last bits would be the processor's
-        wrenches = yielding(mobility, rows)[:-1, -1]
+        wrenches = _delassus(mobility, rows)[:-1, -1]
         return fixed_order.apply(jacobians.T, wrenches)
+
+
+def _delassus(matrix: FloatArray, rows: FloatArray) -> FloatArray:
+    """`J M^-1 J^T` (m, m) of a mass matrix (n, n) and rows J (m, n): what each row's force moves.
+
+    By elimination of M from the bordered matrix (M, J^T; J, 0), whose Schur complement it is but
+    for its sign; M is positive definite, so no pivots are looked for.
+    """
+    size, count = len(matrix), len(rows)
+    bordered = np.zeros((size + count, size + count))
+    bordered[:size, :size] = matrix
+    bordered[:size, size:], bordered[size:, :size] = rows.T, rows
+    for pivot in range(size):
+        rest = bordered[pivot + 1 :, pivot + 1 :]
+        column = bordered[pivot + 1 :, pivot]
+        rest -= column[:, np.newaxis] * (bordered[pivot, pivot + 1 :] / bordered[pivot, pivot])
+    schur: FloatArray = -bordered[size:, size:]
+    return schur

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from experiment.loop import ticks_in_process
 from experiment.metrics import Measurement
 from experiment.plan import Plan
@@ -14,6 +13,7 @@ from experiment.samcon.problem import Problem
 from experiment.samcon.tree import Node
 from msgs_config import configuration
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import SimulationError
 from msgs_config.joint_layout import JointLayout, JointType
 from msgs_config.stamped import StampedState

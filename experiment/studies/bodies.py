@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from experiment.studies.study import Laboratory
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character, Vector
+from msgs_config.dynamics import DynamicsModel
 
 IN_SPACE: dict[str, object] = {"gravity": 0.0, "terrain": "none"}
 """The simulator's parameters where nothing falls, and nothing is there to fall on."""

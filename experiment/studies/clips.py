@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.references.clip_file import available_clips, read_clip
 from experiment.render.stills import strip
 from experiment.studies.plots import label, make_panels, show_pictures
@@ -16,6 +15,7 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
+from msgs_config.dynamics import DynamicsModel
 from sim_node.camera import Picture
 from sim_node.looks import outline
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller_node import parameters as controller_parameters
-from controller_node.dynamics import DynamicsModel
 from controller_node.laws import GainArrays
 from experiment.studies.plots import label, make_panels
 from experiment.studies.study import Case, Findings, Laboratory
@@ -15,6 +14,7 @@ from experiment.studies.tracking import delayed_spectral_radius, errors_by_joint
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.parameters import resolve
 
 if TYPE_CHECKING:  # it takes a second to import

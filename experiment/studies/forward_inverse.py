@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import yaml
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.references.clip_file import read_clip
 from experiment.plan import make_plan
 from experiment.studies.plots import THEORY, label, make_panels
 from experiment.studies.replay import effort_table, efforts_along, errors_of, orders
 from experiment.studies.study import Case, Cell, Findings, Laboratory, Outcome
 from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.dynamics import DynamicsModel
 
 if TYPE_CHECKING:  # it takes a second to import
     from matplotlib.axes import Axes

@@ -7,12 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from controller_node.dynamics import DynamicsModel
 from controller_node.effort_series import TIME_COLUMN
 from controller_node.references.base import Reference
 from experiment.bags.recording import Recording
 from experiment.studies.tracking import errors_by_joint
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.joint_layout import JointLayout
 
 

@@ -1,4 +1,4 @@
-"""The controller's model of the dynamics: MuJoCo behind one class."""
+"""The model of the dynamics on both sides of the loop: MuJoCo behind one class."""
 
 import mujoco
 import numpy as np
@@ -88,6 +88,16 @@ class DynamicsModel:
         acceleration: FloatArray = np.empty(self._layout.size)
         mujoco.mj_solveM(self._model, data, acceleration[np.newaxis], force[np.newaxis])
         return acceleration
+
+    def delassus_matrix(self, rows: FloatArray) -> FloatArray:
+        """`J M^-1 J^T` (m, m) of rows J (m, n): how the force on each row accelerates each.
+
+        In the position taken over; without passive damping (Brogliato 2016, "Nonsmooth Mechanics").
+        """
+        accelerations = np.empty_like(rows)
+        mujoco.mj_factorM(self._model, self._data)
+        mujoco.mj_solveM(self._model, self._data, accelerations, rows)
+        return fixed_order.product(rows, accelerations.T)
 
     def bias_force(self) -> FloatArray:
         """The bias force C (n,) at the state taken over.
