@@ -1,19 +1,12 @@
 """Every golden run has the states that the table says, on this machine as on every other."""
 
-import platform
 from pathlib import Path
 
 import golden
 import pytest
 
 TABLE = golden.golden()
-ON_THIS_PROCESSOR = platform.machine() == "x86_64" and "fma" in golden.processor_flags()
-
-pytestmark = pytest.mark.skipif(
-    not ON_THIS_PROCESSOR,
-    reason="the golden hashes hold for x86-64 with FMA: without it the C library's elementary "
-    "functions have other last bits",
-)
+pytestmark = pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT)
 
 
 def test_the_engines_are_those_of_the_table() -> None:
