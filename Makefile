@@ -13,7 +13,7 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
 
-.PHONY: help venv demo test hashes bench soak kills long-recording format clean distclean
+.PHONY: help venv demo test hashes other-numpy bench soak kills long-recording format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -32,6 +32,12 @@ test: .venv/.installed-test ## Check style and types, run the tests
 
 hashes: .venv/.installed-test ## Renew the golden hashes, after a change that is meant to alter states
 	$(BIN)/python tests/golden.py
+
+other-numpy: .venv/.installed-test ## Compare the golden runs with the oldest and the newest numpy allowed
+	for version in '==1.26.4' '>=2,<3'; do \
+	    rm -rf build/numpy && $(BIN)/python -m pip install -qq --no-deps --target build/numpy "numpy$$version" && \
+	    PYTHONPATH=build/numpy $(BIN)/python -m pytest -q -n auto tests/test_golden_hashes.py || exit 1; \
+	done
 
 bench: .venv/.installed ## Measure speed
 	$(BIN)/python -m benchmarks
