@@ -25,6 +25,7 @@ from controller_node.window_feedback import Deviations, WindowFeedback
 from msgs_config.character import Character
 from msgs_config.errors import MotionError, one_of
 from msgs_config.parameters import Parameter, Values
+from msgs_config.stamped import StampedState
 
 KEYFRAMES_DIRECTORY = Path(__file__).parent / "keyframes"
 
@@ -57,6 +58,11 @@ class Motion:
 
     reference: Reference
     notes: tuple[str, ...] = ()
+
+    def first_state(self) -> StampedState:
+        """The state in which a character is to begin, so that it is where the reference is."""
+        first = self.reference.sample(0.0)
+        return StampedState(0, first.configuration.position, first.velocity, None)
 
 
 def make_motion(character: Character, values: Values) -> Motion:

@@ -79,6 +79,7 @@ class ControllerNode(Node):
         self._counts: Counter[str] = Counter(answered=0, repeated=0, ignored=0, overtaken=0)
         self._answer_times = Durations()
         self._open_topics()
+        self._outputs.publish_initial_state(motion.first_state())
         LiveParameters(
             self, self._declared, self._values, self._take_parameters, self._check_parameters
         )

@@ -43,6 +43,7 @@ class Outputs:
         self._torque_encoder = JointStateEncoder([layout.dof_names[entry] for entry in commanded])
         self._reference_encoder = JointStateEncoder(layout.dof_names)
         self._wrench_encoder = DoublesEncoder(WORLD)
+        self._initial_states = topics.create_publisher(node, topics.INITIAL_STATE)
         self._references = topics.create_publisher(node, topics.REFERENCE)
         self._wrenches = topics.create_publisher(node, topics.NET_WRENCH)
         self._torques = topics.create_publisher(node, topics.JOINT_TORQUES)
@@ -50,6 +51,12 @@ class Outputs:
         self._trajectories = topics.create_publisher(node, topics.ACTIVE_TRAJECTORY)
         self._strengths = topics.create_publisher(node, topics.ACTIVE_STRENGTH)
         self._modes = topics.create_publisher(node, topics.MODE)
+
+    def publish_initial_state(self, state: StampedState) -> None:
+        """Publish in which state the reference begins."""
+        self._initial_states.publish(
+            self._reference_encoder.encode(state.stamp_ns, state.position, state.velocity)
+        )
 
     @property
     def torque_subscribers(self) -> int:

@@ -18,6 +18,7 @@ from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
+from sim_node.initial_state import INITIAL_STATE, as_values
 from sim_node.probe import measure_probe
 
 SHARED = ("rate", "gravity", "placement")  # the same on both sides; set on one, they count on both
@@ -25,6 +26,7 @@ _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
     "characters": "nobody: a run has one character; start sim_node itself for several",
+    INITIAL_STATE: "the run itself: where the reference begins, unless initial_position says it",
     "max_ticks": "--duration",
     "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",
 }
@@ -81,12 +83,10 @@ def make_plan(
     )
     motion = make_motion(character, controller)
     check_reference(motion.reference, choose_behaviour(character, controller))
-    first = motion.reference.sample(0.0)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {
         "commanded_joints": commanded,
-        "initial_position": first.configuration.position.tolist(),
-        "initial_velocity": first.velocity.tolist(),
+        **as_values(motion.first_state()),
     }
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     check_terrain(controller.text("behaviour"), simulator.text("terrain"))

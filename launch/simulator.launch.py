@@ -8,7 +8,7 @@ from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = "actuated_characters"
 CONFIG = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", LaunchConfiguration("config")])
-OVERRIDES = ("character", "max_ticks", "wait_for_subscribers")
+OVERRIDES = ("character", "initial_state", "max_ticks", "wait_for_subscribers")
 """Parameters that arguments of the same names set, instead of the config."""
 
 
@@ -25,6 +25,11 @@ def generate_launch_description() -> LaunchDescription:
                 "character",
                 default_value="",
                 description="name of a character, or path of its .yaml file; empty: the config's",
+            ),
+            DeclareLaunchArgument(
+                "initial_state",
+                default_value="",
+                description="given, without controller_node, or reference; empty: the config's",
             ),
             DeclareLaunchArgument(
                 "max_ticks",

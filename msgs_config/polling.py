@@ -41,6 +41,7 @@ class DirectSubscription:
         """Subscribe; with `events` also to what the middleware says of the subscription."""
         # as many as the middleware keeps, and like it the newest, lest a flood fill the memory
         self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
+        self._node = node
         # When the loop blocks in the executor, it is the executor that takes the message. It
         # hands a callback of two arguments the message's info too, which rclpy's types leave out.
         self._subscription = node.create_subscription(
@@ -55,6 +56,11 @@ class DirectSubscription:
 
     def _keep(self, raw: bytes, info: dict[str, int]) -> None:
         self._pending.append(_received(raw, info))
+
+    def close(self) -> None:
+        """End the subscription; what it has not handed out is lost."""
+        self._pending.clear()
+        self._node.destroy_subscription(self._subscription)
 
     def take(self) -> bytes | None:
         """The next serialised message; None if there is none now."""

@@ -79,6 +79,10 @@ class Actor:
         self._passive = make_passive_forces(role.character, step_s)
         self._delay_ticks = delay_ticks
 
+    def begin_in(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Make a state, each (n,), the initial one of every world that it enters from now on."""
+        self._position, self._velocity = position.copy(), velocity.copy()
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What the simulation does otherwise than the character's file says."""

@@ -18,6 +18,7 @@ from msgs_config.tick_clock import FIRST_TICK
 from msgs_config.topics import Outgoing
 from msgs_config.warnings import Warnings
 from sim_node.back_pressure import BackPressure
+from sim_node.initial_state_topic import InitialStates
 from sim_node.lockstep import LockstepBarrier, Verdict
 from sim_node.pace import Pace
 from sim_node.parameters import (
@@ -30,7 +31,7 @@ from sim_node.parameters import (
     tick_period,
 )
 from sim_node.patience import Due, Patience
-from sim_node.port import Port, open_ports
+from sim_node.port import Port, open_ports, publish_configurations
 from sim_node.realtime import CommandHold
 from sim_node.report import report
 from sim_node.run_control import RunControl
@@ -66,7 +67,8 @@ class SimNode(Node):
         self._realtime = is_realtime(values)
         roles = [make_role(part.character, part.values, part.name) for part in cast.parts]
         self._simulation = Simulation(roles, make_settings(values))
-        declare(self, cast.declared, values)
+        self._initial_states = InitialStates(self, cast, self._simulation)
+        declare(self, self._initial_states.known, values)
         self._ports = open_ports(self, cast, self._simulation)
         self._warnings = Warnings(self)
         self._world_port = WorldPort(self, self._simulation, self._warnings)
@@ -93,10 +95,16 @@ class SimNode(Node):
         """Simulate until `max_ticks`, or until `stop`.
 
         Raises:
-            SimulationError: a fault or a timeout whose parameter says `abort`.
+            SimulationError: a fault or a timeout whose parameter says `abort`, or no controller
+                said where a reference begins.
+            CharacterError: the engine makes nothing sound of a character.
         """
         spinner = Spinner(self)
         try:
+            cast = self._initial_states.settle(stop, spinner)
+            if cast is None:
+                return
+            publish_configurations(self._ports, cast, self._simulation.settings.world)
             self._wait_for_subscribers(stop, spinner)
             self._begin_episode()
             while not stop and not self._finished:

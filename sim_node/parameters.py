@@ -9,7 +9,7 @@ from msgs_config import files
 from msgs_config.character import Character, Loading
 from msgs_config.character_loading import load_character
 from msgs_config.errors import CharacterError, ConfigurationError, LayoutError
-from msgs_config.parameters import Parameter, Values, resolve
+from msgs_config.parameters import Parameter, Value, Values, resolve
 from msgs_config.shared_parameters import (
     CHARACTER,
     GRAVITY,
@@ -22,6 +22,7 @@ from msgs_config.shared_parameters import (
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from msgs_config.urdf_check import check_urdf
 from sim_node.actor import Role
+from sim_node.initial_state import POSITION, VELOCITY, check_given, initial_state_parameters
 from sim_node.simulation import SimulationSettings
 from sim_node.world import WorldSettings
 
@@ -75,6 +76,12 @@ WORLD_PARAMETERS = [
         0,
         "publish the first state when this many subscribe to joint_states",
         maximum=1000,
+    ),
+    Parameter(
+        "initial_state_timeout",
+        60.0,
+        "longest wait for a controller that says where a character begins; 0: no limit",
+        unit="s",
     ),
     Parameter("republish_period", 0.5, "an unanswered state is sent again", unit="s", minimum=0.01),
     Parameter("lockstep_timeout", 0.0, "longest wait for a command; 0: for ever", unit="s"),
@@ -131,20 +138,7 @@ def character_parameters(character: Character) -> list[Parameter]:
             "the joints that must be commanded, and that alone may be; with 'root': assistance",
             texts=True,
         ),
-        Parameter(
-            "initial_position",
-            list(character.rest_position),
-            "position of each degree of freedom at the start",
-            unit="rad or m",
-            minimum=-1e12,
-        ),
-        Parameter(
-            "initial_velocity",
-            [0.0] * character.layout.size,
-            "velocity of each degree of freedom at the start",
-            unit="rad/s or m/s",
-            minimum=-1e12,
-        ),
+        *initial_state_parameters(character),
     ]
 
 
@@ -155,6 +149,11 @@ class Part:
     name: str
     character: Character
     values: Values
+
+    @property
+    def prefix(self) -> str:
+        """What stands before the names of its parameters."""
+        return _prefix(self.name)
 
 
 @dataclass(frozen=True)
@@ -169,6 +168,19 @@ class Cast:
     def names(self) -> tuple[str, ...]:
         """Names of the characters; empty for one alone, which has none."""
         return tuple(part.name for part in self.parts if part.name)
+
+    def with_values(self, changes: Mapping[str, Mapping[str, Value]]) -> "Cast":
+        """The same with other values of parameters of characters, by the characters' names."""
+        parts = [
+            replace(part, values=Values({**part.values, **changes.get(part.name, {})}))
+            for part in self.parts
+        ]
+        changed = {
+            part.prefix + name: value
+            for part in self.parts
+            for name, value in changes.get(part.name, {}).items()
+        }
+        return replace(self, parts=tuple(parts), values=Values(self.values | changed))
 
 
 def make_cast(given: Mapping[str, object]) -> Cast:
@@ -186,7 +198,7 @@ def make_cast(given: Mapping[str, object]) -> Cast:
     values = {name: value for name, value in given.items() if name not in shared}
     for part in parts:
         for parameter in _of_character(part.character):
-            name = _prefix(part.name) + parameter.name
+            name = part.prefix + parameter.name
             declared.append(replace(parameter, name=name))
             values[name] = part.values[parameter.name]
     return Cast(parts, tuple(declared), resolve(declared, values))
@@ -226,6 +238,7 @@ def _make_part(name: str, given: Mapping[str, object]) -> Part:
         alone = resolve([CHARACTER, PLACEMENT], {k: given[k] for k in given if k in _BEFORE})
         character = placed(load_character(alone.text(CHARACTER.name)), alone)
         values = resolve(PARAMETERS + character_parameters(character), given)
+        check_given(values, given)
         character.layout.mask(values.texts("commanded_joints"))  # they exist
     except (ConfigurationError, LayoutError) as error:
         raise ConfigurationError(f"character '{name}': {error}" if name else str(error)) from error
@@ -241,8 +254,8 @@ def make_role(character: Character, values: Values, name: str = "") -> Role:
     return Role(
         character=character,
         commanded_joints=values.texts("commanded_joints"),
-        initial_position=values.numbers("initial_position"),
-        initial_velocity=values.numbers("initial_velocity"),
+        initial_position=values.numbers(POSITION),
+        initial_velocity=values.numbers(VELOCITY),
         name=name,
     )
 

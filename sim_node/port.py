@@ -1,12 +1,14 @@
 """One character's place at the topics: commands and pushes in, its states out."""
 
 from collections import Counter
+from collections.abc import Iterable
 
 from rclpy.node import Node
 
 from msgs_config import configuration, topics
 from msgs_config.errors import CommandError, LayoutError, MessageError
 from msgs_config.messages import JointStateDecoder
+from msgs_config.parameters import Values
 from msgs_config.polling import DirectSubscription
 from msgs_config.tick_clock import TickClock
 from msgs_config.warnings import Warnings
@@ -15,7 +17,7 @@ from sim_node.actor import Actor
 from sim_node.inbox import FirstTick, StampedInbox, forget
 from sim_node.lockstep import LockstepBarrier, Verdict
 from sim_node.outputs import Outputs
-from sim_node.parameters import Cast, Part, command_timeout_ns, display_ticks, is_realtime
+from sim_node.parameters import Cast, command_timeout_ns, display_ticks, is_realtime
 from sim_node.probe import measure_probe
 from sim_node.pushes import Push, PushSchedule
 from sim_node.realtime import CommandHold
@@ -105,34 +107,34 @@ class Port:
 
 
 def open_ports(node: Node, cast: Cast, simulation: Simulation) -> list[Port]:
-    """A port for each character, its configuration published.
+    """A port for each character."""
+    return [_open_port(node, actor, cast.values) for actor in simulation.actors]
+
+
+def publish_configurations(ports: Iterable[Port], cast: Cast, world: WorldSettings) -> None:
+    """Publish what the run of each character depends on, its initial state among it.
 
     Raises:
         CharacterError: the engine makes nothing sound of a character.
     """
-    return [
-        _open_port(node, part, actor, cast, simulation.settings.world)
-        for part, actor in zip(cast.parts, simulation.actors, strict=True)
-    ]
+    for port, part in zip(ports, cast.parts, strict=True):
+        port.outputs.publish_configuration(
+            configuration.describe(
+                part.character,
+                part.values,
+                probe=measure_probe(part.character, world.gravity),
+                terrain=world.terrain,
+                name=part.name,
+                characters=cast.names,
+            )
+        )
 
 
-def _open_port(node: Node, part: Part, actor: Actor, cast: Cast, world: WorldSettings) -> Port:
-    names, commanded, values = actor.layout.dof_names, actor.commanded, cast.values
+def _open_port(node: Node, actor: Actor, values: Values) -> Port:
+    names, commanded = actor.layout.dof_names, actor.commanded
     collector: Collector = LockstepBarrier(names, commanded)
     if is_realtime(values):
         collector = CommandHold(names, commanded, command_timeout_ns(values))
     for note in actor.notes:
         node.get_logger().warning(f"{actor.role.prefix}{note}")
-    outputs = Outputs(node, actor, display_ticks(values))
-    probe = measure_probe(part.character, world.gravity)
-    outputs.publish_configuration(
-        configuration.describe(
-            part.character,
-            part.values,
-            probe=probe,
-            terrain=world.terrain,
-            name=part.name,
-            characters=cast.names,
-        )
-    )
-    return Port(node, actor, collector, outputs)
+    return Port(node, actor, collector, Outputs(node, actor, display_ticks(values)))

@@ -1,11 +1,12 @@
 """The simulation of characters in one world: efforts for one tick, then the next states. No ROS."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
+from msgs_config.stamped import StampedState
 from msgs_config.throw import Throw
 from msgs_config.tick_clock import FIRST_TICK, TickClock
 from sim_node.actor import Actor, ActorMemory, Role
@@ -153,6 +154,14 @@ class Simulation:
         self.episode += 1
         self.throws = ()
         self._world.close()  # first: two engines at a time would take twice the memory
+        self._world = self._fresh_world()
+
+    def begin_in(self, states: Mapping[str, StampedState]) -> None:
+        """Begin in other states, by the characters' names, before the first step; episodes, too."""
+        for actor in self.actors:
+            if (state := states.get(actor.role.name)) is not None:
+                actor.begin_in(state.position, state.velocity)
+        self._world.close()
         self._world = self._fresh_world()
 
     def save(self) -> Saved:

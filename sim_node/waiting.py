@@ -17,7 +17,7 @@ def describe_waiting(node: Node, topic: Topic, missing: list[str]) -> str:
     """One sentence: the entries that lack a command, and the publishers that there are."""
     shown = ", ".join(missing[:_NAMES_SHOWN])
     more = f" and {len(missing) - _NAMES_SHOWN} more" if len(missing) > _NAMES_SHOWN else ""
-    return f"waiting for commands of {shown}{more}; {_describe_publishers(node, topic)}"
+    return f"waiting for commands of {shown}{more}; {describe_publishers(node, topic)}"
 
 
 def describe_conflict(joint: str, topic: Topic, senders: list[str]) -> str:
@@ -44,7 +44,8 @@ def publisher_names(node: Node, topic: Topic, *, wait_for_names: bool = True) ->
         time.sleep(_NAME_POLL)
 
 
-def _describe_publishers(node: Node, topic: Topic) -> str:
+def describe_publishers(node: Node, topic: Topic) -> str:
+    """One sentence: the nodes that publish on a topic, and whose QoS does not fit."""
     infos = node.get_publishers_info_by_topic(topic.name)
     if not infos:
         return f"nobody publishes on '{topic.name}'"

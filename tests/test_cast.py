@@ -20,7 +20,14 @@ from sim_node.parameters import (
 )
 
 HUMANOID = character("humanoid").layout
-OWN = ["character", "placement", "commanded_joints", "initial_position", "initial_velocity"]
+OWN = [
+    "character",
+    "placement",
+    "commanded_joints",
+    "initial_state",
+    "initial_position",
+    "initial_velocity",
+]
 SLOPE = """
 <robot name="ramp"><link name="ramp">
   <collision><origin xyz="0 0 {height}"/><geometry><box size="20 20 1"/></geometry></collision>

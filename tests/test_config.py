@@ -1,7 +1,11 @@
 """The parameter files that ship: each starts its nodes, and says what it claims to say."""
 
+import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+import signal
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +17,20 @@ from ros import MODULES, Inbox, Process, Processes, SimulatorClient, stamp_ns
 from controller_node import parameters as for_controller
 from controller_node.controller import Controller
 from controller_node.motion import make_motion
+from experiment.bags.recording import read_recordings
+from experiment.loop import ticks_in_process
+from experiment.metrics import StateHash
 from experiment.plan import make_plan
+from experiment.replay.replay import replay
+from experiment.replay.through_topics import replay_commands
 from msgs_config import topics
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import placed
+from msgs_config.stamped import StampedState
+from sim_node.initial_state import begins_with_reference
 from sim_node.parameters import Part, make_cast, make_role, make_settings
 from sim_node.simulation import Simulation
 
@@ -35,7 +46,7 @@ NODES = {  # full names of the nodes that each file is for
 }
 SHARED = ("character", "rate", "gravity", "placement")  # must be the same on both sides
 A_FEW_TICKS = 20
-MEETING_TICKS = 240  # within which two humanoids have met
+TICKS = 240  # within which two humanoids have met
 A_PUSH = 0.01  # m that a root is moved by
 
 
@@ -100,33 +111,36 @@ def test_both_sides_agree_on_what_they_must_agree_on(file: str) -> None:
         assert set(part.values.texts("commanded_joints")) == set(commanded)
 
 
-BEGIN_AS_A_RUN = ["humanoid_balance.yaml", "humanoid_walk.yaml", "two_humanoids.yaml"]
+MOTIONS = ["humanoid_balance.yaml", "humanoid_walk.yaml", "two_humanoids.yaml"]
 
 
-@pytest.mark.parametrize("file", BEGIN_AS_A_RUN)
-def test_a_motion_begins_as_in_a_run_to_the_bit(file: str) -> None:
-    parts = make_cast(given(file, SIMULATOR)).parts
+@pytest.mark.parametrize("file", MOTIONS)
+def test_the_file_of_a_motion_holds_no_state(file: str) -> None:
+    parameters = given(file, SIMULATOR)
 
-    for part, node in zip(parts, controllers(file), strict=True):
-        settings = given(file, node)
-        character = settings.pop("character")
-        run = make_plan(character, 1.0, {}, {}, settings).simulator
-        for name in ("initial_position", "initial_velocity", "commanded_joints"):
-            assert part.values[name] == run[name]
+    assert not [name for name in parameters if "initial_pos" in name or "initial_vel" in name]
+    assert all(begins_with_reference(part.values) for part in make_cast(parameters).parts)
 
 
 # What they do
 
 
-def start(processes: Processes, file: str, node: str) -> Process:
-    """Start a node, given by its full name, with a file."""
+def start(processes: Processes, file: str, node: str, **more: object) -> Process:
+    """Start a node, given by its full name, with a file, and parameters beside it."""
     namespace, _, name = node.rpartition("/")
     arguments = ["--ros-args", "--params-file", str(CONFIG / file)]
+    for parameter, value in more.items():
+        arguments += ["-p", f"{parameter}:={value}"]
     arguments += ["-r", f"__ns:={namespace}"] if namespace else []
     return processes.python("-m", MODULES[name], *arguments)
 
 
-WAITING = "[sim_node]: waiting for commands of"  # rightly, where controllers take long to start
+WAITING = "[sim_node]: waiting for "  # rightly, where controllers take long to start
+
+
+def complaints(nodes: Iterable[Process]) -> list[str]:
+    said = [line for node in nodes for line in node.stderr.splitlines()]
+    return [line for line in said if WAITING not in line]
 
 
 def have_been_answered(states: Inbox) -> bool:
@@ -135,7 +149,7 @@ def have_been_answered(states: Inbox) -> bool:
     return len(stamps) >= A_FEW_TICKS and any(any(state.effort) for state in states.messages)
 
 
-@pytest.mark.parametrize("file", NODES)
+@pytest.mark.parametrize("file", sorted(NODES.keys() - MOTIONS))  # those are recorded below
 def test_the_nodes_start_with_a_file_and_run(
     processes: Processes, client: SimulatorClient, file: str
 ) -> None:
@@ -146,8 +160,7 @@ def test_the_nodes_start_with_a_file_and_run(
 
     client.spin_until(lambda: all(map(have_been_answered, states)), "states that were answered")
     assert [node.exit_code for node in nodes] == [None] * len(nodes)
-    said = [line for node in nodes for line in node.stderr.splitlines()]
-    assert [line for line in said if WAITING not in line] == []
+    assert complaints(nodes) == []
 
 
 def test_a_file_is_for_any_namespace(processes: Processes, client: SimulatorClient) -> None:
@@ -171,46 +184,114 @@ def test_what_is_set_beside_a_file_counts_more_than_the_file(
     assert list(client.first_state().position) == [0.25]
 
 
-@pytest.mark.parametrize(
-    ("file", "prefix"), [("humanoid_walk.yaml", ""), ("two_humanoids.yaml", "right.")]
-)
-def test_ros_reads_the_initial_state_to_the_bit(
-    processes: Processes, client: SimulatorClient, file: str, prefix: str
-) -> None:
-    names = [prefix + name for name in ("initial_position", "initial_velocity")]
+@dataclass(frozen=True)
+class Ending:
+    """What a character of a file comes to."""
 
-    start(processes, file, SIMULATOR)
-
-    values = client.get_parameters("sim_node", names)
-    assert [list(value) for value in values] == [given(file, SIMULATOR)[name] for name in names]
+    position: FloatArray  # (n,) the last one
+    state_hash: str
 
 
-def end_of(parts: Sequence[Part]) -> dict[str, FloatArray]:
-    """Positions to which characters of `two_humanoids.yaml` come together in one world."""
-    file, drivers = "two_humanoids.yaml", list[Controller]()
+def ends_of(file: str, parts: Sequence[Part]) -> dict[str, Ending]:
+    """What characters of a file come to, together in one world, without ROS."""
+    drivers, states = list[Controller](), dict[str, StampedState]()
     for part in parts:
-        character, values = controller_values(file, f"/{part.name}{CONTROLLER}")
-        reference = make_motion(character, values).reference
-        drivers.append(for_controller.make_controller(character, reference, values))
+        node = f"/{part.name}{CONTROLLER}" if part.name else CONTROLLER
+        character, values = controller_values(file, node)
+        motion = make_motion(character, values)
+        drivers.append(for_controller.make_controller(character, motion.reference, values))
+        states[part.name] = motion.first_state()
     roles = [make_role(part.character, part.values, part.name) for part in parts]
+    hashes = {part.name: StateHash() for part in parts}
     with Simulation(roles, make_settings(parts[0].values)) as simulation:
+        simulation.begin_in(states)
         begin_ns = simulation.stamp_ns
-        for _ in range(MEETING_TICKS):
-            simulation.step(
-                [
-                    driver.answer(actor.state, begin_ns)[0]
-                    for driver, actor in zip(drivers, simulation.actors, strict=True)
-                ]
-            )
-        return {actor.role.name: actor.state.position for actor in simulation.actors}
+        for tick in range(TICKS + 1):
+            for actor in simulation.actors:
+                hashes[actor.role.name].add(actor.state)
+            if tick < TICKS:
+                simulation.step(
+                    [
+                        np.where(actor.commanded, driver.answer(actor.state, begin_ns)[0], 0.0)
+                        for driver, actor in zip(drivers, simulation.actors, strict=True)
+                    ]
+                )
+        return {
+            actor.role.name: Ending(actor.state.position, hashes[actor.role.name].hexdigest())
+            for actor in simulation.actors
+        }
+
+
+@cache
+def ends_of_two() -> dict[str, Ending]:
+    return ends_of("two_humanoids.yaml", make_cast(given("two_humanoids.yaml", SIMULATOR)).parts)
 
 
 def test_two_humanoids_push_each_other() -> None:
-    parts = make_cast(given("two_humanoids.yaml", SIMULATOR)).parts
+    file = "two_humanoids.yaml"
+    parts = make_cast(given(file, SIMULATOR)).parts
 
-    together = end_of(parts)
-    alone = {part.name: end_of([part])[part.name] for part in parts}
+    together = ends_of_two()
+    alone = {part.name: ends_of(file, [part])[part.name] for part in parts}
 
     assert together.keys() == set(SIDES)
-    for name, position in together.items():
-        assert np.linalg.norm(position[:3] - alone[name][:3]) > A_PUSH
+    for name, ending in together.items():
+        assert np.linalg.norm(ending.position[:3] - alone[name].position[:3]) > A_PUSH
+
+
+# The states of a run
+
+
+def record(processes: Processes, folder: Path, file: str, order: Sequence[str]) -> dict[str, str]:
+    """Let a file's nodes run, started in an order; the hashes of the states of its characters."""
+    cast = make_cast(given(file, SIMULATOR))
+    listening = {"directory": str(folder / "run"), "characters": list(cast.names)}
+    recorder = processes.node(topics.RECORDER_NODE, **listening)
+    more: dict[str, object] = {"wait_for_subscribers": 2}  # controller, or simulator, and recorder
+    started = {}
+    for node in order:
+        ends = {"max_ticks": TICKS} if node == SIMULATOR else {}
+        started[node] = start(processes, file, node, **more, **ends)
+    assert started[SIMULATOR].wait() == 0
+    recorder.send(signal.SIGINT)
+    assert recorder.wait() == 0
+    assert complaints(started.values()) == []
+    return {part.name: hash_in(folder / "run" / part.name) for part in cast.parts}
+
+
+def hash_in(directory: Path) -> str:
+    summary = json.loads((directory / "summary.json").read_text())
+    assert summary["ticks"] == TICKS
+    return str(summary["state_hash"])
+
+
+@pytest.mark.parametrize("file", MOTIONS[:2])
+def test_the_nodes_of_a_file_have_the_states_of_a_run(
+    processes: Processes, tmp_path: Path, file: str
+) -> None:
+    settings = given(file, CONTROLLER)
+    character = settings.pop("character")
+    plan = make_plan(character, TICKS / settings["rate"], {}, {}, settings)
+    run = StateHash()
+    for number, tick in enumerate(ticks_in_process(plan)):
+        for state in (tick.state, tick.following)[number > 0 :]:
+            run.add(state)
+
+    found = record(processes, tmp_path, file, NODES[file])
+
+    assert found == {"": run.hexdigest()}
+    assert replay(read_recordings(tmp_path / "run")).state_hashes == found
+    again = replay_commands(tmp_path / "run", progress=lambda done: None, tell=pytest.fail)
+    assert again.state_hashes == found
+
+
+@pytest.mark.parametrize("turns", range(3))
+def test_the_states_of_two_humanoids_do_not_depend_on_who_starts_first(
+    processes: Processes, tmp_path: Path, turns: int
+) -> None:
+    file = "two_humanoids.yaml"
+    order = [*NODES[file][turns:], *NODES[file][:turns]]
+
+    found = record(processes, tmp_path, file, order)
+
+    assert found == {name: ending.state_hash for name, ending in ends_of_two().items()}

@@ -428,6 +428,10 @@ WRONG: dict[str, tuple[tuple[str, ...], list[str]]] = {
     "duration": (("run", "--character", "pendulum", "--duration", "0"), ["duration", "0.0 s"]),
     "duration is no number": (("run", "--character", "pendulum", "--duration", "nan"), ["nan"]),
     "end": (setting("sim_node.max_ticks:=0"), ["'max_ticks'", "--duration"]),
+    "initial state": (
+        setting("sim_node.initial_state:=reference"),
+        ["'initial_state'", "the run itself", "initial_position"],
+    ),
     "two rates": (
         (*setting("sim_node.rate:=240"), "--set", "controller_node.rate:=480"),
         ["'rate'", "240", "480"],

@@ -24,6 +24,7 @@ _OF_EACH = [
     topics.ROBOT_DESCRIPTION,
     topics.CONFIGURATION.of(topics.SIM_NODE),
     topics.CONFIGURATION.of(topics.CONTROLLER_NODE),
+    topics.INITIAL_STATE.of(topics.CONTROLLER_NODE),
     topics.EXTERNAL_WRENCH,
     topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE),
     topics.ACTIVE_TRAJECTORY.of(topics.CONTROLLER_NODE),
