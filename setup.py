@@ -10,10 +10,9 @@ SHARED = {"launch": "*.launch.py", "config": "*.yaml", "examples": "*.py"}
 
 setup(
     name=PACKAGE,
-    version="0.1.0",
+    version="0.2.0",
     description="Physically simulated characters, actuated by torques over ROS 2 topics.",
     maintainer="actuated_characters developers",
-    maintainer_email="maintainers@example.org",
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),

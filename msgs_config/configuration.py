@@ -2,10 +2,8 @@
 
 import json
 import math
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +16,7 @@ from msgs_config.joint_layout import JointLayout, JointType
 from msgs_config.meshes import collision_meshes
 from msgs_config.parameters import Value, Values
 from msgs_config.probe import Probe, read_probe
-
-_PACKAGES = ["actuated_characters", "pybullet", "mujoco-core", "numpy", "ros-jazzy-rclpy"]
+from msgs_config.versions import installed_versions, read_versions
 
 
 def describe(
@@ -62,7 +59,7 @@ def describe(
         "actuation": None if actuation is None else dict(actuation),
         "parameters_after_stamp_ns": since_ns,
         "parameters": {name: _finite(value) for name, value in values.items()},
-        "versions": {"python": platform.python_version()} | _versions(),
+        "versions": installed_versions(),
     }
     return json.dumps(content, allow_nan=False)
 
@@ -70,16 +67,6 @@ def describe(
 def _finite(value: Value) -> Value | None:
     """What JSON can say: no limit is null, not infinity."""
     return None if isinstance(value, float) and math.isinf(value) else value
-
-
-def _versions() -> dict[str, str]:
-    versions = {}
-    for package in _PACKAGES:
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:  # a ROS install has some of them from elsewhere
-            versions[package] = "unknown"
-    return versions
 
 
 @dataclass(frozen=True)
@@ -92,6 +79,7 @@ class RunConfiguration:
     mass: float  # kg
     parameters: dict[str, Any]
     probe: Probe | None = None  # absent where another simulator than ours speaks
+    versions: dict[str, str] = field(default_factory=dict)  # of what it runs with
 
 
 def parse(text: str) -> RunConfiguration:
@@ -113,6 +101,7 @@ def parse(text: str) -> RunConfiguration:
             mass=float(content["mass"]),
             parameters=dict(content["parameters"]),
             probe=None if probe is None else read_probe(probe, layout.size),
+            versions=read_versions(content.get("versions")),
         )
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError, LayoutError) as error:
         raise MessageError("not a simulator's configuration") from error

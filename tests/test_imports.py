@@ -71,6 +71,7 @@ KNOW_NO_ROS = [
     "msgs_config.rotations",
     "msgs_config.throw",
     "msgs_config.tick_clock",
+    "msgs_config.versions",
     "sim_node.actor",
     "sim_node.aim",
     "sim_node.back_pressure",

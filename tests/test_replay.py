@@ -442,7 +442,7 @@ def test_terrain_lies_in_the_recording(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("parameters", "reason"),
-    [({"rate": "often"}, "cannot be built anew"), ({"turbo": 1}, "unknown parameter")],
+    [({"rate": "often"}, "cannot be built again"), ({"turbo": 1}, "unknown parameter")],
 )
 def test_a_simulator_of_another_kind_is_told(
     pendulum: Recording, parameters: Mapping[str, object], reason: str

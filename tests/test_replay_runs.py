@@ -1,21 +1,26 @@
 """What real nodes have done and a recorder has heard comes again, to the last bit."""
 
+import dataclasses
 import json
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rclpy.serialization import serialize_message
 from rewriting import rewrite, with_flipped_effort
 from ros import Process, Processes, SimulatorClient, tick_of
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from test_sim_services import begin_steps, response_of
 
+from experiment.bags.reader import RecordedMessage
 from experiment.bags.recording import read_recording, read_recordings
 from experiment.replay.replay import replay
 from msgs_config import topics
 from msgs_config.errors import RecordingError
+from msgs_config.versions import installed_versions
 
 LOWEST, LARGEST = 0, 62  # bits
 
@@ -243,3 +248,69 @@ def test_the_command_says_so(walk: Path, processes: Processes, tmp_path: Path) -
     (line,) = [line for line in bad.stderr.splitlines() if line.startswith("error")]
     assert "tick 102" in line and "effort of 'right_knee' was" in line
     assert "N m was commanded" in line
+    assert "recorded with" not in line
+
+
+def with_versions(bag: Path, target: Path, change: Callable[[dict[str, str]], object]) -> Path:
+    """Copy a bag with other versions in the simulator's configuration: None for none at all."""
+
+    def altered(message: RecordedMessage) -> bytes:
+        if not message.topic.endswith("sim_node/configuration"):
+            return message.raw
+        content = json.loads(message.decode().data)
+        content["versions"] = change(content["versions"])
+        if content["versions"] is None:
+            del content["versions"]
+        return bytes(serialize_message(String(data=json.dumps(content))))
+
+    return rewrite(bag, target, altered)
+
+
+def with_another_command(bag: Path, target: Path) -> Path:
+    """Copy a bag with a number in it that makes a replay differ."""
+    stamp_ns = int(read_recording(bag).stamps_ns[100])
+    return with_flipped_effort(
+        bag, target, topic="joint_torques", stamp_ns=stamp_ns, name="right_knee", bit=1
+    )
+
+
+def test_other_versions_are_named_beside_the_first_tick_that_differs(
+    walk: Path, processes: Processes, tmp_path: Path
+) -> None:
+    others = {"numpy": "1.0.0", "actuated_characters": "0.1.0"}
+    same = with_versions(walk / "bag", tmp_path / "same", lambda now: {**now, **others})
+    bad = with_another_command(same, tmp_path / "bad")
+
+    commands = [processes.command(*words) for words in (("replay", str(bad)), ("info", str(bad)))]
+    good = processes.command("replay", str(same))
+
+    assert [*(command.wait() for command in commands), good.wait()] == [1, 0, 0]
+    (line,) = [line for line in commands[0].stderr.splitlines() if line.startswith("error")]
+    present = installed_versions()
+    assert "tick 102" in line
+    assert line.endswith(
+        f"; recorded with actuated_characters 0.1.0 (now {present['actuated_characters']}), "
+        f"numpy 1.0.0 (now {present['numpy']})"
+    )
+    shown = " ".join(commands[1].stdout.split())
+    assert "numpy 1.0.0" in shown and f"libc {present['libc']}" in shown
+    assert "identical" in good.stdout and "recorded with" not in good.stdout + good.stderr
+
+
+def test_a_bag_that_says_no_versions_is_read(walk: Path, tmp_path: Path) -> None:
+    old = with_versions(walk / "bag", tmp_path / "old", lambda now: None)
+
+    (recording,) = read_recordings(old)
+
+    assert recording.versions == {}
+    assert replay([recording]).difference is None
+
+
+def test_a_simulator_of_another_version_is_named_where_it_cannot_be_built_again(
+    walk: Path, tmp_path: Path
+) -> None:
+    newer = with_versions(walk / "bag", tmp_path / "bag", lambda now: {**now, "numpy": "99.0"})
+    (recording,) = read_recordings(newer)
+
+    with pytest.raises(RecordingError, match=r"'turbo'.*; recorded with numpy 99\.0 \(now "):
+        replay([dataclasses.replace(recording, parameters={**recording.parameters, "turbo": 1})])

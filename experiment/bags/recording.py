@@ -69,6 +69,7 @@ class Recording:
     character: Character  # as it stood there, made from the texts in the bag
     name: str = ""  # its topics' namespace without the leading slash
     parameters: Mapping[str, Any] = field(repr=False)  # the simulator's
+    versions: Mapping[str, str] = field(default_factory=dict, repr=False)  # it ran with them
     stamps_ns: IntArray  # (t + 1,): each state once, in order, no tick left out
     published_ns: IntArray  # (t + 1,): wall time of each state, as the bag has it
     position: FloatArray  # (t + 1, n)
@@ -253,6 +254,7 @@ def _recording(track: Track, worlds: Mapping[str, WorldTrack]) -> Recording:
         character=rebuilt.character,
         name=track.namespace,
         parameters=rebuilt.known.parameters,
+        versions=rebuilt.known.versions,
         stamps_ns=stamps,
         published_ns=integers(states.published_ns),
         position=matrix(states.position, size, count),

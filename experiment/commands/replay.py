@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from experiment.commands.progress import progress_bar
 from experiment.commands.replay_topics import add_through_topics, replay_through_topics
-from experiment.commands.replay_verdict import verdict
+from experiment.commands.replay_verdict import difference_error, verdict
 from msgs_config.errors import ConfigurationError, ReplayError
 
 if TYPE_CHECKING:  # they take a second to import
@@ -66,7 +66,7 @@ def _replay(options: argparse.Namespace) -> None:
     for note in result.notes:
         print(f"note: {note}")
     if result.difference is not None:
-        raise ReplayError(f"{options.bag}: {result.difference}")
+        raise difference_error(options.bag, recordings, result.difference)
     if tolerance is None:
         _check_summaries(options.bag, recordings, result)
     simulated = max(float(recording.times[-1]) for recording in recordings)

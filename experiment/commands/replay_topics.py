@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.table import Table
 
 from experiment.commands.progress import progress_bar
-from experiment.commands.replay_verdict import named, verdict
+from experiment.commands.replay_verdict import difference_error, named, verdict
 from experiment.commands.settings import node_settings
-from msgs_config.errors import ConfigurationError, ReplayError
+from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # they take a second to import
     from experiment.bags.recording import Recording
@@ -93,7 +93,7 @@ def _replay_commands(options: argparse.Namespace) -> None:
         for note in result.notes:
             print(f"note: {note}")
         if result.difference is not None:
-            raise ReplayError(f"{options.bag}: {result.difference}")
+            raise difference_error(options.bag, together, result.difference)
         tail = f"through topics in {time.monotonic() - started:.1f} s"
         print(verdict(together, result, options.tolerance, tail))
 
@@ -139,7 +139,7 @@ def _tell(options: argparse.Namespace, recording: "Recording", findings: "Comman
     elif options.set:  # they are to differ
         print(f"first difference: {first}")
     else:
-        raise ReplayError(f"{options.bag}: {first}")
+        raise difference_error(options.bag, [recording], first)
 
 
 def _table(findings: "CommandFindings") -> Table:

@@ -1,7 +1,11 @@
-"""What the two ways of `replay` say of a run whose states came again."""
+"""What the ways of `replay` say of a run whose states came again, or did not."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+from msgs_config.errors import ReplayError
+from msgs_config.versions import describe_changes, installed_versions
 
 if TYPE_CHECKING:  # they take a second to import
     from experiment.bags.recording import Recording
@@ -23,6 +27,15 @@ def verdict(
         return f"identical: {head}, state hash {hashes}; {tail}"
     largest = ", ".join(f"{value:.3g} {unit}" for unit, value in sorted(result.largest.items()))
     return f"within {tolerance:g}: {head}, largest differences {largest}; {tail}"
+
+
+def difference_error(
+    bag: Path, recordings: "Sequence[Recording]", difference: object
+) -> ReplayError:
+    """An error of one line: what differs first, and which versions are others than then."""
+    present = installed_versions()
+    changes = dict.fromkeys(describe_changes(each.versions, present) for each in recordings)
+    return ReplayError("; ".join(filter(None, [f"{bag}: {difference}", *changes])))
 
 
 def named(recording: "Recording") -> str:

@@ -13,6 +13,7 @@ from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import RATE
 from msgs_config.tick_clock import TickClock
+from msgs_config.versions import describe_changes, installed_versions
 from msgs_config.wrench_messages import WrenchArrays
 from sim_node.actor import Role
 from sim_node.parameters import PARAMETERS, character_parameters, make_role, make_settings
@@ -56,7 +57,12 @@ def simulator_values(recording: Recording) -> Values:
     try:
         return resolve(PARAMETERS + character_parameters(recording.character), given)
     except ActuatedCharactersError as error:
-        raise RecordingError(f"the recording's simulator cannot be built anew: {error}") from error
+        changes = describe_changes(recording.versions, installed_versions())
+        raise RecordingError(
+            "; ".join(
+                filter(None, [f"the recording's simulator cannot be built again: {error}", changes])
+            )
+        ) from error
 
 
 def make_simulation(together: Sequence[Recording], first_stamp_ns: int) -> Simulation:

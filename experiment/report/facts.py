@@ -24,6 +24,7 @@ from experiment.report.timing import lateness, pauses, state_times, wall_steps
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
+from msgs_config.versions import read_versions
 
 _PERCENTILES = (50, 99)
 _HIGHEST_RATE = 100_000  # Hz
@@ -108,8 +109,6 @@ def _stream(name: str, messages: StateMessages) -> StreamFacts:
     parameters = said.get("parameters")
     parameters = parameters if isinstance(parameters, dict) else {}
     rate = parameters.get("rate")
-    versions = said.get("versions")
-    versions = versions if isinstance(versions, dict) else {}
     known: dict[str, Any] = {
         "name": name,
         "character": _text(said.get("character")),
@@ -117,7 +116,7 @@ def _stream(name: str, messages: StateMessages) -> StreamFacts:
         "mass": number(said.get("mass")),
         "rate_hz": rate if isinstance(rate, int) and 0 < rate <= _HIGHEST_RATE else None,
         "mode": _text(parameters.get("mode")),
-        "versions": {str(package): str(version) for package, version in versions.items()},
+        "versions": read_versions(said.get("versions")),
         "states": len(messages.stamps_ns),
     }
     if known["rate_hz"] is None or not known["states"]:

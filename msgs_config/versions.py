@@ -1,0 +1,40 @@
+"""Versions of what the last bits of a run depend on: this package, engines, Python, C library."""
+
+import platform
+from collections.abc import Mapping
+from importlib import metadata
+
+_PACKAGES = ("actuated_characters", "pybullet", "mujoco-core", "numpy", "ros-jazzy-rclpy")
+_UNKNOWN = "unknown"
+
+
+def installed_versions() -> dict[str, str]:
+    """The versions in this process, by name; `unknown` where nothing says it."""
+    versions = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:  # a ROS install has some of them from elsewhere
+            versions[package] = _UNKNOWN
+    versions["libc"] = " ".join(filter(None, platform.libc_ver())) or _UNKNOWN
+    return versions
+
+
+def read_versions(content: object) -> dict[str, str]:
+    """The versions that a `~/configuration` says; none of it, or of something else, is no error."""
+    if not isinstance(content, dict):
+        return {}
+    return {str(name): str(version) for name, version in content.items()}
+
+
+def describe_changes(recorded: Mapping[str, str], present: Mapping[str, str]) -> str:
+    """A part of a sentence that names each version that is another one now; empty if none is.
+
+    What is unknown on one side cannot be compared.
+    """
+    changes = [
+        f"{name} {before} (now {present[name]})"
+        for name, before in recorded.items()
+        if _UNKNOWN not in (before, present.get(name, _UNKNOWN)) and before != present[name]
+    ]
+    return f"recorded with {', '.join(changes)}" if changes else ""
