@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import yaml
 
 from experiment.metrics import COLUMNS
+from experiment.whole_files import part_of, write_whole, writing
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import RecordingError, RunError
 
@@ -28,6 +30,7 @@ def prepare_directory(directory: Path, *, overwrite: bool) -> None:
     """
     names = (BAG, DAMAGED, PARAMETERS, LOGS, SUMMARY, SERIES, PLOT, STRIP, VIDEO, REPORT)
     results = [directory / name for name in names]
+    results += [part_of(path) for path in results]  # of a run that was killed
     try:
         present = set(directory.iterdir()) if directory.exists() else set()
         if present - set(results):
@@ -54,28 +57,30 @@ def figures_directory(run: Path, namespace: str, *, is_alone: bool) -> Path:
 
 
 def write_figures(directory: Path, summary: dict[str, object], series: FloatArray) -> None:
-    """Write `summary.json`, and `measurements.csv` with a line of column names.
+    """Write `measurements.csv` with a line of column names, and then `summary.json`, each whole.
 
     Raises:
         RecordingError: the directory cannot be written to.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(summary, indent=2) + "\n"
-        (directory / SUMMARY).write_text(text, encoding="utf-8")
-        header = ",".join(COLUMNS)
-        np.savetxt(
-            directory / SERIES, series, delimiter=",", header=header, comments="", fmt="%.9g"
-        )
     except OSError as error:
-        raise RecordingError(f"cannot write the figures: {error}") from error
+        raise RecordingError(f"cannot write to {directory}: {error.strerror or error}") from error
+    header = ",".join(COLUMNS)
+    with writing(directory / SERIES) as part:
+        np.savetxt(part, series, delimiter=",", header=header, comments="", fmt="%.9g")
+    write_whole(directory / SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
 def write_parameters(directory: Path, name: str, parameters: Mapping[str, object]) -> Path:
-    """Write a node's parameter file, as `--params-file` takes it; returns its path."""
+    """Write a node's parameter file, as `--params-file` takes it; returns its path.
+
+    Raises:
+        RecordingError: it cannot be written.
+    """
     file = directory / PARAMETERS / f"{name}.yaml"
     content = {name: {"ros__parameters": dict(parameters)}}
-    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    write_whole(file, yaml.safe_dump(content))
     return file
 
 
@@ -94,7 +99,11 @@ def read_figures(directory: Path) -> tuple[dict[str, Any], FloatArray]:
 
 
 def plot_figures(directory: Path) -> None:
-    """Draw errors and efforts of a run over time into `plot.png`."""
+    """Draw errors and efforts of a run over time into `plot.png`.
+
+    Raises:
+        RecordingError: there are none, or it cannot be written.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
@@ -119,5 +128,7 @@ def plot_figures(directory: Path) -> None:
         panel.legend(loc="upper right", fontsize="small")
     panels[-1].set_xlabel("simulation time (s)")
     figure.suptitle(f"{summary['character']}, {summary['ticks']} ticks")
-    figure.savefig(directory / PLOT, dpi=110)
+    content = BytesIO()
+    figure.savefig(content, format="png", dpi=110)
     pyplot.close(figure)
+    write_whole(directory / PLOT, content.getvalue())

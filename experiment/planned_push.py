@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from experiment.plan import Plan
+from experiment.whole_files import write_whole
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.tick_clock import TickClock
 from msgs_config.wrench_messages import WrenchArrays
@@ -85,7 +86,7 @@ def _parts(text: str) -> tuple[str, tuple[float, float, float], float]:
 def write_pushes(file: Path, pushes: Sequence[PlannedPush]) -> None:
     """Write pushes for the node to send, the first one first."""
     in_order = sorted(pushes, key=lambda push: push.stamp_ns)
-    file.write_text(json.dumps([asdict(push) for push in in_order], indent=1), encoding="utf-8")
+    write_whole(file, json.dumps([asdict(push) for push in in_order], indent=1))
 
 
 def read_pushes(file: Path) -> list[PlannedPush]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from controller_node.behaviours.posture import Posture
 from experiment.plan import Plan
+from experiment.whole_files import write_whole
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
@@ -190,7 +191,7 @@ def plan_throws(plan: Plan, texts: Sequence[str]) -> tuple[list[PlannedThrow], l
 def write_throws(file: Path, throws: Sequence[PlannedThrow]) -> None:
     """Write throws for the node to send, the first one first."""
     in_order = sorted(throws, key=lambda throw: throw.stamp_ns)
-    file.write_text(json.dumps([asdict(throw) for throw in in_order], indent=1), encoding="utf-8")
+    write_whole(file, json.dumps([asdict(throw) for throw in in_order], indent=1))
 
 
 def read_throws(file: Path) -> list[PlannedThrow]:

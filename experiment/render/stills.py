@@ -10,6 +10,7 @@ from matplotlib.image import imsave
 from experiment.bags.recording import Recording
 from experiment.render.captions import captioned
 from experiment.render.scene import make_scene, nearest_rows
+from experiment.whole_files import write_whole
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -163,10 +164,7 @@ def save_png(picture: Picture, path: Path) -> None:
     """
     content = BytesIO()
     imsave(content, picture, format="png")
-    try:
-        path.write_bytes(content.getvalue())
-    except OSError as error:
-        raise RecordingError(f"cannot write picture {path}: {error.strerror}") from error
+    write_whole(path, content.getvalue())
 
 
 def _rows(known: FloatArray, times: Sequence[float] | int) -> IntArray:

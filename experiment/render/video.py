@@ -1,10 +1,11 @@
 """Writes pictures as a video: H.264 in MP4, as browsers and slides play it."""
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiment.whole_files import replacing
 from msgs_config.errors import ConfigurationError, RecordingError
 from sim_node.camera import Picture
 from sim_node.stage import Size
@@ -39,7 +40,7 @@ def write_video(path: Path, pictures: Iterable[Picture], size: Size, fps: int) -
         RecordingError: the file cannot be written.
     """
     check_video(size, fps)
-    with _unfinished(path) as part, _writing(path):
+    with replacing(path) as part, _writing(path):
         import av
 
         with av.open(str(part), "w", format="mp4", options={"movflags": "+faststart"}) as video:
@@ -101,15 +102,3 @@ def _writing(path: Path) -> Iterator[None]:
     except (OSError, av.FFmpegError) as error:
         reason = error.strerror or str(error)
         raise RecordingError(f"cannot write video {path}: {reason}") from error
-
-
-@contextmanager
-def _unfinished(path: Path) -> Iterator[Path]:
-    """A name for the file beside its own, which it gets at the end; otherwise nothing is left."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        yield part
-        part.replace(path)
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)

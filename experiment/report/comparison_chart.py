@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from experiment.report.comparison import Comparison
 from experiment.report.decimation import decimated
 from experiment.studies.plots import label, make_panels
-from msgs_config.errors import RecordingError
+from experiment.whole_files import write_whole
 
 _SIZE = (11.0, 3.4)  # inches, of each character's panel
 _DPI = 110
@@ -57,7 +57,4 @@ def save_figure(figure: Figure, path: Path) -> None:
     """
     content = BytesIO()
     figure.savefig(content, format="png", dpi=_DPI)
-    try:
-        path.write_bytes(content.getvalue())
-    except OSError as error:
-        raise RecordingError(f"cannot write picture {path}: {error.strerror}") from error
+    write_whole(path, content.getvalue())

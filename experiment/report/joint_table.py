@@ -2,17 +2,16 @@
 
 import csv
 import math
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from experiment.bags.recording import Recording
+from experiment.whole_files import writing
 from msgs_config.errors import RecordingError
 
 _HEAD = ("time_s", "stamp_ns", "episode")
-_PART = ".part"
 
 
 def columns(recording: Recording, *, reference: bool) -> list[str]:
@@ -36,17 +35,10 @@ def write_joint_states(
         RecordingError: the file exists already, or cannot be written.
     """
     check_output(file, overwrite=overwrite)
-    part = file.with_name(file.name + _PART)
-    try:
-        with part.open("w", encoding="utf-8", newline="") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(columns(recording, reference=reference))
-            writer.writerows(_rows(recording, reference=reference))
-        os.replace(part, file)
-    except OSError as error:
-        raise RecordingError(f"cannot write {file}: {error.strerror}") from error
-    finally:
-        part.unlink(missing_ok=True)
+    with writing(file) as part, part.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns(recording, reference=reference))
+        writer.writerows(_rows(recording, reference=reference))
 
 
 def check_output(file: Path, *, overwrite: bool) -> None:

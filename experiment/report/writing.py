@@ -8,6 +8,7 @@ from experiment.figures import REPORT
 from experiment.report.contents import Contents, read_contents
 from experiment.report.page import GENERATOR, Chapter, Section, Table, render_page
 from experiment.report.sections import NAMES, STILLS, CharacterReport
+from experiment.whole_files import write_whole
 from msgs_config.errors import RecordingError
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 
@@ -113,7 +114,7 @@ def _write(directory: Path, old: list[Path], files: dict[str, bytes]) -> None:
         directory.mkdir(parents=True, exist_ok=True)
         for file in old:
             file.unlink()
-        for name, content in files.items():
-            (directory / name).write_bytes(content)
     except OSError as error:
         raise RecordingError(f"cannot write the report: {error}") from error
+    for name, content in files.items():
+        write_whole(directory / name, content)
