@@ -1,6 +1,7 @@
 """Files from outside: found by name, read as data with a limit on size, never evaluated."""
 
 import importlib.util
+import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -68,24 +69,59 @@ def parse_yaml_mapping(
     Raises:
         error: the text is no YAML, is too large, nests too deep, or holds no mapping.
     """
-    if len(text) > MAX_YAML_CHARACTERS:
-        raise error(f"{path}: larger than {MAX_YAML_CHARACTERS >> 10} KiB")
-    try:
-        content = yaml.load(text, _PlainLoader)
-    except (yaml.YAMLError, ValueError) as cause:  # ValueError: no such date, too many digits
-        where = getattr(cause, "problem_mark", None)
-        line = f", line {where.line + 1}" if where is not None else ""
-        problem = getattr(cause, "problem", None)
-        reason = f": {problem[:200]}" if problem else ""
-        raise error(f"{path}{line}: not valid YAML{reason}") from cause
+    content = parse_yaml(str(path), text, error)
     if not isinstance(content, dict):
         raise error(f"{path}: must hold a mapping")
     return content
 
 
-class _PlainLoader(yaml.SafeLoader):
-    """Plain data alone, and nothing by which a small text becomes deep or large."""
+def parse_yaml(place: str, text: str, error: type[ActuatedCharactersError]) -> Any:
+    """The value that a YAML text stands for; numbers are decimal, as in YAML 1.2 and JSON.
 
+    Args:
+        place: Where the text comes from, such as a file's path: an error begins with it.
+        text: The YAML text.
+        error: The class of the error.
+
+    Raises:
+        error: the text is no YAML, is too large, or nests too deep.
+    """
+    if len(text) > MAX_YAML_CHARACTERS:
+        raise error(f"{place}: larger than {MAX_YAML_CHARACTERS >> 10} KiB")
+    try:
+        return yaml.load(text, _PlainLoader)
+    except (yaml.YAMLError, ValueError) as cause:  # ValueError: a number of too many digits
+        where = getattr(cause, "problem_mark", None)
+        line = f", line {where.line + 1}" if where is not None else ""
+        problem = getattr(cause, "problem", None)
+        reason = f": {problem[:200]}" if problem else ""
+        raise error(f"{place}{line}: not valid YAML{reason}") from cause
+
+
+_TAG = "tag:yaml.org,2002:"
+_PLAIN_VALUES = {  # what a value without quotes is; anything else is a text
+    "null": (r"~|null|Null|NULL|", [*"~nN", ""]),
+    "bool": (
+        r"true|True|TRUE|false|False|FALSE|yes|Yes|YES|no|No|NO|on|On|ON|off|Off|OFF",
+        [*"tTfFyYnNoO"],
+    ),
+    "int": (r"[-+]?[0-9]+", [*"-+0123456789"]),
+    "float": (
+        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+        [*"-+0123456789."],
+    ),
+}
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Plain data alone, and nothing by which a small text becomes deep or large.
+
+    PyYAML follows YAML 1.1, where `1e-1` is a text, `010` is eight and `1:30` ninety. Here they
+    are 0.1, ten and a text, as in YAML 1.2; dates are texts as well.
+    """
+
+    yaml_implicit_resolvers: dict[str, list[Any]] = {}  # noqa: RUF012 (PyYAML's own name)
     _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
@@ -107,6 +143,11 @@ class _PlainLoader(yaml.SafeLoader):
         # a mapping that is merged (`<<`) is copied: ten merges of ten, a few times over, are
         # more than fits into memory. Left alone, the key `<<` is no valid one.
         pass
+
+
+for _kind, (_pattern, _first) in _PLAIN_VALUES.items():
+    _PlainLoader.add_implicit_resolver(_TAG + _kind, re.compile(rf"(?:{_pattern})\Z"), _first)
+_PlainLoader.add_constructor(f"{_TAG}int", lambda _, node: int(node.value))
 
 
 def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> ElementTree.Element:

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import yaml
-
+from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a while to import
@@ -27,10 +26,7 @@ def node_settings(texts: Sequence[str], nodes: Sequence[str]) -> dict[str, dict[
             raise ConfigurationError(f"--set {text}: write it as {node_name}.NAME:=VALUE")
         if node not in settings:
             raise ConfigurationError(f"--set {text}: {one_of('node', node, list(nodes))}")
-        try:
-            settings[node][parameter] = yaml.safe_load(value)
-        except (yaml.YAMLError, ValueError, RecursionError) as error:
-            raise ConfigurationError(f"--set {text}: the value is not valid YAML") from error
+        settings[node][parameter] = files.parse_yaml(f"--set {text}", value, ConfigurationError)
     return settings
 
 
