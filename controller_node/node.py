@@ -42,7 +42,7 @@ from msgs_config.process import StopSignal
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
 from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
-from msgs_config.warnings import Warnings
+from msgs_config.warnings import UNLOGGED, Warnings
 
 _FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge the last messages
 
@@ -291,6 +291,7 @@ class ControllerNode(Node):
             refused = {
                 "refused_trajectories": self._trajectories.refused,
                 "refused_strengths": self._strengths.refused,
+                UNLOGGED: self._warnings.unlogged,
             }
             self._diagnostics.publish({**self._counts, **refused, **times})
 

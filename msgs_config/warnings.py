@@ -1,26 +1,46 @@
-"""Warnings that are said once, though their cause may come again at every tick."""
+"""Warnings that are logged once, though their cause may come again at every tick."""
 
 from rclpy.node import Node
 
-_MOST_SAID = 100  # different ones, lest a hostile sender fill the memory and the log
+MOST_LOGGED = 100  # different sentences; a hostile sender must not fill the memory and the log
+UNLOGGED = "unlogged_warnings"  # the count's name in the diagnostics
 _LONGEST = 1000  # characters of a sentence, which may quote what was received
 
 
 class Warnings:
-    """A node's warnings, each sentence once."""
+    """A node's warnings, each sentence once; those beyond `MOST_LOGGED` are only counted."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._said: set[str] = set()
+        self._kinds: set[str] = set()
+        self._sentences: set[str] = set()
+        self.unlogged = 0
+        """How many were not logged because so many different ones were; repetitions count."""
 
     def say_once(self, sentence: str, kind: str = "") -> None:
-        """Log a sentence, unless it, or another one of its kind, was logged before."""
+        """Log a sentence, unless it, or another one of its kind, was logged before.
+
+        A kind is the caller's own word, of which there are few: those are always logged.
+        """
         if len(sentence) > _LONGEST:
             sentence = sentence[:_LONGEST] + " ..."
-        if not self.has_said(kind or sentence):
-            self._said.add(kind or sentence)
-            self._node.get_logger().warning(sentence)
+        logged, key = (self._kinds, kind) if kind else (self._sentences, sentence)
+        if key in logged:
+            return
+        if len(self._sentences) == MOST_LOGGED and not kind:
+            self._count()
+            return
+        logged.add(key)
+        self._node.get_logger().warning(sentence)
 
     def has_said(self, kind: str) -> bool:
-        """Whether a sentence of a kind was logged, or so many that no more are."""
-        return kind in self._said or len(self._said) >= _MOST_SAID
+        """Whether a sentence of a kind was logged."""
+        return kind in self._kinds
+
+    def _count(self) -> None:
+        if not self.unlogged:
+            self._node.get_logger().warning(
+                f"there were {MOST_LOGGED} different warnings; further ones are not logged, "
+                f"but counted ({UNLOGGED} in the diagnostics)"
+            )
+        self.unlogged += 1

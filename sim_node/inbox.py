@@ -55,7 +55,8 @@ class StampedInbox:
                 self.counts["accepted"] += 1
             except (MessageError, CommandError) as error:
                 self.counts["rejected"] += 1
-                kind = f"a {self._what} of the past" if isinstance(error, _PastError) else ""
+                past = f"a {self._what}{self._of} of the past"
+                kind = past if isinstance(error, _PastError) else ""
                 self._warnings.say_once(f"{self._what}{self._of} refused: {error}", kind)
 
     def forget(self) -> None:

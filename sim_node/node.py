@@ -16,7 +16,7 @@ from msgs_config.polling import Spinner
 from msgs_config.process import StopSignal
 from msgs_config.tick_clock import FIRST_TICK
 from msgs_config.topics import Outgoing
-from msgs_config.warnings import Warnings
+from msgs_config.warnings import UNLOGGED, Warnings
 from sim_node.back_pressure import BackPressure
 from sim_node.initial_state_topic import InitialStates
 from sim_node.lockstep import LockstepBarrier, Verdict
@@ -69,8 +69,8 @@ class SimNode(Node):
         self._simulation = Simulation(roles, make_settings(values))
         self._initial_states = InitialStates(self, cast, self._simulation)
         declare(self, self._initial_states.known, values)
-        self._ports = open_ports(self, cast, self._simulation)
         self._warnings = Warnings(self)
+        self._ports = open_ports(self, cast, self._simulation, self._warnings)
         self._world_port = WorldPort(self, self._simulation, self._warnings)
         self._clock_topic = topics.create_publisher(self, topics.CLOCK)
         self._max_ticks = values.integer("max_ticks")
@@ -249,11 +249,11 @@ class SimNode(Node):
     def _tell_conflicts(self) -> None:
         """Say who competes for a joint in real time, once for each, when their names are known."""
         for joint, port in self._conflicts.items():
-            if not port.warnings.has_said(joint):
+            if not self._warnings.has_said(joint):
                 senders = publisher_names(self, port.torques, wait_for_names=False)
                 if UNKNOWN_NODE not in senders:
                     sentence = describe_conflict(joint, port.torques, senders)
-                    port.warnings.say_once(f"{sentence}; the last one counts", kind=joint)
+                    self._warnings.say_once(f"{sentence}; the last one counts", kind=joint)
 
     def _look_at_the_clock(self) -> None:
         now = time.monotonic()
@@ -337,6 +337,7 @@ class SimNode(Node):
             "episode": self._simulation.episode,
             "paused": self._control.paused,
             "timeouts": self._timeouts,
+            UNLOGGED: self._warnings.unlogged,
         }
         values |= self._tick_times.summary() | self._pace.summary() | self._world_port.counts
         for port in self._ports:

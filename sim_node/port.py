@@ -30,7 +30,14 @@ Collector = LockstepBarrier | CommandHold
 class Port:
     """Takes what is sent to one character, and keeps it for the tick that it is for."""
 
-    def __init__(self, node: Node, actor: Actor, collector: Collector, outputs: Outputs) -> None:
+    def __init__(
+        self,
+        node: Node,
+        actor: Actor,
+        collector: Collector,
+        outputs: Outputs,
+        warnings: Warnings,
+    ) -> None:
         """Subscribe to the character's topics; `collector` judges its commands."""
         namespace = actor.role.name
         self.actor = actor
@@ -41,10 +48,10 @@ class Port:
         self._pushes = PushSchedule(actor.character)
         self._decoder = JointStateDecoder()
         self._commands = DirectSubscription(node, self.torques)
-        self.warnings = Warnings(node)
+        self._warnings = warnings
         self._of = f" for '{namespace}'" if namespace else ""
         wrench = topics.EXTERNAL_WRENCH.under(namespace)
-        self._wrenches = StampedInbox(node, wrench, "push", self._of, self.warnings)
+        self._wrenches = StampedInbox(node, wrench, "push", self._of, warnings)
 
     @property
     def push_counts(self) -> Counter[str]:
@@ -79,13 +86,13 @@ class Port:
             verdict = self.collector.offer(command.stamp_ns, indices, command.effort)
         except (MessageError, LayoutError, CommandError) as error:
             self.collector.count_rejected()
-            self.warnings.say_once(f"command{self._of} rejected: {error}")
+            self._warnings.say_once(f"command{self._of} rejected: {error}")
             return Verdict.REJECTED
         if verdict is Verdict.FUTURE or (command.stamp_ns == 0 and verdict is Verdict.STALE):
-            self.warnings.say_once(
+            self._warnings.say_once(
                 f"command{self._of} dropped: it answers {command.stamp_ns} ns, the state is of "
                 f"{self.collector.stamp_ns} ns; the stamp must be that of the state",
-                kind=f"a {verdict.value} command",
+                kind=f"a {verdict.value} command{self._of}",
             )
         return verdict
 
@@ -106,9 +113,9 @@ class Port:
         return self._pushes.take(tick)
 
 
-def open_ports(node: Node, cast: Cast, simulation: Simulation) -> list[Port]:
+def open_ports(node: Node, cast: Cast, simulation: Simulation, warnings: Warnings) -> list[Port]:
     """A port for each character."""
-    return [_open_port(node, actor, cast.values) for actor in simulation.actors]
+    return [_open_port(node, actor, cast.values, warnings) for actor in simulation.actors]
 
 
 def publish_configurations(ports: Iterable[Port], cast: Cast, world: WorldSettings) -> None:
@@ -130,11 +137,12 @@ def publish_configurations(ports: Iterable[Port], cast: Cast, world: WorldSettin
         )
 
 
-def _open_port(node: Node, actor: Actor, values: Values) -> Port:
+def _open_port(node: Node, actor: Actor, values: Values, warnings: Warnings) -> Port:
     names, commanded = actor.layout.dof_names, actor.commanded
     collector: Collector = LockstepBarrier(names, commanded)
     if is_realtime(values):
         collector = CommandHold(names, commanded, command_timeout_ns(values))
     for note in actor.notes:
         node.get_logger().warning(f"{actor.role.prefix}{note}")
-    return Port(node, actor, collector, Outputs(node, actor, display_ticks(values)))
+    outputs = Outputs(node, actor, display_ticks(values))
+    return Port(node, actor, collector, outputs, warnings)

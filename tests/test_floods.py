@@ -5,6 +5,7 @@ import signal
 from rclpy.context import Context
 from rclpy.serialization import serialize_message
 from ros import (
+    ControllerClient,
     Processes,
     SimulatorClient,
     assert_quiet,
@@ -16,6 +17,10 @@ from ros import (
 )
 
 from msgs_config import topics
+from msgs_config.tick_clock import TickClock
+from msgs_config.warnings import MOST_LOGGED
+
+CLOCK = TickClock(240)
 
 
 def test_a_flood_while_it_waits_takes_a_bounded_memory(
@@ -151,3 +156,47 @@ def test_a_controller_lives_through_simulators_that_come_and_go(
     assert all(run == runs[0] for run in runs)
     assert node.exit_code is None
     assert_quiet(node)
+
+
+def test_a_simulator_says_when_it_only_counts_further_warnings(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    simulator = processes.simulator()
+    state = client.first_state()
+
+    for number in range(MOST_LOGGED + 20):
+        client.command(stamp_ns(state), {f"unknown_{number}": 0.0})
+        client.get_parameters(topics.SIM_NODE, ["gravity"])  # it takes what has come
+    client.reported(rejected=MOST_LOGGED + 20, unlogged_warnings=20)
+    client.command(stamp_ns(state) * 2, {"hinge": 0.0})  # of another kind
+    client.reported(future=1, unlogged_warnings=20)
+
+    assert "unknown_99'" in simulator.stderr and "unknown_100'" not in simulator.stderr
+    assert simulator.stderr.count("further ones are not logged, but counted") == 1
+    assert "the stamp must be that of the state" in simulator.stderr
+    assert list(client.answer(state, {"hinge": 0.5}).effort) == [0.5]
+
+
+def test_a_controller_says_when_it_only_counts_further_warnings(
+    processes: Processes, simulator: ControllerClient
+) -> None:
+    node = processes.controller("pendulum")
+    diagnostics = simulator.listen(topics.DIAGNOSTICS)
+    simulator.ask(joint_state(CLOCK.stamp_ns(1), ["hinge"], [0.0], [0.0]))
+
+    for number in range(MOST_LOGGED + 20):
+        strange = joint_state(
+            CLOCK.stamp_ns(2), ["hinge", f"x_{number}"], [0.0] * 2, [0.0] * 2, [0.0] * 2
+        )
+        simulator.states.publish(strange)
+    simulator.spin_until(
+        lambda: any(
+            ("unlogged_warnings", "20") in {(item.key, item.value) for item in status.values}
+            for message in diagnostics.messages
+            for status in message.status
+        ),
+        "the count",
+    )
+
+    assert node.stderr.count("further ones are not logged, but counted") == 1
+    assert simulator.ask(joint_state(CLOCK.stamp_ns(2), ["hinge"], [0.1], [0.0], [0.0]))
