@@ -35,6 +35,7 @@ setup(
     # beside them, and a requirement that is not met stops a program that imports pkg_resources.
     install_requires=[
         "joblib>=1.4,<2",
+        "lz4>=4.0,<5",  # which rosbags needs as well
         "matplotlib>=3.6,<4",
         "mujoco-core==4.0.1",  # exactly: another engine may have other last bits
         "numpy>=1.26,<3",

@@ -5,15 +5,18 @@ Format: the MCAP specification, version 0.
 
 import struct
 from collections.abc import Iterator
+from os import SEEK_CUR
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from rosbags.rosbag2.storage_mcap import decompress
 
+from experiment.bags.limits import MOST_OF_CHUNK, LimitError
 from msgs_config.errors import RecordingError
 
 _MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F
+_READ = (_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK)
 _HEAD = struct.Struct("<BQ")  # of a record: its kind, and the length of what follows
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence number, log time, publish time
 _CHUNK_HEAD = struct.Struct("<QQQI")  # first and last log time, size of the records, checksum
@@ -52,6 +55,7 @@ class McapRecords:
 
     def __init__(self, file: Path) -> None:
         self.unreadable_bytes = 0
+        self.refusal = ""  # why some of them are not read, though they may be sound
         self.fraction = 0.0  # of the file that has been read
         self.is_compressed = False  # as far as it was read
         self._path = file
@@ -77,10 +81,20 @@ class McapRecords:
                 kind, length = _HEAD.unpack(head)
                 if kind in (_DATA_END, _FOOTER):
                     break
-                body = file.read(min(length, size - file.tell()))
+                left = min(length, size - file.tell())
+                if kind not in _READ or left > MOST_OF_CHUNK:
+                    self._skip(kind, left)
+                    file.seek(left, SEEK_CUR)
+                    continue
+                body = file.read(left)
                 self.fraction = file.tell() / size
                 yield from self._record(kind, body, whole=len(body) == length)
         self.fraction = 1.0
+
+    def _skip(self, kind: int, length: int) -> None:
+        if kind in _READ:
+            self.refusal = str(LimitError("a record", length, MOST_OF_CHUNK))
+            self.unreadable_bytes += length
 
     def channels(self) -> list[Channel]:
         """The topics that were announced, as far as the file was read."""
@@ -93,6 +107,8 @@ class McapRecords:
         file.seek(-_TAIL.size, 2)
         kind, length, start, _, _, magic = _TAIL.unpack(file.read())
         if (kind, length, magic) != (_FOOTER, 20, _MAGIC) or not 0 < start < size:
+            return
+        if size - start > MOST_OF_CHUNK:
             return
         file.seek(start)
         before = self.unreadable_bytes
@@ -127,7 +143,8 @@ class McapRecords:
         if whole:
             try:
                 packed = decompress(packed, compression, size, checksum)
-            except Exception:  # whatever its libraries raise for damaged bytes
+            except Exception as error:  # whatever its libraries raise for damaged bytes
+                self.refusal = str(error) if isinstance(error, LimitError) else self.refusal
                 self.unreadable_bytes += len(body)
                 return
         yield from self._records(packed)

@@ -1,27 +1,42 @@
 """Reads recordings: rosbag2 directories of serialised messages, without ROS' rosbag2."""
 
 import heapq
-import shutil
+import sqlite3
 import tempfile
-from collections.abc import Callable, Collection, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import ExitStack, closing
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from rclpy.serialization import deserialize_message
 from rosbags.interfaces import Connection, ConnectionExtRosbag2
 from rosbags.rosbag2 import Reader
-from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # the one that it found
-from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.rosbag2.storage_mcap import ChunkInfo, McapReader, msgsrc
 
+from experiment.bags.limits import (
+    MOST_OF_CHUNK,
+    MOST_OF_FILES,
+    MOST_SORTED,
+    Allowance,
+    LimitError,
+    check_message,
+    check_tables,
+    unpack_file,
+    unpack_message,
+)
 from experiment.bags.mcap_records import McapRecords
 from experiment.bags.metadata import CDR, FILE, MESSAGE, BagMetadata, read_metadata, recover_hint
 from experiment.bags.storage import SQLITE3, SUFFIXES, ZSTD_MAGIC, check_sqlite_path, reason
 from msgs_config.errors import RecordingError, one_of
 
 _ZSTD_SUFFIX = ".zstd"
+_LEAST_HELD = 200  # bytes that a message takes in memory beside its own
+
+Stored: TypeAlias = tuple[str, int, bytes, str]
+"""Topic, log time in ns, the message as it is stored, and type; without a topic only a time from
+which on there may be messages."""
 
 
 class RecordedMessage(NamedTuple):
@@ -80,26 +95,49 @@ def _messages(
     path: Path, topics: Collection[str] | None, stack: ExitStack
 ) -> Iterator[RecordedMessage]:
     metadata = BagMetadata((path,), (), "") if path.is_file() else read_metadata(path)
-    readers = [_open(path, file, metadata, stack) for file in metadata.files]
+    disk, memory = Allowance("its files", MOST_OF_FILES), Allowance("chunks", MOST_OF_CHUNK)
+    readers = [_open(path, file, metadata, stack, disk) for file in metadata.files]
     _check_topics(topics, readers, metadata)
-    unpack: Callable[[bytes], bytes] = _unpacked if path.is_file() else bytes
+    unpack: Callable[[bytes], bytes] = _unpacked if path.is_file() else check_message
     if metadata.compression_mode == MESSAGE:
-        unpack = zstd.decompress
-    streams = [_in_order(reader, topics) for reader in readers]
-    if len(streams) == 1:
-        merged = streams[0]
-    else:
-        merged = heapq.merge(*streams, key=lambda message: message.log_time_ns)
-    for topic, log_time_ns, raw, type_name in merged:
-        yield RecordedMessage(topic, log_time_ns, unpack(raw), type_name)
+        unpack = unpack_message
+    streams = [
+        _within_limits(path, Path(str(reader.path)), stream)
+        for reader in readers
+        for stream in _streams(reader, topics, memory)
+    ]
+    for topic, log_time_ns, stored, type_name in heapq.merge(*streams, key=lambda each: each[1]):
+        if topic:
+            try:
+                raw = unpack(stored)
+            except LimitError as error:
+                raise _refusal(path, f"on '{topic}' {error}") from error
+            yield RecordedMessage(topic, log_time_ns, raw, type_name)
 
 
-def _open(path: Path, file: Path, metadata: BagMetadata, stack: ExitStack) -> Reader:
+def _within_limits(path: Path, file: Path, stream: Iterator[Stored]) -> Iterator[Stored]:
+    """A stream of a file; what is too large in it, or damaged, is refused with the file's name."""
+    try:
+        yield from stream
+    except ValueError as error:  # LimitError is one
+        name = "" if path == file else f"{file.name}: "
+        raise _refusal(path, f"{name}{reason(error)}") from error
+
+
+def _refusal(path: Path, why: str) -> RecordingError:
+    return RecordingError(f"cannot read recording {path}: {why}{_hint(path)}")
+
+
+def _open(
+    path: Path, file: Path, metadata: BagMetadata, stack: ExitStack, disk: Allowance
+) -> Reader:
     """A file of a recording, decompressed if need be."""
     if not file.is_file():
         raise RecordingError(f"cannot read recording {path}: its file {file.name} is missing")
     if metadata.compression_mode == FILE and file.suffix == _ZSTD_SUFFIX:
-        file = _decompressed(file, Path(stack.enter_context(tempfile.TemporaryDirectory())))
+        copy = Path(stack.enter_context(tempfile.TemporaryDirectory())) / file.stem
+        unpack_file(file, copy, disk)
+        file = copy
     if file.suffix not in SUFFIXES.values():
         raise RecordingError(f"cannot read recording {path}: {file.name} is no .mcap or .db3 file")
     if file.suffix == SUFFIXES[SQLITE3]:
@@ -110,6 +148,8 @@ def _open(path: Path, file: Path, metadata: BagMetadata, stack: ExitStack) -> Re
                     f"cannot read recording {path}: {file.name} was never closed, a journal lies "
                     f"beside it; {recover_hint(path, 'makes it whole')}"
                 )
+        with closing(sqlite3.connect(f"file:{file}?immutable=1", uri=True)) as tables:
+            check_tables(tables)
     reader: Reader = stack.enter_context(Reader(file))
     for connection in reader.connections:
         extension = connection.ext
@@ -124,16 +164,7 @@ def _open(path: Path, file: Path, metadata: BagMetadata, stack: ExitStack) -> Re
 
 def _unpacked(raw: bytes) -> bytes:
     """A message of a file without metadata, which would say whether each is compressed."""
-    unpacked: bytes = zstd.decompress(raw) if raw.startswith(ZSTD_MAGIC) else raw
-    return unpacked
-
-
-def _decompressed(file: Path, directory: Path) -> Path:
-    """A copy of a file that was compressed as a whole."""
-    copy = directory / file.stem
-    with zstd.open(file, "rb") as source, copy.open("wb") as sink:
-        shutil.copyfileobj(source, sink)
-    return copy
+    return unpack_message(raw) if raw.startswith(ZSTD_MAGIC) else check_message(raw)
 
 
 def _check_topics(
@@ -146,16 +177,45 @@ def _check_topics(
             raise RecordingError(one_of("topic", topic, sorted(recorded)))
 
 
-def _in_order(reader: Reader, topics: Collection[str] | None) -> Iterator[RecordedMessage]:
-    """The messages of one file by log time."""
+def _streams(
+    reader: Reader, topics: Collection[str] | None, memory: Allowance
+) -> list[Iterator[Stored]]:
+    """The messages of one file, each stream by log time; chunks share what memory is allowed."""
     chosen = [each for each in reader.connections if topics is None or each.topic in topics]
     if not chosen:  # to rosbags an empty selection means everything
-        return
+        return []
     if _is_unindexed(reader):
-        yield from _sorted(Path(str(reader.path)), chosen)
-        return
+        return [_sorted(Path(str(reader.path)), chosen)]
+    storage = reader.storage
+    if isinstance(storage, McapReader):
+        return [
+            _chunk(storage, chunk, chosen, memory)
+            for chunk in storage.chunks
+            if any(chunk.channel_count.get(connection.id) for connection in chosen)
+        ]
+    return [_rows(reader, chosen)]
+
+
+def _rows(reader: Reader, chosen: Sequence[Connection]) -> Iterator[Stored]:
     for connection, log_time_ns, raw in reader.messages(chosen):
-        yield RecordedMessage(connection.topic, log_time_ns, raw, connection.msgtype)
+        yield connection.topic, log_time_ns, raw, connection.msgtype
+
+
+def _chunk(
+    storage: McapReader, chunk: ChunkInfo, chosen: Sequence[Connection], memory: Allowance
+) -> Iterator[Stored]:
+    """The time at which a chunk begins, and then, once that has come, its messages."""
+    assert storage.bio is not None
+    yield "", chunk.message_start_time, b"", ""
+    size = max(chunk.compressed_size, chunk.uncompressed_size)
+    memory.take(size)
+    channels = {connection.id: connection for connection in chosen}
+    end = chunk.message_end_time + 1
+    messages = msgsrc(chunk, channels, chunk.message_start_time, end, storage.bio)
+    for log_time_ns, _, connection, raw in messages:
+        if connection is not None and raw is not None:
+            yield connection.topic, log_time_ns, raw, connection.msgtype
+    memory.give_back(size)
 
 
 def _is_unindexed(reader: Reader) -> bool:
@@ -170,20 +230,18 @@ def _is_unindexed(reader: Reader) -> bool:
     )
 
 
-def _sorted(file: Path, chosen: list[Connection]) -> list[RecordedMessage]:
+def _sorted(file: Path, chosen: list[Connection]) -> Iterator[Stored]:
     """The messages of an MCAP file that has no index; all of them are held in memory."""
     topics = {connection.topic for connection in chosen}
-    records = McapRecords(file)
-    messages = [
-        RecordedMessage(channel.topic, log_time_ns, raw, channel.type_name)
-        for channel, log_time_ns, raw in records.messages()
-        if channel.topic in topics
-    ]
+    records, memory = McapRecords(file), Allowance("a file without an index", MOST_SORTED)
+    messages: list[Stored] = []
+    for channel, log_time_ns, raw in records.messages():
+        if channel.topic in topics:
+            memory.take(len(raw) + _LEAST_HELD)
+            messages.append((channel.topic, log_time_ns, raw, channel.type_name))
     if records.unreadable_bytes:
-        raise RecordingError(
-            f"cannot read recording {file}: {records.unreadable_bytes} bytes of it are damaged"
-        )
-    return sorted(messages, key=lambda message: message.log_time_ns)
+        raise ValueError(records.refusal or f"{records.unreadable_bytes} bytes of it are damaged")
+    yield from sorted(messages, key=lambda message: message[1])
 
 
 @cache

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from rosbags.interfaces import Connection, Qos
 from rosbags.rosbag2.metadata import parse_qos
-from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # the one that it found
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from experiment.bags.definitions import MessageDefinition, read_definition
+from experiment.bags.limits import MOST_OF_FILES, UNPACKING_FAILED, Allowance, unpack_file
 from experiment.bags.metadata import METADATA
 from experiment.bags.salvage import McapSalvage, Salvage, SqliteSalvage, StoredMessage, StoredTopic
 from experiment.bags.storage import NONE, SQLITE3, SUFFIXES, ZSTD, BagFiles, reason
@@ -150,8 +150,9 @@ def _salvaged(
     report: Progress,
 ) -> Iterator[StoredMessage]:
     """The messages of all files, one after the other; what was announced is added."""
+    disk = Allowance("its files", MOST_OF_FILES)
     for number, file in enumerate(files):
-        salvage = _open(file, scratch, contents)
+        salvage = _open(file, scratch, contents, disk)
         try:
             for count, message in enumerate(salvage.messages()):
                 if count % _REPORT_PERIOD == 0:
@@ -167,10 +168,10 @@ def _salvaged(
             contents.lost.append(f"{file.name}: {salvage.damage}")
 
 
-def _open(file: Path, scratch: Path, contents: Contents) -> Salvage:
+def _open(file: Path, scratch: Path, contents: Contents, disk: Allowance) -> Salvage:
     """A storage file; a copy of it, where reading would change it."""
     if file.suffix == _ZSTD_SUFFIX:
-        file = _decompressed(file, scratch, contents)
+        file = _decompressed(file, scratch, contents, disk)
     elif _storage_of(file) == SQLITE3:
         for journal in (file.with_name(file.name + end) for end in _JOURNALS):
             if journal.is_file():
@@ -179,15 +180,13 @@ def _open(file: Path, scratch: Path, contents: Contents) -> Salvage:
     return SqliteSalvage(file) if _storage_of(file) == SQLITE3 else McapSalvage(file)
 
 
-def _decompressed(file: Path, scratch: Path, contents: Contents) -> Path:
+def _decompressed(file: Path, scratch: Path, contents: Contents, disk: Allowance) -> Path:
     """A copy of a file that was compressed as a whole, as far as it goes."""
     copy = scratch / file.stem
-    with copy.open("wb") as sink, zstd.open(file, "rb") as source:
-        try:
-            while piece := source.read1():
-                sink.write(piece)
-        except (EOFError, zstd.ZstdError) as error:
-            contents.lost.append(f"{file.name}: {reason(error)}")
+    try:
+        unpack_file(file, copy, disk)
+    except UNPACKING_FAILED as error:
+        contents.lost.append(f"{file.name}: {reason(error)}")
     return copy
 
 

@@ -6,8 +6,13 @@ from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # the one that it found
-
+from experiment.bags.limits import (
+    UNPACKING_FAILED,
+    LimitError,
+    check_message,
+    check_tables,
+    unpack_message,
+)
 from experiment.bags.mcap_records import Channel, McapRecords
 from experiment.bags.metadata import CDR
 from experiment.bags.storage import ZSTD_MAGIC, reason
@@ -61,7 +66,7 @@ class McapSalvage:
 
     def __init__(self, file: Path) -> None:
         self._records = McapRecords(file)
-        self._lost_messages = 0
+        self._lost = _Lost()
 
     def messages(self) -> Iterator[StoredMessage]:
         """What can be read, in the file's order.
@@ -73,9 +78,8 @@ class McapSalvage:
         for channel, log_time_ns, packed in self._records.messages():
             if channel not in topics:
                 topics[channel] = _topic_of(channel)
-            raw = _unpacked(packed)
+            raw = self._lost.unpacked(packed)
             if raw is None:
-                self._lost_messages += 1
                 continue
             was_compressed = self._records.is_compressed or raw is not packed
             yield StoredMessage(topics[channel], log_time_ns, raw, was_compressed)
@@ -88,7 +92,9 @@ class McapSalvage:
     @property
     def damage(self) -> str:
         """What could not be read."""
-        return _damage((self._records.unreadable_bytes, "bytes"), (self._lost_messages, "messages"))
+        count, why = self._records.unreadable_bytes, self._records.refusal
+        unread = f"{count} bytes{f' ({why})' if why else ''}" if count else ""
+        return ", ".join(filter(None, (unread, str(self._lost))))
 
     @property
     def fraction(self) -> float:
@@ -116,7 +122,7 @@ class SqliteSalvage:
 
     def __init__(self, file: Path) -> None:
         self._file = file
-        self._lost_rows = 0
+        self._lost = _Lost()
         self._end = ""  # why it was reached too early
         self.topics: list[StoredTopic] = []
         self.fraction = 0.0
@@ -124,7 +130,7 @@ class SqliteSalvage:
     @property
     def damage(self) -> str:
         """What could not be read."""
-        return "; ".join(filter(None, (_damage((self._lost_rows, "messages")), self._end)))
+        return "; ".join(filter(None, (str(self._lost), self._end)))
 
     def messages(self) -> Iterator[StoredMessage]:
         """What can be read, in the file's order.
@@ -136,6 +142,7 @@ class SqliteSalvage:
             with closing(sqlite3.connect(self._file)) as connection:
                 connection.text_factory = lambda text: text.decode(errors="replace")
                 connection.execute("PRAGMA writable_schema=ON")  # else a cut file is refused whole
+                check_tables(connection)
                 topics = self._topics(connection)
                 self.topics = list(topics.values())
                 yield from self._rows(connection, topics)
@@ -166,9 +173,8 @@ class SqliteSalvage:
         try:
             for number, log_time_ns, packed in rows:
                 is_sound = isinstance(packed, bytes) and isinstance(log_time_ns, int)
-                raw = _unpacked(packed) if is_sound and number in topics else None
+                raw = self._lost.unpacked(packed if is_sound and number in topics else None)
                 if raw is None:
-                    self._lost_rows += 1
                     continue
                 done += len(packed)
                 self.fraction = min(done / size, 1.0)
@@ -177,19 +183,37 @@ class SqliteSalvage:
             self._end = f"what comes after its {done} first bytes of messages ({reason(error)})"
 
 
-def _unpacked(packed: bytes) -> bytes | None:
-    """A message as it was serialised, also where rosbag2 compressed each; None if it is damaged."""
-    if not packed.startswith(ZSTD_MAGIC):
-        return packed
-    try:
-        raw: bytes = zstd.decompress(packed)
-    except Exception:  # zstd's own; no message is worth losing the others for
+class _Lost:
+    """Counts the messages that are there and cannot be kept."""
+
+    def __init__(self) -> None:
+        self._damaged = 0
+        self._refused = 0
+        self._refusal = ""
+
+    def unpacked(self, packed: bytes | None) -> bytes | None:
+        """A message as it was serialised, also where rosbag2 compressed each; None if it is lost.
+
+        `packed` is None for what is no message.
+        """
+        try:
+            if packed is not None:
+                is_packed = packed.startswith(ZSTD_MAGIC)
+                return unpack_message(packed) if is_packed else check_message(packed)
+        except LimitError as error:
+            self._refused += 1
+            self._refusal = str(error)
+            return None
+        except UNPACKING_FAILED:
+            pass
+        self._damaged += 1
         return None
-    return raw
 
-
-def _damage(*counts: tuple[int, str]) -> str:
-    return ", ".join(f"{count} {what}" for count, what in counts if count)
+    def __str__(self) -> str:
+        """How many, and why; empty if there are none."""
+        damaged = f"{self._damaged} messages" if self._damaged else ""
+        refused = f"{self._refused} messages ({self._refusal})" if self._refused else ""
+        return ", ".join(filter(None, (damaged, refused)))
 
 
 def _columns(connection: sqlite3.Connection, table: str) -> list[str]:
