@@ -14,6 +14,7 @@ from typing import NoReturn, Protocol
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.last_resort import exit_after
+from msgs_config.shared_memory import remove_orphans
 
 EXIT_ERROR = 1
 _LEAVE_TIME = 2  # s that leaving the ROS graph may take
@@ -126,6 +127,7 @@ def _leave(node: RunnableNode | None, code: int) -> None:
 def _start_ros() -> None:
     # the name that Fast DDS 2.14, Jazzy's, knows; other vendors ignore it
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(_DDS_PROFILES))
+    remove_orphans()
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
