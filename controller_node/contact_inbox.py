@@ -12,6 +12,8 @@ from msgs_config.warnings import Warnings
 from msgs_config.wrench_messages import decode_wrenches
 
 _LARGEST = 1e9  # N and N m
+_MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the states waiting
+_MOST_KEPT = 5000  # ticks whose states are yet to come, as many as the queue of states holds
 
 
 class ContactInbox:
@@ -36,7 +38,10 @@ class ContactInbox:
         tick, in real time of those as well whose states were left without an answer. What lies
         before the episode's first state does not count.
         """
-        while (raw := self._inbox.take()) is not None:
+        for _ in range(_MOST_AT_ONCE):
+            raw = self._inbox.take()
+            if raw is None:
+                break
             self._keep(raw)
         if stamp_ns not in self._kept:
             return None
@@ -71,3 +76,10 @@ class ContactInbox:
                 f"contacts ignored: not one wrench a link, of {_LARGEST:g} N and N m at most"
             )
         self._kept[message.stamp_ns] = wrenches
+        if len(self._kept) > _MOST_KEPT:
+            del self._kept[next(iter(self._kept))]  # the oldest: stamps that go back clear all
+            self._warnings.say_once(
+                f"contacts of more than {_MOST_KEPT} ticks wait for their states; the oldest are "
+                "dropped",
+                kind="contacts that wait",
+            )

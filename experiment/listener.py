@@ -28,6 +28,7 @@ HEARD = frozenset(
 """The topics that are of any use for the figures."""
 
 _MOST_EARLY = 20_000  # messages
+_MOST_EARLY_BYTES = 1 << 26  # of them together
 
 
 class RunListener:
@@ -44,6 +45,7 @@ class RunListener:
         self._configuration: RunConfiguration | None = None
         self._configuration_text = ""
         self._early: list[tuple[str, bytes, int]] = []
+        self._early_bytes = 0
         self._counts: dict[str, int | None] = dict.fromkeys(COUNTS)
         self._first_command_ns: int | None = None
         self._last_state_ns = 0
@@ -67,7 +69,8 @@ class RunListener:
         if topic == CONFIGURATION:
             self._configure(decode(raw, String).data)
         elif self._configuration is None:
-            if len(self._early) == _MOST_EARLY:
+            self._early_bytes += len(raw)
+            if len(self._early) == _MOST_EARLY or self._early_bytes > _MOST_EARLY_BYTES:
                 raise RecordingError(f"nothing on '{CONFIGURATION}', which says what states mean")
             self._early.append((topic, raw, published_ns))
         elif topic == topics.JOINT_STATES.name:
@@ -93,6 +96,7 @@ class RunListener:
         counts = {COUNTS[name]: count for name, count in self._counts.items()}
         head = {"character": self._configuration.character}
         missing = {"missing_ticks": self.missing_ticks}
+        missing |= {"dropped_references": self._assembler.dropped_references}
         return head | figures | counts | missing, self._measurement.series()
 
     def _configure(self, text: str) -> None:

@@ -179,6 +179,6 @@ def run_in_process(
     figures = measurement.summary(wall_time=time.perf_counter() - started)
     counts = {"rejected_commands": 0, "duplicate_commands": 0}
     counts |= {"rejected_pushes": 0, "rejected_throws": 0}
-    losses: dict[str, object] = {"missing_ticks": 0, "lost_messages": {}}
+    losses: dict[str, object] = {"missing_ticks": 0, "dropped_references": 0, "lost_messages": {}}
     summary = {"character": known.character} | figures | counts | losses
     write_figures(directory, summary, measurement.series())

@@ -7,7 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from physics import character
-from ros import ControllerClient, Processes, SimulatorClient, joint_state, stamp_ns
+from ros import (
+    ControllerClient,
+    Processes,
+    SimulatorClient,
+    joint_state,
+    stamp_ns,
+    wait_until,
+)
 from sensor_msgs.msg import JointState
 
 from experiment.loop import ticks_in_process
@@ -273,3 +280,25 @@ def test_strengths_begin_at_their_stamp_are_echoed_and_refused_in_a_line(
         True,
         True,
     ]
+
+
+def test_contacts_whose_states_never_come_are_dropped_and_it_is_logged_once(
+    processes: Processes, simulator: ControllerClient
+) -> None:
+    node = processes.controller("humanoid", behaviour="reactive")
+    driver = Ticks(simulator)
+    driver.next()
+    simulator.states.publish(state(2, first=False))  # it waits for its contacts
+    before = node.peak_memory
+
+    driver.tick = 10
+    for count in range(8000):
+        driver.leave(force=1.0)
+        if count % 500 == 0:
+            simulator.get_parameters(CONTROLLER, ["law"])  # it takes what has come
+    wait_until(lambda: "the oldest are dropped" in node.stderr, "the warning")
+    driver.tick = 1
+    driver.next()
+
+    assert node.stderr.count("the oldest are dropped") == 1
+    assert node.peak_memory < before + 50.0

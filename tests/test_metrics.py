@@ -17,7 +17,7 @@ from std_msgs.msg import String
 from controller_node import parameters as for_controller
 from experiment.listener import RunListener
 from experiment.metrics import COLUMNS, Measurement, StateHash, Tick
-from experiment.tick_assembler import TickAssembler
+from experiment.tick_assembler import MOST_AHEAD, TickAssembler
 from msgs_config import configuration, topics
 from msgs_config.arrays import FloatArray
 from msgs_config.character_file import shipped_characters
@@ -411,6 +411,42 @@ def test_a_reference_that_never_comes_leaves_the_others_their_ticks() -> None:
     assert figures["ticks"] == 9
     errors = [0.1 * tick / 2.0 for tick in (1, 2, 3, 4, 6, 7, 8, 9)]
     assert figures["joint_error_mean_rad"] == pytest.approx(np.mean(errors))
+
+
+def test_references_wait_only_for_the_states_that_they_belong_to() -> None:
+    sound = assembled([*STATES, *REFERENCES])
+    far = [reference(tick, entries(knee=9.0)) for tick in range(11 + MOST_AHEAD, 200 + MOST_AHEAD)]
+    between = [replace(one, stamp_ns=one.stamp_ns + 5) for one in REFERENCES]
+    late = [replace(one, stamp_ns=-5) for one in REFERENCES]
+    strange = [*far, *between, *late]
+
+    for order in ([*STATES, *strange, *REFERENCES], [*strange, *STATES, *REFERENCES]):
+        assert assembled(order) == sound
+    gap = [one for index, one in enumerate(STATES) if index != 4]
+    assembler = dropping([*REFERENCES, *gap, *far])
+    assert assembler.dropped_references == len(far) + 1
+
+
+def test_a_flood_of_references_takes_a_bounded_memory_and_is_counted() -> None:
+    flood = [reference(tick, entries(knee=1.0)) for tick in range(1, 40_000)]
+
+    assert dropping(flood).dropped_references == 39_999 - 11_000
+    assembler = dropping([*STATES, *flood])
+    assert assembler.dropped_references == 39_999 - 10 - MOST_AHEAD
+    assembler.add_state(replace(STATES[0], stamp_ns=reference(30_000, entries()).stamp_ns))
+    assembler.finish()
+    assert assembler.dropped_references == 39_999 - 10
+
+
+def dropping(order: Iterable[StampedState | StampedReference]) -> TickAssembler:
+    """What has taken these things."""
+    assembler = TickAssembler(Measurement(KNOWN), RATE)
+    for thing in order:
+        if isinstance(thing, StampedState):
+            assembler.add_state(thing)
+        else:
+            assembler.add_reference(thing)
+    return assembler
 
 
 def test_between_two_episodes_there_is_no_tick() -> None:

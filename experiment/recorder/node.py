@@ -200,6 +200,8 @@ class RecorderNode(Node):
             of_it = f" of '{name}'" if name else ""
             try:
                 figures, series = listener.results()
+                if dropped := figures["dropped_references"]:
+                    self.get_logger().warning(f"{dropped} references{of_it} belong to no state")
                 lost = {"lost_messages": self._lost_messages(name)}
                 directory = figures_directory(self._directory, name, is_alone=not name)
                 write_figures(directory, figures | lost, series)
