@@ -75,21 +75,32 @@ def parse_yaml_mapping(
     return content
 
 
-def parse_yaml(place: str, text: str, error: type[ActuatedCharactersError]) -> Any:
+def parse_yaml(
+    place: str,
+    text: str,
+    error: type[ActuatedCharactersError],
+    *,
+    most: int = MAX_YAML_CHARACTERS,
+    most_of_value: int = MAX_YAML_VALUE,
+) -> Any:
     """The value that a YAML text stands for; numbers are decimal, as in YAML 1.2 and JSON.
 
     Args:
         place: Where the text comes from, such as a file's path: an error begins with it.
         text: The YAML text.
         error: The class of the error.
+        most: Characters of the text that are read at most.
+        most_of_value: Characters of a key or value.
 
     Raises:
         error: the text is no YAML, is too large, or nests too deep.
     """
-    if len(text) > MAX_YAML_CHARACTERS:
-        raise error(f"{place}: larger than {MAX_YAML_CHARACTERS >> 10} KiB")
+    if len(text) > most:
+        raise error(f"{place}: larger than {most >> 10} KiB")
     try:
-        return yaml.load(text, _PlainLoader)
+        loader = _PlainLoader(text)
+        loader.most_of_value = most_of_value
+        return loader.get_single_data()
     except (yaml.YAMLError, ValueError) as cause:  # ValueError: a number of too many digits
         where = getattr(cause, "problem_mark", None)
         line = f", line {where.line + 1}" if where is not None else ""
@@ -122,6 +133,7 @@ class _PlainLoader(yaml.SafeLoader):
     """
 
     yaml_implicit_resolvers: dict[str, list[Any]] = {}  # noqa: RUF012 (PyYAML's own name)
+    most_of_value = MAX_YAML_VALUE
     _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
@@ -132,9 +144,9 @@ class _PlainLoader(yaml.SafeLoader):
         self._depth += 1
         node = super().compose_node(parent, index)
         self._depth -= 1
-        if isinstance(node, yaml.ScalarNode) and len(node.value) > MAX_YAML_VALUE:
+        if isinstance(node, yaml.ScalarNode) and len(node.value) > self.most_of_value:
             raise yaml.MarkedYAMLError(
-                problem=f"a value of more than {MAX_YAML_VALUE} characters",
+                problem=f"a value of more than {self.most_of_value} characters",
                 problem_mark=node.start_mark,
             )
         return node

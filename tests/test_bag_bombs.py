@@ -288,3 +288,25 @@ def test_a_message_may_be_as_large_as_the_limit(tmp_path: Path, size: int) -> No
                 list(read_messages(bag))
         else:
             assert [message.raw for message in read_messages(bag)] == [raw]
+
+
+def test_metadata_that_stands_for_a_thousand_million_entries_is_refused(tmp_path: Path) -> None:
+    merges = [f"l{n}: &l{n} {{<<: [{', '.join([f'*l{n - 1}'] * 10)}]}}" for n in range(1, 9)]
+    content = "\n".join(["l0: &l0 {a: 0}", *merges, "rosbag2_bagfile_information: *l8"])
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    write_jazzy_db3(bag / "bag_0.db3", SOUND)
+    (bag / "metadata.yaml").write_text(content)
+
+    ended = run("info", bag)
+
+    assert ended.code == 1, ended.errors
+    assert "metadata.yaml" in ended.errors
+    assert ended.mebibytes < MOST_MEBIBYTES
+
+
+def test_metadata_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "metadata.yaml").write_text("# " + "x" * (8 * MIB))
+
+    with pytest.raises(RecordingError, match=r"metadata.yaml is damaged: larger than 4096 KiB"):
+        list(read_messages(tmp_path))

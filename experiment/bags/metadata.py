@@ -4,15 +4,16 @@ from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-import yaml
-
 from experiment.bags.storage import SUFFIXES, ZSTD, reason
 from experiment.figures import BAG
+from msgs_config import files
 from msgs_config.errors import RecordingError, one_of
 
 METADATA = "metadata.yaml"
 FILE, MESSAGE = "file", "message"  # what rosbag2 compressed; within MCAP the file itself tells
 _LATEST_VERSION = 9  # of Jazzy
+_MOST = 1 << 22  # characters; of a hundred topics it has some 100,000
+_MOST_OF_VALUE = 1 << 16  # characters; rosbag2 wrote all of a topic's publishers into one text
 CDR = "cdr"  # the only serialisation that ROS 2 has
 
 
@@ -31,12 +32,13 @@ def read_metadata(bag: Path) -> BagMetadata:
         RecordingError: there is none, or something in it cannot be used.
     """
     try:
-        text = (bag / METADATA).read_text(encoding="utf-8")
-        content = yaml.safe_load(text)["rosbag2_bagfile_information"]
+        content = load_metadata(bag)
         version = int(content["version"])
     except OSError as error:
         raise RecordingError(f"no complete recording at {bag}: {_missing(bag)}") from error
-    except Exception as error:  # YAML's own, and many others of its constructors
+    except RecordingError as error:
+        raise RecordingError(f"cannot read recording {bag}: {error}") from error
+    except Exception as error:  # of a file that holds something else
         raise RecordingError(f"cannot read recording {bag}: {METADATA} is damaged") from error
     try:
         return _parse(bag, content)
@@ -46,6 +48,22 @@ def read_metadata(bag: Path) -> BagMetadata:
             f"cannot read recording {bag}: {METADATA}{later if version > _LATEST_VERSION else ''} "
             f"lacks a field or has one of a wrong type: {reason(error)}"
         ) from error
+
+
+def load_metadata(bag: Path) -> Any:
+    """What `metadata.yaml` says, unchecked.
+
+    Raises:
+        RecordingError: it is no YAML, or too large.
+        OSError, UnicodeDecodeError, KeyError, TypeError: it cannot be read, or is something else.
+    """
+    with (bag / METADATA).open(encoding="utf-8") as file:
+        text = file.read(_MOST + 1)
+    place = f"{METADATA} is damaged"
+    content = files.parse_yaml(
+        place, text, RecordingError, most=_MOST, most_of_value=_MOST_OF_VALUE
+    )
+    return content["rosbag2_bagfile_information"]
 
 
 def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
@@ -64,9 +82,9 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
         problem = f"its messages are not serialised as {CDR}"
     if problem is not None:
         raise RecordingError(f"cannot read recording {bag}: {problem}")
-    files = tuple(bag / PurePath(path).name for path in paths)  # once relative to `bag`'s parent
+    present = tuple(bag / PurePath(path).name for path in paths)  # once relative to `bag`'s parent
     names = tuple(str(topic["name"]) for topic in topics)
-    return BagMetadata(files, names, mode)
+    return BagMetadata(present, names, mode)
 
 
 def recover_hint(bag: Path, does: str) -> str:

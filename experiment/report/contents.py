@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from std_msgs.msg import String
 
+from experiment.bags.metadata import METADATA, load_metadata
 from experiment.bags.reader import RecordedMessage, read_messages
 from experiment.bags.recording import find_bag
 from experiment.bags.storage import SUFFIXES
@@ -21,7 +21,6 @@ from msgs_config.errors import MessageError, RecordingError
 from msgs_config.messages import decode
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 
-_METADATA = "metadata.yaml"
 _STATES = topics.JOINT_STATES.name
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 _STATE_TYPE, _TEXT_TYPE = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
@@ -182,10 +181,9 @@ def _metadata(bag: Path) -> dict[str, Any]:
         storages = {suffix: storage for storage, suffix in SUFFIXES.items()}
         return {"storage_identifier": storages.get(bag.suffix, "unknown")}
     try:
-        loaded = yaml.safe_load((bag / _METADATA).read_text(encoding="utf-8"))
-        content = loaded["rosbag2_bagfile_information"]
-    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
-        raise RecordingError(f"cannot read {bag / _METADATA}") from error
+        content = load_metadata(bag)
+    except (OSError, ValueError, KeyError, TypeError, RecordingError) as error:
+        raise RecordingError(f"cannot read {bag / METADATA}") from error
     return content if isinstance(content, dict) else {}
 
 
