@@ -41,12 +41,6 @@ def test_angles_of_points_and_cosines_are_those_of_the_c_library(
     assert elementary.arccos(x).tolist() == [math.acos(point[1]) for point in points]
 
 
-def test_powers_are_broadcast() -> None:
-    powers = elementary.power(np.array([[2.0], [0.3]]), np.arange(3.0))
-
-    assert powers.tolist() == [[1.0, 2.0, 4.0], [1.0, 0.3, math.pow(0.3, 2.0)]]
-
-
 def test_what_is_outside_the_domain_is_not_a_number_and_spoils_nothing_else() -> None:
     sines = elementary.sin(np.array([math.inf, 0.5, math.nan]))
 

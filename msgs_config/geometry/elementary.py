@@ -41,11 +41,6 @@ def arctan2(y: FloatArray, x: FloatArray) -> FloatArray:
     return _of_each(math.atan2, y, x)
 
 
-def power(bases: FloatArray, exponents: FloatArray) -> FloatArray:
-    """Bases to the power of exponents, which are broadcast against each other: (...)."""
-    return _of_each(math.pow, *np.broadcast_arrays(bases, exponents))
-
-
 def _of_each(function: Callable[..., float], *arguments: FloatArray) -> FloatArray:
     """The function's values (...) at arguments of one shape (...)."""
     shape = np.shape(arguments[0])
