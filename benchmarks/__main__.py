@@ -1,4 +1,4 @@
-"""`make bench`: all measurements, or with `--only NAME` one of them."""
+"""`make bench`: all measurements, or with `--only NAME` one of them; what got worse is red."""
 
 import argparse
 import os
@@ -13,6 +13,7 @@ from rich.console import Console  # noqa: E402 - after the limit on threads
 from benchmarks.control_law import measure_control_laws  # noqa: E402
 from benchmarks.cost import measure_cost  # noqa: E402
 from benchmarks.lockstep import measure_lockstep  # noqa: E402
+from benchmarks.ratios import compare, comparison_table, read_ratios, store_ratios  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
 from benchmarks.recorder import measure_recorder  # noqa: E402
 from benchmarks.replay import measure_replay  # noqa: E402
@@ -37,14 +38,19 @@ def main() -> int:
     """Measure and print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--only", choices=_MEASUREMENTS, help="the one to measure")
-    only = parser.parse_args().only
+    parser.add_argument("--store", action="store_true", help="store the ratios as those to keep")
+    options = parser.parse_args()
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    console = Console(width=_WIDTH)
+    console, ratios = Console(width=_WIDTH), []
+    stored = read_ratios()  # before all that takes minutes: it may be malformed
     with own_domain() as domain:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
         for name, measure in _MEASUREMENTS.items():
-            if only in (None, name):
-                measure(console)
+            if options.only in (None, name):
+                ratios += measure(console)
+    console.print(comparison_table(compare(ratios, stored)))
+    if options.store:
+        store_ratios(ratios)
     return 0
 
 

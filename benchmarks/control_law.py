@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.deep_mimic import DeepMimicStablePd
+from benchmarks.ratios import Ratio
 from controller_node.laws import LAWS
 from controller_node.parameters import make_controller
 from controller_node.references.base import Reference, ReferenceState
@@ -21,8 +22,8 @@ _WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
 _NEEDS_A_FILE = "feedforward"
 
 
-def measure_control_laws(console: Console) -> None:
-    """Measure and print the table."""
+def measure_control_laws(console: Console) -> list[Ratio]:
+    """Measure and print the table; the ratio of each law to PyBullet's."""
     console.print("control laws: humanoid ...")
     ticks = list(ticks_in_process(make_plan("humanoid", _DURATION, _WALK, {}, {})))
     with DeepMimicStablePd() as theirs:
@@ -30,13 +31,16 @@ def measure_control_laws(console: Console) -> None:
     table = Table(title="one control law (µs a tick)", title_justify="left")
     for column in ("", "law", "with reference", "law / PyBullet's"):
         table.add_column(column, justify="right" if column else "left")
+    ratios = []
     for name in LAWS:
         if name == _NEEDS_A_FILE:
             continue
         law_us, whole_us = _ours(name, ticks)
         table.add_row(name, f"{law_us:.0f}", f"{whole_us:.0f}", f"{law_us / theirs_us:.3f}")
+        ratios.append(Ratio(f"law {name}", law_us / theirs_us, "law / PyBullet's stable PD"))
     table.add_row("PyBullet's stable PD (deep_mimic)", f"{theirs_us:.0f}", "", "")
     console.print(table)
+    return ratios
 
 
 class _Known:

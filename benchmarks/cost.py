@@ -2,9 +2,11 @@
 
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 from rich.console import Console
@@ -12,12 +14,14 @@ from rich.table import Table
 
 from benchmarks.chains import write_chain
 from benchmarks.nodes import Nodes
+from benchmarks.ratios import Ratio
 from msgs_config import topics
 from msgs_config.arrays import FloatArray
 from msgs_config.messages import JointStateDecoder, JointStateEncoder
 from msgs_config.polling import DirectSubscription, Spinner
 from sim_node.parameters import Cast, Part, make_cast, make_role, make_settings
 from sim_node.simulation import Simulation
+from sim_node.world import World
 
 _CHAINS = (1, 8, 32, 100)  # hinges
 _HUMANOIDS = (1, 2, 4, 8)
@@ -32,12 +36,19 @@ class Cost:
 
     label: str
     dofs: int
+    engine_us: float  # median of the engine's own steps
     alone_us: float  # median
     over_topics_us: float  # median
 
+    @property
+    def per_dof_us(self) -> float:
+        """A degree of freedom's share of a tick without topics."""
+        return self.alone_us / self.dofs
 
-def measure_cost(console: Console) -> None:
-    """Measure and print a table for chains and one for humanoids."""
+
+def measure_cost(console: Console) -> list[Ratio]:
+    """Measure and print a table for chains and one for humanoids; their ratios."""
+    ratios = []
     with tempfile.TemporaryDirectory() as directory:
         chains = {_label(n, "hinge"): chain(Path(directory), n) for n in _CHAINS}
         crowds = {_label(n, "humanoid"): humanoids(n) for n in _HUMANOIDS}
@@ -47,6 +58,19 @@ def measure_cost(console: Console) -> None:
                 console.print(f"cost: {label} ...")
                 costs.append(_measure(label, given))
             console.print(_table(costs))
+            ratios += cost_ratios(costs)
+    return ratios
+
+
+def cost_ratios(costs: list[Cost]) -> list[Ratio]:
+    """What the smallest and the largest cost beside the engine alone, and how that grows."""
+    first, last = costs[0], costs[-1]
+    growth = last.per_dof_us / first.per_dof_us
+    return [
+        *(Ratio(c.label, c.alone_us / c.engine_us, "tick / engine step alone") for c in costs),
+        Ratio(f"{last.label}, growth", growth, f"tick per DoF / that of {first.label}"),
+        Ratio(f"{first.label}, topics", first.over_topics_us / first.alone_us, "topics / alone"),
+    ]
 
 
 def _label(count: int, kind: str) -> str:
@@ -75,8 +99,25 @@ def make_simulation(cast: Cast) -> Simulation:
 def _measure(label: str, given: Mapping[str, object]) -> Cost:
     cast = make_cast(given)
     dofs = sum(part.character.layout.size for part in cast.parts)
-    alone = np.median(1e6 * step_durations(cast))
-    return Cost(label, dofs, float(alone), _over_topics(cast, given))
+    with timed_engine() as engine:
+        alone = np.median(1e6 * step_durations(cast))
+    engine_us = 1e6 * float(np.median(engine[-_TICKS:]))
+    return Cost(label, dofs, engine_us, float(alone), _over_topics(cast, given))
+
+
+@contextmanager
+def timed_engine() -> Iterator[list[float]]:
+    """Durations in s of the engine's steps within the block, without what surrounds them."""
+    durations: list[float] = []
+    step = World.step
+
+    def timed(world: World) -> None:
+        started = time.perf_counter()
+        step(world)
+        durations.append(time.perf_counter() - started)
+
+    with patch.object(World, "step", timed):
+        yield durations
 
 
 def step_durations(cast: Cast) -> FloatArray:
@@ -134,14 +175,14 @@ class _LimpController:
 def _table(costs: list[Cost]) -> Table:
     title = "one tick of the simulator (median), and a DoF's share over that of the smallest"
     table = Table(title=title, title_justify="left")
-    for column in ("", "DoF", "alone µs", "ticks/s", "µs/DoF", "ratio"):
+    for column in ("", "DoF", "engine µs", "alone µs", "ticks/s", "µs/DoF", "ratio"):
         table.add_column(column, justify="right" if column else "left")
     for column in ("topics µs", "µs/DoF", "ratio"):
         table.add_column(column, justify="right")
     first = costs[0]
     for cost in costs:
-        row = [cost.label, str(cost.dofs), f"{cost.alone_us:.0f}", f"{1e6 / cost.alone_us:.0f}"]
-        row += _per_dof(cost.alone_us / cost.dofs, first.alone_us / first.dofs)
+        row = [cost.label, str(cost.dofs), f"{cost.engine_us:.0f}", f"{cost.alone_us:.0f}"]
+        row += [f"{1e6 / cost.alone_us:.0f}", *_per_dof(cost.per_dof_us, first.per_dof_us)]
         row += [f"{cost.over_topics_us:.0f}"]
         row += _per_dof(cost.over_topics_us / cost.dofs, first.over_topics_us / first.dofs)
         table.add_row(*row)

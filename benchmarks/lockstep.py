@@ -5,6 +5,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.closed_loop import in_process, over_topics
+from benchmarks.ratios import Ratio
 from benchmarks.round_trip import round_trips
 from experiment.plan import Plan, make_plan
 from msgs_config.arrays import FloatArray
@@ -17,8 +18,8 @@ _REFERENCES: dict[str, dict[str, object]] = {
 }
 
 
-def measure_lockstep(console: Console) -> None:
-    """Measure and print the table."""
+def measure_lockstep(console: Console) -> list[Ratio]:
+    """Measure and print the table; the ratios for each character."""
     table = Table(title="lockstep, one tick (µs)", title_justify="left")
     for column in ("", "p50", "p99", "ticks/s", "real-time factor"):
         table.add_column(column, justify="right" if column else "left")
@@ -27,12 +28,11 @@ def measure_lockstep(console: Console) -> None:
         console.print(f"lockstep: {name} ...")
         ratios.append(_measure(make_plan(name, _DURATION, reference, {}, {}), table))
     console.print(table)
-    for ratio in ratios:
-        console.print(ratio)
+    return ratios
 
 
-def _measure(plan: Plan, table: Table) -> str:
-    """Add the rows of one character; returns what lockstep over topics adds, in round trips."""
+def _measure(plan: Plan, table: Table) -> Ratio:
+    """Add the rows of one character; the ratio of a tick over topics to what it is made of."""
     name, rate = plan.character.name, plan.simulator.integer("rate")
     layout = plan.character.layout
     last = over_topics(plan)[-1]
@@ -47,11 +47,8 @@ def _measure(plan: Plan, table: Table) -> str:
     for label, (p50, p99, per_second) in rows.items():
         factor = "" if "bare" in label else f"{per_second / rate:.1f}"
         table.add_row(f"{name} {label}", f"{p50:.0f}", f"{p99:.0f}", f"{per_second:.0f}", factor)
-    direct, executors, joined, apart = (values[0] for values in rows.values())
-    return (
-        f"{name}: ((c) - (b)) / (a) = {(apart - joined) / direct:.2f}, "
-        f"((c) - (b)) / (a') = {(apart - joined) / executors:.2f}"
-    )
+    direct, _, joined, apart = (values[0] for values in rows.values())
+    return Ratio(f"lockstep, {name}", apart / (joined + direct), "(c) / ((b) + (a))")
 
 
 def _row(durations: FloatArray) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.nodes import Nodes, processor_time
+from benchmarks.ratios import Ratio
 from experiment.plan import Plan, make_plan
 from msgs_config import topics
 
@@ -61,8 +62,8 @@ def _tick(nodes: Nodes) -> int:
     return int(nodes.reports[-1]["tick"]) if nodes.reports else 0
 
 
-def measure_recorder(console: Console) -> None:
-    """Measure and print the table."""
+def measure_recorder(console: Console) -> list[Ratio]:
+    """Measure and print the table; how much slower the loop is, and the recorder's share."""
     console.print(f"recorder: {CHARACTER} at {RATE} Hz, {_PAIRS} pairs of runs ...")
     plan = walk(_DURATION)
     without, beside = [], []
@@ -71,11 +72,12 @@ def measure_recorder(console: Console) -> None:
         beside.append(time_run(plan, recorded=True))
     real_time = time_run(_real_time(), recorded=True)
     ratios = [a.ticks_per_s / b.ticks_per_s for a, b in zip(without, beside, strict=True)]
+    share = _median([t.share for t in beside])
     rows = {
         "ticks a second without it": f"{_median([t.ticks_per_s for t in without]):.0f}",
         "beside it": f"{_median([t.ticks_per_s for t in beside]):.0f}",
         "slow-down": f"{_median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})",
-        "its share of a core": f"{_median([t.share for t in beside]):.0%}",
+        "its share of a core": f"{share:.0%}",
         f"in real time, {real_time.ticks_per_s:.0f} ticks a second": f"{real_time.share:.0%}",
     }
     title = f"recorder of all topics, {CHARACTER} at {RATE} Hz in lockstep, medians"
@@ -83,6 +85,10 @@ def measure_recorder(console: Console) -> None:
     for label, value in rows.items():
         table.add_row(label, value)
     console.print(table)
+    return [
+        Ratio("recorder, slow-down", _median(ratios), "a tick beside it / one without it"),
+        Ratio("recorder, share", share, "its processor time / the run's"),
+    ]
 
 
 def _median(values: list[float]) -> float:

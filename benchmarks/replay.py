@@ -4,9 +4,12 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.ratios import Ratio
+from benchmarks.yardstick import yardstick_us
 from experiment.bags.recording import read_recordings
 from experiment.figures import prepare_directory
 from experiment.plan import make_plan
@@ -18,8 +21,8 @@ _DURATION = 20.0  # s of simulated time
 _WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
 
 
-def measure_replay(console: Console) -> None:
-    """Record a walk with all topics, replay it, and print the table.
+def measure_replay(console: Console) -> list[Ratio]:
+    """Record a walk with all topics, replay it, and print the table; ratios to the yardstick.
 
     Raises:
         ReplayError: it did not come again.
@@ -40,11 +43,17 @@ def measure_replay(console: Console) -> None:
     table = Table(title="replay of a walk, one core", title_justify="left")
     for column in ("", "µs a tick", "real-time factor"):
         table.add_column(column, justify="right" if column else "left")
-    for label, seconds in (
-        ("reading the bag", times[1] - times[0]),
-        ("torques against commands, simulation, comparison", times[2] - times[1]),
-        ("together", times[2] - times[0]),
+    reading, repeating = (1e6 * float(taken) / plan.ticks for taken in np.diff(times))
+    for label, us in (
+        ("reading the bag", reading),
+        ("torques against commands, simulation, comparison", repeating),
+        ("together", reading + repeating),
     ):
-        factor = f"{_DURATION / seconds:.1f}"
-        table.add_row(label, f"{1e6 * seconds / plan.ticks:.0f}", factor)
+        factor = f"{1e6 * _DURATION / (us * plan.ticks):.1f}"
+        table.add_row(label, f"{us:.0f}", factor)
     console.print(table)
+    unit = yardstick_us()
+    return [
+        Ratio("replay, reading", reading / unit, "a tick / yardstick"),
+        Ratio("replay, repeating", repeating / unit, "a tick / yardstick"),
+    ]

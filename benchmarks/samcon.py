@@ -8,6 +8,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.ratios import Ratio
+from benchmarks.yardstick import yardstick_us
 from experiment.samcon.problem import Problem
 from experiment.samcon.reconstruction import Job, reconstruct
 from experiment.samcon.settings import preset
@@ -24,8 +26,8 @@ class Speed:
     samples_a_second: float
 
 
-def measure_samcon(console: Console) -> None:
-    """Measure and print the table."""
+def measure_samcon(console: Console) -> list[Ratio]:
+    """Measure and print the table; what a sample costs, and what more processes add to it."""
     console.print("sampling-based motion control: humanoid, walk ...")
     counts = sorted({1, min(2, os.cpu_count() or 1), os.cpu_count() or 1})
     speeds = [_speed(workers) for workers in counts]
@@ -42,6 +44,18 @@ def measure_samcon(console: Console) -> None:
             f"{efficiency:.2f}",
         )
     console.print(table)
+    return _ratios(speeds)
+
+
+def _ratios(speeds: list[Speed]) -> list[Ratio]:
+    one, *others = speeds
+    sample_us = 1e6 / one.samples_a_second
+    ratios = [Ratio("search for a motion", sample_us / yardstick_us(), "sample / yardstick")]
+    for speed in others:
+        cost = speed.workers * one.samples_a_second / speed.samples_a_second
+        how = "a sample's processor time / that in one process"
+        ratios.append(Ratio(f"search for a motion, {speed.workers} processes", cost, how))
+    return ratios
 
 
 def _speed(workers: int) -> Speed:

@@ -9,6 +9,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.ratios import Ratio
+from benchmarks.yardstick import yardstick_us
 from controller_node.behaviours.library import MotionLibrary
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
@@ -18,8 +20,8 @@ _STATES = 30  # of a walk, each looked for once
 _LASTING = 0.5  # s, the default of `blend.duration`
 
 
-def measure_search(console: Console) -> None:
-    """Measure and print the table."""
+def measure_search(console: Console) -> list[Ratio]:
+    """Measure and print the table; the ratio of the median search to the yardstick."""
     console.print("search of the library: humanoid ...")
     humanoid = load_character("humanoid")
     library = MotionLibrary(humanoid, [], _LASTING)
@@ -27,13 +29,15 @@ def measure_search(console: Console) -> None:
     durations = []
     for number in range(_STATES):
         state = walk.sample(number / _STATES)
-        started = time.perf_counter()
+        started = time.process_time()
         library.nearest(library.predicted(state.configuration.position, state.velocity))
-        durations.append(1e3 * (time.perf_counter() - started))
+        durations.append(1e3 * (time.process_time() - started))
     table = Table(title="one search of the whole library (ms)", title_justify="left")
     for column in ("moments", "the first", "median", "longest of the others"):
         table.add_column(column, justify="right")
     first, others = durations[0], durations[1:]
-    numbers = (first, float(np.median(others)), max(others))
+    median = float(np.median(others))
+    numbers = (first, median, max(others))
     table.add_row(str(len(library)), *(f"{number:.1f}" for number in numbers))
     console.print(table)
+    return [Ratio("search of the library", 1e3 * median / yardstick_us(), "search / yardstick")]
