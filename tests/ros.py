@@ -3,7 +3,6 @@
 Everything waits for a condition with a deadline; nothing sleeps to let something happen.
 """
 
-import ctypes
 import os
 import signal
 import subprocess
@@ -17,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from forked import Fork, be_killed_with_parent
 from geometry_msgs.msg import Transform, Vector3, Wrench
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
@@ -50,7 +50,6 @@ MODULES = {
     topics.CONTROLLER_NODE: "controller_node.main",
     topics.RECORDER_NODE: "experiment.recorder.main",
 }
-_PR_SET_PDEATHSIG = 1  # prctl(2)
 _MIDDLEWARE_SAYS = "sequence size exceeds remaining buffer"
 
 
@@ -88,24 +87,39 @@ class Process:
         log: Path,
         cwd: Path | None = None,
         environment: Mapping[str, str] | None = None,
+        forked_module: str | None = None,
     ) -> None:
-        """Start `python arguments`, to be killed should the test's own process be."""
+        """Start `python arguments`, to be killed should the test's own process be.
+
+        With `forked_module` it is `python -m forked_module arguments`, by a fork; see `Fork`.
+        """
         self._errors = log.with_suffix(".stderr")
         self._output = log.with_suffix(".stdout")
-        inherited = dict(os.environ if environment is None else environment)
-        inherited.pop(DDS_PROFILES, None)
+        own = dict(os.environ if environment is None else environment)
+        own |= {"PYTHONUNBUFFERED": "1"}
+        own.pop(DDS_PROFILES, None)
+        self._process: Fork | subprocess.Popen[bytes]
+        if forked_module is not None:
+            folder = cwd or Path.cwd()
+            self._process = Fork(forked_module, arguments, self._output, self._errors, folder, own)
+        else:
+            self._process = self._popen(arguments, cwd, own)
+        self.pid = self._process.pid
+
+    def _popen(
+        self, arguments: Sequence[str], cwd: Path | None, environment: Mapping[str, str]
+    ) -> subprocess.Popen[bytes]:
         with self._errors.open("wb") as errors, self._output.open("wb") as output:
-            self._process = subprocess.Popen(
+            return subprocess.Popen(
                 [sys.executable, *arguments],
                 cwd=cwd,
-                env={**inherited, "PYTHONUNBUFFERED": "1"},
+                env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=errors,
                 start_new_session=True,
-                preexec_fn=_be_killed_with_parent,
+                preexec_fn=be_killed_with_parent,
             )
-        self.pid = self._process.pid
 
     @property
     def exit_code(self) -> int | None:
@@ -152,10 +166,6 @@ class Process:
             self._process.wait()
 
 
-def _be_killed_with_parent() -> None:
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
 LOG_LINES = 220
 """Of a node, however much it is told: a hundred for each kind of input."""
 
@@ -169,10 +179,13 @@ def assert_quiet(process: Process) -> None:
 
 
 class Processes:
-    """Starts processes in a folder, and ends them all, the last one first."""
+    """Starts processes in a folder, and ends them all, the last one first.
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    Nodes are forked (see `Fork`) unless `fresh`; all others begin as processes do.
+    """
+
+    def __init__(self, folder: Path, *, fresh: bool = False) -> None:
+        self._folder, self._fresh = folder, fresh
         self._started: list[Process] = []
 
     def node(self, name: str, namespace: str = "", **parameters: object) -> Process:
@@ -182,7 +195,9 @@ class Processes:
         file.write_text(yaml.safe_dump({f"/**/{name}": {"ros__parameters": given}}))
         arguments = ["--ros-args", "--params-file", str(file)]
         arguments += ["-r", f"__ns:=/{namespace}"] if namespace else []
-        return self.python("-m", MODULES[name], *arguments)
+        if self._fresh:
+            return self.python("-m", MODULES[name], *arguments)
+        return self._start(arguments, forked_module=MODULES[name])
 
     def simulator(self, character: str = "pendulum", **parameters: object) -> Process:
         """Start `sim_node`."""
@@ -198,8 +213,16 @@ class Processes:
 
     def python(self, *arguments: str, environment: Mapping[str, str] | None = None) -> Process:
         """Start Python in the folder."""
+        return self._start(arguments, environment)
+
+    def _start(
+        self,
+        arguments: Sequence[str],
+        environment: Mapping[str, str] | None = None,
+        forked_module: str | None = None,
+    ) -> Process:
         log = self._folder / f"process_{len(self._started)}"
-        process = Process(arguments, log, cwd=self._folder, environment=environment)
+        process = Process(arguments, log, self._folder, environment, forked_module)
         self._started.append(process)
         return process
 

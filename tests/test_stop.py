@@ -39,6 +39,15 @@ def own_graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         yield domain
 
 
+@pytest.fixture
+def processes(domain: int, tmp_path: Path) -> Iterator[Processes]:
+    """Starts processes that begin as they do for a user, which matters while they start."""
+    del domain
+    started = Processes(tmp_path, fresh=True)
+    yield started
+    started.end()
+
+
 @contextmanager
 def observer(domain: int) -> Iterator[SimulatorClient]:
     """A client that leaves the graph again."""
