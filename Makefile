@@ -13,7 +13,11 @@ ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
 
-.PHONY: help venv demo test hashes other-numpy bench soak kills long-recording format clean distclean
+# Bytecode that is not kept would be compiled again at the start of each of hundreds of processes,
+# and for each worker of the tests.
+unexport PYTHONDONTWRITEBYTECODE
+
+.PHONY: help venv demo test quick hashes other-numpy bench soak kills long-recording format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -28,7 +32,13 @@ test: .venv/.installed-test ## Check style and types, run the tests
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
+
+quick: .venv/.installed-test ## Check style and types, run the tests that are not marked as slow
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow" --durations 5 --durations-min 5
 
 hashes: .venv/.installed-test ## Renew the golden hashes, after a change that is meant to alter states
 	$(BIN)/python tests/golden.py
@@ -39,7 +49,7 @@ other-numpy: .venv/.installed-test ## Compare the golden runs with the oldest an
 	    PYTHONPATH=build/numpy $(BIN)/python -m pytest -q -n auto tests/test_golden_hashes.py || exit 1; \
 	done
 
-bench: .venv/.installed ## Measure speed
+bench: .venv/.installed ## Measure speed; ratios that got worse are red
 	$(BIN)/python -m benchmarks
 
 soak: .venv/.installed ## Run 500,000 ticks with disturbances; no tick lost, no memory grown

@@ -15,6 +15,12 @@ from experiment.domain import own_domain
 os.environ[DDS_PROFILES] = str(Path(__file__).parents[1] / "msgs_config" / "fastdds.xml")
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Half as many workers again as processors: many tests wait for processes, and for times."""
+    processors = len(os.sched_getaffinity(0))
+    return processors + (processors + 1) // 2
+
+
 @pytest.fixture(scope="session")
 def domain() -> Iterator[int]:
     """A ROS domain that nobody else on this machine uses; the tests' processes inherit it."""

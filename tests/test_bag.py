@@ -459,6 +459,7 @@ payloads = st.builds(  # large ones make several chunks
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(["/a", "/b", "/c"]), payloads, log_times_ns)))
 def test_messages_come_back_by_time_and_those_of_equal_time_as_written(

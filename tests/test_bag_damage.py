@@ -16,6 +16,8 @@ from experiment.bags.writer import BagWriter
 from msgs_config.errors import RecordingError
 from tests.foreign_bags import Said, write_humble_db3, write_mcap
 
+pytestmark = pytest.mark.slow
+
 READ, RECOVERED = 45, 12  # damaged copies of each kind of bag
 SAID = [Said("/a" if number % 3 else "/b", number, f"text {number}") for number in range(40)]
 

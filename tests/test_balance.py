@@ -396,6 +396,7 @@ class Stance:
         return float(np.abs(self._run.state.velocity).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given", [{}, {"friction": 0.7}, {"friction": 1.0}, {"rate": 480}], ids=str
 )
@@ -410,6 +411,7 @@ def test_the_humanoid_stands_still_by_its_joints_alone(
     assert stance.fastest < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_it_stands_from_poses_beside_its_own(humanoid: Character, seed: int) -> None:
     # Arrange
@@ -444,6 +446,7 @@ def test_without_the_virtual_force_a_smaller_push_is_too_much(humanoid: Characte
     assert not stance.stands
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("impulse", [impulse for _, impulse in PUSHES], ids=[n for n, _ in PUSHES])
 def test_it_withstands_a_push(humanoid: Character, impulse: tuple[float, float]) -> None:
     stance = Stance(humanoid, BalanceGains())

@@ -172,6 +172,7 @@ def test_more_samples_a_pixel_smooth_the_edges_and_change_nothing_else(
 # Every character
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY_CHARACTER, ids=character_id)
 def test_the_default_view_has_all_of_a_character_and_not_much_else(name: str) -> None:
     whole = character(name)
@@ -210,6 +211,7 @@ def test_the_view_follows_the_root_along_the_ground_alone(camera: Camera) -> Non
     assert view.target == (0.5, 2.0, 0.0)
 
 
+@pytest.mark.slow
 def test_the_view_of_an_arm_stays_where_it_is() -> None:
     arm = character("franka_panda")
     rest = np.array(arm.rest_position)

@@ -728,6 +728,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BROKEN)
 def test_a_broken_urdf_is_refused_by_path(write: WriteCharacter, case: str) -> None:
     path = write("urdf: lift.urdf\ninertia: file\n", BROKEN[case])

@@ -12,6 +12,8 @@ from ros import PATIENCE, wait_until
 
 from experiment.studies.catalogue import NAMES, load_study
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "experiment.cli", "study"]
 
 

@@ -175,6 +175,7 @@ def test_times_durations_and_wrapping_are_the_files(clip: str) -> None:
     assert frames.wraps == (clip in WRAPPED) == (content(clip)["Loop"] == "wrap")
 
 
+@pytest.mark.slow
 @every_clip
 def test_a_reference_is_at_each_frame_when_its_time_comes(clip: str) -> None:
     # Arrange
@@ -228,6 +229,7 @@ def test_the_walk_is_upright_in_the_z_up_world_and_goes_along_x() -> None:
 # --- velocities ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cycle", [0, 3])
 @every_clip
 def test_a_velocity_is_the_rate_of_change_of_the_configuration(clip: str, cycle: int) -> None:

@@ -149,6 +149,7 @@ def have_been_answered(states: Inbox) -> bool:
     return len(stamps) >= A_FEW_TICKS and any(any(state.effort) for state in states.messages)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", sorted(NODES.keys() - MOTIONS))  # those are recorded below
 def test_the_nodes_start_with_a_file_and_run(
     processes: Processes, client: SimulatorClient, file: str

@@ -162,6 +162,7 @@ def test_no_law_changes_its_inputs() -> None:
 # --- on the engine -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "substeps"), [(0.1, 1), (0.5, 1), (0.9, 1), (0.1, 4), (0.2, 4)])
 def test_explicit_pd_is_stable_up_to_its_bound(share: float, substeps: int) -> None:
     """`kp h^2 / n + 2 kd h < 4 m`; `share` is the stiffness's part of the left side."""

@@ -75,6 +75,7 @@ def test_both_engines_find_the_same_kinetic_energy(name: str) -> None:
         )
 
 
+@pytest.mark.slow
 @every_character
 def test_both_engines_accelerate_alike_under_efforts_on_every_degree_of_freedom(name: str) -> None:
     whole = without_self_collision(name)

@@ -52,6 +52,7 @@ def a_dirty_episode(run: LoneSimulation) -> None:
     run.watches_contacts = False
 
 
+@pytest.mark.slow
 @any_settings
 def test_a_reset_is_a_fresh_simulation_to_the_bit(given: dict[str, object]) -> None:
     # Arrange
@@ -156,6 +157,7 @@ def touch_each_other(run: Simulation) -> bool:
     return bool(pybullet.getContactPoints(one._body, other._body, physicsClientId=one._client))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [{}, {"substeps": 2, "command_delay_ticks": 1}], ids=str)
 def test_a_reset_of_two_humanoids_in_contact_is_a_fresh_simulation_to_the_bit(
     given: dict[str, object],

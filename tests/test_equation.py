@@ -109,6 +109,7 @@ def touches_nothing(watched: Watched) -> bool:
 # In flight
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY_CHARACTER, ids=character_id)
 def test_in_flight_it_holds_for_any_state_and_effort(name: str, watch: Watch) -> None:
     # Arrange: beyond soft limits, too, and with as much passive damping as there is
@@ -291,6 +292,7 @@ def test_what_spinning_friction_does_is_left_over_as_a_torque_about_the_normal(
 # Over topics
 
 
+@pytest.mark.slow
 def test_it_holds_for_what_a_bag_says_of_a_walk(processes: Processes, tmp_path: Path) -> None:
     # Arrange
     run = processes.command(

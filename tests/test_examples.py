@@ -17,6 +17,8 @@ from sensor_msgs.msg import JointState
 from msgs_config import rotations, topics
 from msgs_config.arrays import FloatArray
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FILES = sorted(EXAMPLES.glob("*.py"))
 INTERRUPTIBLE = {

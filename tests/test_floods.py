@@ -2,6 +2,7 @@
 
 import signal
 
+import pytest
 from rclpy.context import Context
 from rclpy.serialization import serialize_message
 from ros import (
@@ -21,6 +22,8 @@ from msgs_config.tick_clock import TickClock
 from msgs_config.warnings import MOST_LOGGED
 
 CLOCK = TickClock(240)
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_flood_while_it_waits_takes_a_bounded_memory(

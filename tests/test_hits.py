@@ -60,6 +60,7 @@ def clip_run(clip: str) -> LoneSimulation:
     return simulation
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clip", available_clips(HUMANOID))
 def test_no_clip_hits_itself(clip: str) -> None:
     # Arrange

@@ -15,6 +15,8 @@ from msgs_config.character_loading import load_character
 from msgs_config.errors import CharacterError
 from msgs_config.urdf_check import MAX_JOINTS, MAX_POSITION_ENTRIES
 
+pytestmark = pytest.mark.slow
+
 PROJECT = Path(__file__).parents[1]
 READ = """
 import json, resource, sys, time

@@ -150,6 +150,7 @@ def test_pid_leaves_no_steady_state_error() -> None:
     assert track[-1] == pytest.approx(1.0, abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "stable"), [(0.95, True), (1.05, False)])
 def test_pid_is_stable_up_to_its_bound(share: float, stable: bool) -> None:
     """`0 < ki < kp kd / m`."""

@@ -113,6 +113,7 @@ def test_there_is_one_frame_a_link_in_the_characters_order() -> None:
     assert origins[row["left_ankle"], 1] > 0.05 > -0.05 > origins[row["right_ankle"], 1]
 
 
+@pytest.mark.slow
 @every_character
 def test_looking_at_links_changes_no_bit_of_what_follows(name: str) -> None:
     # Arrange
@@ -590,6 +591,7 @@ def in_the_void(gravity: float = 9.81) -> WorldSettings:
     return WorldSettings(gravity=gravity, ground=False)
 
 
+@pytest.mark.slow
 def test_the_contact_wrenches_of_a_falling_humanoid_are_what_changes_its_momentum() -> None:
     # Arrange: limp, moving over the ground and turning, so that there is friction; it lies in the
     # end, with links of its own on each other

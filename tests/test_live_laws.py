@@ -68,6 +68,7 @@ def walker(law: str, series: str, **given: object) -> Any:
     return controller("humanoid", law=law, **clip, **INTEGRAL, **given)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("before", "after"), list(permutations(LAWS, 2)))
 def test_another_law_answers_the_next_state_as_if_it_had_always_done(
     before: str, after: str, series: str

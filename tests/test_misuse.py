@@ -33,6 +33,8 @@ from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import TickClock
 from sim_node.pushes import Push
 
+pytestmark = pytest.mark.slow
+
 CLOCK = TickClock(240)
 MESSAGES = 10_000
 A_TICK = 100  # messages

@@ -305,6 +305,7 @@ FIRST_STATES: dict[str, tuple[dict[str, object], FloatArray, FloatArray]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FIRST_STATES)
 def test_a_run_begins_in_the_references_first_state(tmp_path: Path, kind: str) -> None:
     given, position, velocity = FIRST_STATES[kind]

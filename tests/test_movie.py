@@ -27,6 +27,8 @@ from msgs_config.errors import CharacterError, ConfigurationError, RecordingErro
 from msgs_config.wrench_messages import WrenchArrays
 from sim_node.camera import Picture
 
+pytestmark = pytest.mark.slow
+
 RATE = 240
 SIZE = (96, 64)
 BOX = str(DATA / "free_box.yaml")

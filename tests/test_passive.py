@@ -147,6 +147,7 @@ def test_the_damper_only_takes_energy(passive: PassiveForces, ball: Joint) -> No
     assert taken > 0.0
 
 
+@pytest.mark.slow
 @every_ball
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("stiffer", [1.0, 1e5])

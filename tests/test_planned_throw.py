@@ -95,6 +95,7 @@ def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
 # Aiming
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["front", "left", "back", "right", "above", "37.5"])
 @pytest.mark.parametrize("reference", [HELD, WALK], ids=["hold", "walk"])
 def test_a_ball_hits_its_target_at_its_time_from_its_side(
@@ -301,6 +302,7 @@ def thrown(tmp_path_factory: pytest.TempPathFactory) -> Made:
     return Made(plan, throws, directory, read_recording(directory), summary)
 
 
+@pytest.mark.slow
 def test_the_bag_says_what_was_thrown_and_where_it_went(thrown: Made) -> None:
     recording, throws = thrown.recording, sorted(thrown.throws, key=lambda each: each.stamp_ns)
 
@@ -332,6 +334,7 @@ def test_the_bag_says_what_the_controller_did_about_it(thrown: Made) -> None:
     assert second.facts["impulse"] == pytest.approx(16.0, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_replay_through_topics_sends_the_balls_as_well(thrown: Made) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("ROS_DOMAIN_ID", raising=False)
@@ -380,6 +383,7 @@ def test_a_recording_of_throws_alone_is_replayed_without_them_and_says_so(thrown
     assert not result.identical
 
 
+@pytest.mark.slow
 def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path: Path) -> None:
     directory = tmp_path / "run"
     prepare_directory(directory, overwrite=False)
@@ -425,6 +429,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "expected"), REFUSED)
 def test_the_command_refuses_in_a_line(
     arguments: list[str], expected: list[str], tmp_path: Path, processes: Processes

@@ -123,6 +123,7 @@ def pushed(tmp_path_factory: pytest.TempPathFactory) -> Made:
 # A run with pushes
 
 
+@pytest.mark.slow
 def test_each_push_acts_from_exactly_its_tick_for_the_duration(pushed: Made) -> None:
     applied = pushed.recording.applied_wrench
 

@@ -126,6 +126,7 @@ def drop(seed: int, *, to_the_end: bool) -> Drop:
     return Drop(most / first, kinetic, float(beyond.max()), float(beyond[-1]), far)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("batch", range(DROPS // BATCH))
 def test_a_dropped_ragdoll_gains_no_energy_and_comes_to_rest_within_its_limits(batch: int) -> None:
     for seed in range(BATCH * batch, BATCH * (batch + 1)):

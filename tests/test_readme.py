@@ -45,6 +45,7 @@ def test_every_make_target_of_the_readme_exists():
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
 
 
+@pytest.mark.slow
 def test_the_controller_of_the_readme_holds_the_pendulum_at_its_target(tmp_path, processes):
     code = re.search(r"```python\n(.*?)```", README, flags=re.DOTALL)[1]
     assert len(code.splitlines()) <= 40

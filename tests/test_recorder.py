@@ -27,6 +27,8 @@ from msgs_config.messages import JointStateDecoder
 from msgs_config.polling import DirectSubscription
 from msgs_config.topics import Topic
 
+pytestmark = pytest.mark.slow
+
 FULL_AT = 200_000  # bytes: more than the figures of a short run, less than its bag
 TICKS = 480
 LONG = 4000  # ticks

@@ -31,6 +31,8 @@ from msgs_config.tick_clock import TickClock
 from msgs_config.topics import Topic
 from sim_node.pushes import Push
 
+pytestmark = pytest.mark.slow
+
 CLOCK = TickClock(240)
 TICKS = 60
 PUSHED_AT = 30

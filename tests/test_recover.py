@@ -27,6 +27,8 @@ from tests.foreign_bags import SAID, texts, write_humble_db3
 from tests.limits import file_size_limit, unprivileged
 from tests.ros import Process, wait_until
 
+pytestmark = pytest.mark.slow
+
 QOS = QoSProfile(depth=5000)
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KINDS = [(s, c) for s in ("mcap", "sqlite3") for c in ("none", "zstd")]

@@ -22,6 +22,8 @@ from msgs_config import topics
 from msgs_config.errors import RecordingError
 from msgs_config.versions import installed_versions
 
+pytestmark = pytest.mark.slow
+
 LOWEST, LARGEST = 0, 62  # bits
 
 

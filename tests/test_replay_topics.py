@@ -50,6 +50,8 @@ from msgs_config.character_loading import load_character
 from msgs_config.errors import RecordingError, RunError
 from msgs_config.messages import JointStateDecoder, JointStateEncoder
 
+pytestmark = pytest.mark.slow
+
 RATE = 480  # Hz: delayed, the humanoid needs a fast one
 TICKS = 160
 DELAY = 2

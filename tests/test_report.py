@@ -26,6 +26,8 @@ from msgs_config import topics
 from msgs_config.errors import RecordingError
 from msgs_config.topics import Topic
 
+pytestmark = pytest.mark.slow
+
 HOSTILE = "/<script>alert('x')</script>&amp;"
 VOID = {"meta", "img"}
 TICKS = 120

@@ -25,6 +25,8 @@ from msgs_config import topics
 from msgs_config.character_loading import load_character
 from msgs_config.messages import JointStateDecoder, state_in_layout
 
+pytestmark = pytest.mark.slow
+
 TICKS = 480
 WALK = ("run", "--character", "humanoid", "--clip", "walk", "--duration", "2")
 LONG_WALK = ("run", "--clip", "walk", "--duration", "1e6")

@@ -34,6 +34,8 @@ from experiment.samcon.workers import Workers
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
 
+pytestmark = pytest.mark.slow
+
 PROJECT = Path(__file__).parents[1]
 HUMANOID = character("humanoid")
 LAYOUT = HUMANOID.layout

@@ -27,6 +27,8 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.dynamics import DynamicsModel
 
+pytestmark = pytest.mark.slow
+
 HUMANOID = character("humanoid")
 SIZE = HUMANOID.layout.size
 SETTINGS = preset("humanoid", "jump")

@@ -11,6 +11,8 @@ from msgs_config.errors import ConfigurationError, SimulationError
 from sim_node.pushes import Push
 from sim_node.simulation import Simulation
 
+pytestmark = pytest.mark.slow
+
 HUMANOID = character("humanoid").layout
 LINKS = [link.name for link in character("humanoid").links]
 TICKS = 360

@@ -81,6 +81,7 @@ def in_our_order(kind: ShapeType, size: tuple[float, ...]) -> tuple[float, ...]:
     return size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("robot", "scale"), ROBOTS)
 def test_shapes_are_those_of_the_engine(tmp_path: Path, robot: str, scale: float) -> None:
     # Arrange

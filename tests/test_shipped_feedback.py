@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from ros import Processes
 from test_run import Run, summary_of
 
@@ -13,6 +14,8 @@ from experiment.samcon.reconstruction import duration_of
 from experiment.samcon.settings import preset
 from experiment.samcon.trials import headings
 from experiment.samcon.window_trials import WindowRun, WindowTrials
+
+pytestmark = pytest.mark.slow
 
 FAST = preset("humanoid", "walk", 480, samples=1, kept=1, lookahead=0)
 LATE = {"rate": 480, "command_delay_ticks": 1}

@@ -18,6 +18,8 @@ from experiment.bags.reader import read_messages
 from experiment.domain import own_domain
 from msgs_config import topics
 
+pytestmark = pytest.mark.slow
+
 PROJECT = Path(__file__).parents[1]
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
 SHARED_MEMORY = Path("/dev/shm")

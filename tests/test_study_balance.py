@@ -11,6 +11,8 @@ from experiment.studies import balance
 from experiment.studies.study import Case, Outcome
 from msgs_config import rotations
 
+pytestmark = pytest.mark.slow
+
 
 class Weakling:
     """A laboratory in which all who are pushed harder than by an impulse lie down."""

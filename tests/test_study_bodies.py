@@ -18,6 +18,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character_loading import load_character
 from sim_node.world import WorldSettings
 
+pytestmark = pytest.mark.slow
+
 BODY = RigidBody(2.0, np.array([0.3, 0.5, 0.9]))
 TIMES = np.linspace(0.0, 2.0, 801)
 LOADS = (

@@ -12,6 +12,8 @@ from experiment.studies.equation import TickTime, close
 from experiment.studies.study import Case, Findings
 from msgs_config.wrench_messages import WrenchArrays
 
+pytestmark = pytest.mark.slow
+
 ROUNDING = 1e-10
 NOTICED = 1e-3
 

@@ -20,6 +20,8 @@ from experiment.studies.study import Case, Findings
 from msgs_config.dynamics import DynamicsModel
 from msgs_config.tick_clock import TickClock
 
+pytestmark = pytest.mark.slow
+
 GRAVITY = 9.81
 
 

@@ -16,6 +16,8 @@ from experiment.studies.lift_responses import Gains, Response, find_bound
 from experiment.studies.study import Findings
 from msgs_config.arrays import FloatArray
 
+pytestmark = pytest.mark.slow
+
 PERIOD, STEP = 1.0 / 240.0, 1e-3
 TIMES = np.arange(0.0, 3.0, STEP)
 

@@ -14,6 +14,8 @@ from experiment.studies.study import Case, Findings
 from msgs_config.throw import Throw
 from msgs_config.throw_messages import BallStates, ball_names
 
+pytestmark = pytest.mark.slow
+
 GRAVITY = 9.81
 
 

@@ -25,6 +25,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.bullet import pybullet
 from sim_node.world import WorldSettings
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 1.0 / 240  # s
 
 

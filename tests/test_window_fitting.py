@@ -19,6 +19,8 @@ from experiment.samcon.window_fitting import WindowFit, WindowFitState, fitted_w
 from experiment.samcon.window_trials import WindowRun, WindowTrials
 from msgs_config.errors import ConfigurationError, RunError
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = preset("humanoid", "walk", 240, window=0.0667, feedback={}, window_feedback="")
 PROBLEM = Problem.of("humanoid", "walk", 0.4, SETTINGS, {"rate": 240})  # two cycles of 0.2 s
 
