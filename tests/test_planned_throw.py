@@ -315,6 +315,7 @@ def test_the_bag_says_what_was_thrown_and_where_it_went(thrown: Made) -> None:
     assert there == [0] * (first + 1) + [1] * (second - first) + [2] * (181 - second - 1)
 
 
+@pytest.mark.slow
 def test_a_run_in_one_process_takes_the_same_throws(thrown: Made, tmp_path: Path) -> None:
     prepare_directory(tmp_path / "run", overwrite=False)
 
@@ -324,6 +325,7 @@ def test_a_run_in_one_process_takes_the_same_throws(thrown: Made, tmp_path: Path
     assert summary["state_hash"] == thrown.summary["state_hash"]
 
 
+@pytest.mark.slow
 def test_the_bag_says_what_the_controller_did_about_it(thrown: Made) -> None:
     changes, hit = thrown.recording.modes, CLOCK.stamp_ns(1 + round(0.5 * RATE))
 
@@ -343,6 +345,7 @@ def test_a_replay_through_topics_sends_the_balls_as_well(thrown: Made) -> None:
     assert result.identical and result.states == 181
 
 
+@pytest.mark.slow
 def test_a_replay_is_identical_with_all_the_balls(thrown: Made) -> None:
     result = replay([thrown.recording])
 
@@ -350,6 +353,7 @@ def test_a_replay_is_identical_with_all_the_balls(thrown: Made) -> None:
     assert result.state_hashes == {"": thrown.summary["state_hash"]}
 
 
+@pytest.mark.slow
 def test_a_replay_sees_a_ball_that_is_missing_another_or_elsewhere(thrown: Made) -> None:
     recording = thrown.recording
     ticks = [tick for tick, each in enumerate(recording.throws) if each]
@@ -374,6 +378,7 @@ def test_a_replay_sees_a_ball_that_is_missing_another_or_elsewhere(thrown: Made)
         replay([changed()])
 
 
+@pytest.mark.slow
 def test_a_recording_of_throws_alone_is_replayed_without_them_and_says_so(thrown: Made) -> None:
     silent = replace(thrown.recording, throws=(), balls=())
 

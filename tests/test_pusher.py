@@ -147,6 +147,7 @@ def test_each_push_acts_from_exactly_its_tick_for_the_duration(pushed: Made) -> 
     assert [tick for tick in said if said[tick]] == [1, 2, 3, 40, 41, 42, 43, 60]
 
 
+@pytest.mark.slow
 def test_the_states_are_those_of_one_process_with_the_same_pushes_to_the_bit(pushed: Made) -> None:
     acting = [as_acting(*push) for push in PUSHES]
 
@@ -159,6 +160,7 @@ def test_the_states_are_those_of_one_process_with_the_same_pushes_to_the_bit(pus
         assert recording.velocity[row].tobytes() == state.velocity.tobytes(), row
 
 
+@pytest.mark.slow
 def test_the_states_are_those_without_pushes_until_the_first_one_acts(pushed: Made) -> None:
     alone = states_without_ros(plan_of(), [])
 
@@ -167,6 +169,7 @@ def test_the_states_are_those_without_pushes_until_the_first_one_acts(pushed: Ma
     assert np.abs(first).max() > 0.01
 
 
+@pytest.mark.slow
 def test_a_run_in_one_process_takes_the_same_pushes(pushed: Made, tmp_path: Path) -> None:
     prepare_directory(tmp_path / "run", overwrite=False)
 
@@ -176,6 +179,7 @@ def test_a_run_in_one_process_takes_the_same_pushes(pushed: Made, tmp_path: Path
     assert summary["state_hash"] == pushed.summary["state_hash"]
 
 
+@pytest.mark.slow
 def test_nothing_is_left_behind_but_what_was_planned(pushed: Made) -> None:
     assert pushed.most_alive == 4
     assert pushed.left == []
