@@ -21,6 +21,7 @@ CHEST = LINKS.index("chest")
 MODEL = DynamicsModel(HUMANOID)
 STANDING = np.array(HUMANOID.rest_position)
 FRICTION = 0.9
+WATCHED_TICKS = 5 * RATE_HZ  # a cycle of the longest clip, and its wrap
 
 
 class Watch:
@@ -67,14 +68,14 @@ def test_no_clip_hits_itself(clip: str) -> None:
     watch, largest, touched = Watch(), 0.0, 0
     with clip_run(clip) as simulation:
         # Act
-        for current, _, _ in run_together(simulation, driver({"clip": clip}), 10 * RATE_HZ):
+        for current, _, _ in run_together(simulation, driver({"clip": clip}), WATCHED_TICKS):
             assert simulation.actor.contacts is not None
             wrenches = simulation.actor.contacts.wrenches
             largest = max(largest, watch.impulse(wrenches, current.position))
             touched += bool(wrenches.any())
 
     # Assert
-    assert touched > RATE_HZ  # there were contacts to be told from hits
+    assert touched > WATCHED_TICKS / 10  # there were contacts to be told from hits
     assert largest < 0.5 * THRESHOLD
 
 
