@@ -356,6 +356,7 @@ def test_nothing_touched_before_the_first_tick() -> None:
     assert not contacts.touching.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("substeps", [1, 5])
 def test_contact_forces_are_the_mean_over_the_tick(substeps: int) -> None:
     # Arrange: over a second of falling the ground gives back what the weight gave

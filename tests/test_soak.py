@@ -9,6 +9,7 @@ from benchmarks.soak import soak
 from msgs_config.polling import DirectSubscription
 
 
+@pytest.mark.slow
 def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(domain: int) -> None:
     del domain  # the processes inherit it
 

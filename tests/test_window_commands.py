@@ -83,6 +83,7 @@ def test_a_window_feedback_where_it_cannot_act_is_refused(
 QUICK = ["--samples", "1", "--kept", "1", "--workers", "1", "--rate", "480", "--delay-ticks", "1"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "then"),
     [
