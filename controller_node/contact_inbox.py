@@ -3,10 +3,12 @@
 import numpy as np
 from rclpy.node import Node
 
+from controller_node.simulators import Simulators
 from msgs_config import topics
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
 from msgs_config.errors import MessageError
+from msgs_config.messages import frame_id_of
 from msgs_config.polling import DirectSubscription
 from msgs_config.warnings import Warnings
 from msgs_config.wrench_messages import decode_wrenches
@@ -17,9 +19,12 @@ _MOST_KEPT = 5000  # ticks whose states are yet to come, as many as the queue of
 
 
 class ContactInbox:
-    """Takes `contacts`, and has those of each state ready."""
+    """Takes `contacts` of the bound simulator, and has those of each state ready."""
 
-    def __init__(self, node: Node, character: Character, warnings: Warnings) -> None:
+    def __init__(
+        self, node: Node, character: Character, simulators: Simulators, warnings: Warnings
+    ) -> None:
+        self._simulators = simulators
         self._inbox = DirectSubscription(node, topics.CONTACTS)
         self._rows = {link.name: row for row, link in enumerate(character.links)}
         self._warnings = warnings
@@ -30,6 +35,11 @@ class ContactInbox:
     def begin(self) -> None:
         """An episode begins, whose stamps may be those of another simulator's episode before."""
         self._until_ns = -1
+
+    def restart(self) -> None:
+        """Forget all: what comes from now on is another simulator's."""
+        self._kept.clear()
+        self._until_ns = self._newest_ns = -1
 
     def until(self, stamp_ns: int, episode_ns: int) -> FloatArray | None:
         """Net wrenches (links, 6), N and N m, of all ticks since the last call up to a state.
@@ -55,6 +65,8 @@ class ContactInbox:
 
     def _keep(self, raw: bytes) -> None:
         try:
+            if not self._simulators.is_own(topics.CONTACTS.name, frame_id_of(raw)):
+                return
             message = decode_wrenches(raw)
         except MessageError as error:
             self._warnings.say_once(f"contacts ignored: {error}")

@@ -6,7 +6,6 @@ from contextlib import suppress
 
 import numpy as np
 from rclpy.node import Node
-from std_msgs.msg import Header, String
 
 from controller_node.actuation import Actuation
 from controller_node.behaviours.base import ModeReport
@@ -21,10 +20,12 @@ from controller_node.parameters import (
     make_controller,
     make_settings,
 )
+from controller_node.simulators import Simulators
 from controller_node.strengths_topic import StrengthTopic
 from controller_node.trajectories import Trajectories
 from msgs_config import configuration, topics
 from msgs_config.character_loading import load_character
+from msgs_config.configuration import RunConfiguration
 from msgs_config.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
 from msgs_config.durations import Durations
 from msgs_config.errors import (
@@ -34,14 +35,14 @@ from msgs_config.errors import (
     LayoutError,
     MessageError,
 )
-from msgs_config.messages import JointStateDecoder, decode, state_in_layout
+from msgs_config.messages import JointStateDecoder, state_in_layout
 from msgs_config.node_parameters import LiveParameters, declare, given_parameters
 from msgs_config.parameters import Values, resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
+from msgs_config.session import ANONYMOUS, given_session
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
 from msgs_config.stamped import StampedState
-from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 from msgs_config.warnings import UNLOGGED, Warnings
 
 _FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge the last messages
@@ -73,7 +74,6 @@ class ControllerNode(Node):
         self._answer: Answer | None = None
         self._episode_ns: int | None = None
         self._warnings = Warnings(self)
-        self._simulator_runs_on = False  # it waits for nobody
         self._diagnostics = DiagnosticsPublisher(self)
         self._next_report = 0.0
         self._counts: Counter[str] = Counter(answered=0, repeated=0, ignored=0, overtaken=0)
@@ -86,10 +86,15 @@ class ControllerNode(Node):
 
     def _open_topics(self) -> None:
         self._decoder = JointStateDecoder()
-        self._episodes = DirectSubscription(self, topics.EPISODE)
-        self._simulators = DirectSubscription(self, topics.CONFIGURATION.of(topics.SIM_NODE))
+        self._simulators = Simulators(
+            self,
+            given_session(self._values),
+            self._controller.clock,
+            self._check_simulator,
+            self._warnings,
+        )
         self._contacts = (
-            ContactInbox(self, self._character, self._warnings)
+            ContactInbox(self, self._character, self._simulators, self._warnings)
             if self._controller.needs_contacts
             else None
         )
@@ -126,7 +131,7 @@ class ControllerNode(Node):
         try:
             while not stop:
                 self._report()
-                self._check_simulator()
+                self._simulators.look(time.monotonic())
                 raw = self._next_state()
                 if raw is not None:
                     spinner.received()
@@ -143,11 +148,11 @@ class ControllerNode(Node):
 
     def _next_state(self) -> bytes | None:
         """The next state; in real time the newest, for the others have been overtaken."""
-        raw = self._states.take()
-        if raw is None or not self._simulator_runs_on:
+        raw = self._simulators.next_state(self._states.take)
+        if raw is None or not self._simulators.runs_on:
             return raw
         for _ in range(topics.JOINT_STATES.qos.depth):
-            newer = self._states.take()
+            newer = self._simulators.next_state(self._states.take)
             if newer is None:
                 break
             self._overtake(raw)
@@ -157,7 +162,7 @@ class ControllerNode(Node):
     def _overtake(self, raw: bytes) -> None:
         """Leave a state without an answer, save that it may be the first of an episode."""
         self._counts["overtaken"] += 1
-        if self._answer is not None and self._answer.raw_state == raw:
+        if self._is_answered(raw):
             return
         with suppress(MessageError, LayoutError, ClockError):
             state = state_in_layout(self._layout, self._decoder.decode(raw))
@@ -165,17 +170,8 @@ class ControllerNode(Node):
             if state.effort is None:
                 self._begin_episode(state.stamp_ns)
 
-    def _check_simulator(self) -> None:
+    def _check_simulator(self, simulator: RunConfiguration) -> None:
         """Compare a simulator that says what it simulates with this controller."""
-        raw = self._simulators.take()
-        if raw is None:
-            return
-        try:
-            simulator = configuration.parse(decode(raw, String).data)
-        except MessageError as error:
-            self._warnings.say_once(f"configuration ignored: {error}")
-            return
-        self._simulator_runs_on = simulator.parameters.get("mode") == "realtime"
         if simulator.probe is None:
             return
         if simulator.layout.dof_names != self._layout.dof_names:
@@ -196,14 +192,17 @@ class ControllerNode(Node):
     def _take_state(self, raw: bytes) -> None:
         if not self._is_heard():
             return  # the simulator publishes the state again
-        if self._answer is not None and self._answer.raw_state == raw:
+        if self._is_answered(raw):
+            assert self._answer is not None
             self._counts["repeated"] += 1
             self._outputs.publish(self._answer)
             return
         try:
-            state = state_in_layout(self._layout, self._decoder.decode(raw))
+            arrays = self._decoder.decode(raw)
+            state = state_in_layout(self._layout, arrays)
             _check_finite(state)
             self._controller.clock.tick(state.stamp_ns)  # it is one
+            self._bind(arrays.frame_id)
             episode_ns = self._episode_of(state)
         except (MessageError, LayoutError, ClockError) as error:
             self._counts["ignored"] += 1
@@ -229,6 +228,23 @@ class ControllerNode(Node):
         self._tell_mode()
         self._outputs.publish(self._answer)
 
+    def _is_answered(self, raw: bytes) -> bool:
+        """Whether a state, serialised, is the one that was answered last, of the same simulator."""
+        answer = self._answer
+        return (
+            answer is not None
+            and answer.raw_state == raw
+            and answer.session == self._simulators.bound
+        )
+
+    def _bind(self, frame_id: str) -> None:
+        """Take up a simulator whose state can be used, if there is none; all of another is over."""
+        if self._simulators.bind(frame_id):
+            self._episode_ns = self._waiting = None
+            self._outputs.bind(self._simulators.bound or ANONYMOUS)
+            if self._contacts is not None:
+                self._contacts.restart()
+
     def _tell_mode(self) -> None:
         """Publish what it does, if that is new."""
         mode = self._controller.mode
@@ -245,7 +261,9 @@ class ControllerNode(Node):
 
     def _check_rate(self, state: StampedState) -> None:
         """Say so if states come several ticks apart: their stamps fit any multiple of the rate."""
-        if self._answer is None or state.effort is None or self._simulator_runs_on:
+        if self._answer is None or state.effort is None or self._simulators.runs_on:
+            return
+        if self._answer.session != self._simulators.bound:
             return
         clock = self._controller.clock
         apart = clock.tick(state.stamp_ns) - clock.tick(self._answer.state.stamp_ns)
@@ -259,15 +277,15 @@ class ControllerNode(Node):
         """Stamp of the first state of the state's episode; None if it is not known yet.
 
         The first state says so itself, and begins another episode even with the stamp of the one
-        before: the simulator may have been started again. Who joins later learns it from the
-        latched topic.
+        before: the simulator may have been started again. A controller that joins later learns it
+        from the latched topic, once.
         """
-        raw = self._episodes.take()
-        if raw is not None:
-            stamp = decode(raw, Header).stamp
-            self._episode_ns = stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
         if state.effort is None:
             self._begin_episode(state.stamp_ns)
+        elif self._episode_ns is None:
+            found_ns = self._simulators.episode_before(state.stamp_ns)
+            if found_ns is not None:
+                self._begin_episode(found_ns)
         if self._episode_ns is None or self._episode_ns > state.stamp_ns:
             return None
         return self._episode_ns
@@ -293,7 +311,8 @@ class ControllerNode(Node):
                 "refused_strengths": self._strengths.refused,
                 UNLOGGED: self._warnings.unlogged,
             }
-            self._diagnostics.publish({**self._counts, **refused, **times})
+            counts = {**self._counts, **self._simulators.counts}
+            self._diagnostics.publish({**counts, **refused, **times})
 
     def _check_parameters(self, values: Values) -> None:
         self._controller.check(make_settings(self._character, values))

@@ -17,6 +17,7 @@ from msgs_config import topics
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.joint_layout import JointLayout
 from msgs_config.messages import DoublesEncoder, JointStateEncoder, split_stamp
+from msgs_config.session import ANONYMOUS
 from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.topics import Outgoing
 from msgs_config.wrench_messages import WORLD
@@ -30,6 +31,7 @@ class Answer:
     state: StampedState
     effort: FloatArray  # (n,) what is sent of it, zero elsewhere
     torques: bytes  # the message
+    session: str  # of the simulator whose state it is
     reference: StampedReference
 
 
@@ -40,8 +42,7 @@ class Outputs:
         """Offer the topics; `commanded` are the entries of the effort that are sent."""
         self._layout = layout
         self._commanded = commanded
-        self._torque_encoder = JointStateEncoder([layout.dof_names[entry] for entry in commanded])
-        self._reference_encoder = JointStateEncoder(layout.dof_names)
+        self.bind(ANONYMOUS)
         self._wrench_encoder = DoublesEncoder(WORLD)
         self._initial_states = topics.create_publisher(node, topics.INITIAL_STATE)
         self._references = topics.create_publisher(node, topics.REFERENCE)
@@ -58,6 +59,15 @@ class Outputs:
             self._reference_encoder.encode(state.stamp_ns, state.position, state.velocity)
         )
 
+    def bind(self, session: str) -> None:
+        """Name the simulator's session in what answers its states."""
+        names = self._layout.dof_names
+        self._session = session
+        self._torque_encoder = JointStateEncoder(
+            [names[entry] for entry in self._commanded], session
+        )
+        self._reference_encoder = JointStateEncoder(names, session)
+
     @property
     def torque_subscribers(self) -> int:
         """How many subscribe to the torques."""
@@ -70,7 +80,7 @@ class Outputs:
         torques = self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded])
         sent = np.zeros(self._layout.size)
         sent[self._commanded] = effort[self._commanded]
-        return Answer(raw, state, sent, torques, reference)
+        return Answer(raw, state, sent, torques, self._session, reference)
 
     def publish(self, answer: Answer) -> None:
         """Publish an answer, the torques first: the simulator goes on while the rest is made."""

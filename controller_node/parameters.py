@@ -14,6 +14,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character import ROOT_TORQUE, Character
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Parameter, Values
+from msgs_config.session import SESSION
 from msgs_config.shared_parameters import CHARACTER, GRAVITY, PLACEMENT, RATE
 
 PARAMETERS = [
@@ -66,6 +67,7 @@ PARAMETERS = [
         "largest horizontal force on the feet, as a share of the vertical one",
         live=True,
     ),
+    SESSION,
     Parameter("gain_scale.p", 1.0, "factor on every joint's stiffness, not the root's", live=True),
     Parameter("gain_scale.d", 1.0, "factor on every joint's damping, not the root's", live=True),
 ]

@@ -16,6 +16,7 @@ from msgs_config.joint_layout import JointLayout, JointType
 from msgs_config.meshes import collision_meshes
 from msgs_config.parameters import Value, Values
 from msgs_config.probe import Probe, read_probe
+from msgs_config.session import ANONYMOUS, SESSION, session_of
 from msgs_config.versions import installed_versions, read_versions
 
 
@@ -28,12 +29,14 @@ def describe(
     actuation: Mapping[str, int | bool] | None = None,
     name: str = "",
     characters: Sequence[str] = (),
+    session: str = ANONYMOUS,
 ) -> str:
     """The JSON text: the character with its files, the parameters in force, and the versions.
 
     `since_ns` is the stamp of the last state that was answered with other parameters, if any;
     `probe` and `terrain` are a simulator's, `actuation` a controller's. `name` is the character's
     in its world, where it is one of several: `characters`, in the order in which they entered it.
+    `session` is the simulator's; as a parameter it is left out, for it is of no influence.
 
     Raises:
         CharacterError: a mesh of the character or of the terrain cannot be read.
@@ -45,6 +48,7 @@ def describe(
         "urdf": character.loading.urdf_text,
         "urdf_path": str(character.loading.urdf_path),
         "meshes": collision_meshes(character.loading),
+        "session": session,
         "name": name,
         "characters": list(characters),
         "joints": [
@@ -58,7 +62,9 @@ def describe(
         "probe": None if probe is None else probe.content(),
         "actuation": None if actuation is None else dict(actuation),
         "parameters_after_stamp_ns": since_ns,
-        "parameters": {name: _finite(value) for name, value in values.items()},
+        "parameters": {
+            name: _finite(value) for name, value in values.items() if name != SESSION.name
+        },
         "versions": installed_versions(),
     }
     return json.dumps(content, allow_nan=False)
@@ -80,6 +86,7 @@ class RunConfiguration:
     parameters: dict[str, Any]
     probe: Probe | None = None  # absent where another simulator than ours speaks
     versions: dict[str, str] = field(default_factory=dict)  # of what it runs with
+    session: str = ANONYMOUS
 
 
 def parse(text: str) -> RunConfiguration:
@@ -102,6 +109,7 @@ def parse(text: str) -> RunConfiguration:
             parameters=dict(content["parameters"]),
             probe=None if probe is None else read_probe(probe, layout.size),
             versions=read_versions(content.get("versions")),
+            session=session_of(str(content.get("session", ""))),
         )
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError, LayoutError) as error:
         raise MessageError("not a simulator's configuration") from error

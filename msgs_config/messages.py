@@ -26,6 +26,7 @@ from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _STAMP = 4  # after the encapsulation header
 _NAMES_START = 12  # after the encapsulation header and the stamp
+_FRAME_START = 16  # after the length of the frame's name
 _MAX_KEPT_SENDERS = 16
 _ENTRY_BYTES = {JointState: (8, 8, 8), MultiDOFJointState: (56, 48, 48)}
 _EMPTY = np.zeros(0)
@@ -40,6 +41,7 @@ class JointArrays:
     position: FloatArray
     velocity: FloatArray
     effort: FloatArray
+    frame_id: str = ""
 
 
 def split_stamp(stamp_ns: int) -> tuple[int, int]:
@@ -50,6 +52,21 @@ def split_stamp(stamp_ns: int) -> tuple[int, int]:
 def with_stamp(raw: bytes, stamp_ns: int) -> bytes:
     """A serialised little-endian message that begins with a stamp, with another one instead."""
     return raw[:_STAMP] + struct.pack("<iI", *split_stamp(stamp_ns)) + raw[_NAMES_START:]
+
+
+def frame_id_of(raw: bytes) -> str:
+    """The `frame_id` of a serialised message that begins with a header, or is one.
+
+    Raises:
+        MessageError: the message is too short for that.
+    """
+    try:
+        (length,) = struct.unpack_from("<I" if raw[1] & 1 else ">I", raw, _NAMES_START)
+    except (struct.error, IndexError) as error:
+        raise MessageError(f"{len(raw)} bytes that have no header") from error
+    if _FRAME_START + length > len(raw):
+        raise MessageError(f"a header cut off after {len(raw)} bytes")
+    return raw[_FRAME_START : _FRAME_START + length].rstrip(b"\0").decode(errors="replace")
 
 
 def padding(length: int, alignment: int) -> int:
@@ -114,10 +131,10 @@ def _check_lengths(raw: bytes, entry_bytes: Sequence[int]) -> None:
 
 
 class JointStateEncoder:
-    """Serialises JointState messages that all have the same names."""
+    """Serialises JointState messages that all have the same names and `frame_id`."""
 
-    def __init__(self, names: Sequence[str]) -> None:
-        self._head = CDR_LITTLE_ENDIAN + bytes(8) + cdr_names(names)
+    def __init__(self, names: Sequence[str], frame_id: str = "") -> None:
+        self._head = CDR_LITTLE_ENDIAN + bytes(8) + cdr_names(names, frame_id)
 
     def encode(
         self,
@@ -163,7 +180,7 @@ class JointStateDecoder:
     """Reads serialised JointState messages; fast for senders whose names it has seen."""
 
     def __init__(self) -> None:
-        self._kept: dict[bytes, tuple[str, ...]] = {}
+        self._kept: dict[bytes, tuple[tuple[str, ...], str]] = {}  # names and frame_id
 
     def decode(self, raw: bytes) -> JointArrays:
         """The message's content.
@@ -171,17 +188,19 @@ class JointStateDecoder:
         Raises:
             MessageError: the bytes are no JointState.
         """
-        for head, names in self._kept.items():
+        for head, texts in self._kept.items():
             if raw.startswith(head, _NAMES_START) and raw.startswith(CDR_LITTLE_ENDIAN):
-                return _read_doubles(raw, _NAMES_START + len(head), names)
+                return _read_doubles(raw, _NAMES_START + len(head), *texts)
         return self._decode_slowly(raw)
 
     def _decode_slowly(self, raw: bytes) -> JointArrays:
         message = decode(raw, JointState)
-        names = tuple(message.name)
-        head = cdr_names(names)
-        if raw.startswith(head, _NAMES_START) and len(self._kept) < _MAX_KEPT_SENDERS:
-            self._kept[head] = names
+        names, frame_id = tuple(message.name), str(message.header.frame_id)
+        head = cdr_names(names, frame_id)
+        if raw.startswith(head, _NAMES_START):
+            if len(self._kept) == _MAX_KEPT_SENDERS:  # each start of a simulator is a new sender
+                del self._kept[next(iter(self._kept))]
+            self._kept[head] = names, frame_id
         stamp = message.header.stamp
         return JointArrays(
             stamp_ns=stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec,
@@ -189,10 +208,11 @@ class JointStateDecoder:
             position=np.array(message.position, dtype=float),
             velocity=np.array(message.velocity, dtype=float),
             effort=np.array(message.effort, dtype=float),
+            frame_id=frame_id,
         )
 
 
-def _read_doubles(raw: bytes, offset: int, names: tuple[str, ...]) -> JointArrays:
+def _read_doubles(raw: bytes, offset: int, names: tuple[str, ...], frame_id: str) -> JointArrays:
     """The rest of a message whose names end at `offset`."""
     seconds, nanoseconds = struct.unpack_from("<iI", raw, 4)
     arrays = []
@@ -206,7 +226,9 @@ def _read_doubles(raw: bytes, offset: int, names: tuple[str, ...]) -> JointArray
             offset += 8 * count
     except (struct.error, ValueError) as error:
         raise MessageError(f"a JointState cut off after {len(raw)} bytes") from error
-    return JointArrays(seconds * NANOSECONDS_PER_SECOND + nanoseconds, names, *arrays)
+    stamp_ns = seconds * NANOSECONDS_PER_SECOND + nanoseconds
+    position, velocity, effort = arrays
+    return JointArrays(stamp_ns, names, position, velocity, effort, frame_id)
 
 
 def state_in_layout(layout: JointLayout, arrays: JointArrays) -> StampedState:

@@ -15,7 +15,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages import JointStateDecoder, JointStateEncoder, decode
 from msgs_config.throw import NUMBERS, Throw, throw_of
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
-from msgs_config.wrench_messages import encode_multi_dof
+from msgs_config.wrench_messages import WORLD, encode_multi_dof
 
 _POSE, _TWIST = slice(0, 7), slice(7, 13)
 
@@ -33,8 +33,9 @@ class BallStates:
 class ThrowCodec:
     """Throws to and from serialised messages."""
 
-    def __init__(self) -> None:
-        self._encoder = JointStateEncoder(NUMBERS)
+    def __init__(self, frame_id: str = "") -> None:
+        """`frame_id` is that of what it encodes."""
+        self._encoder = JointStateEncoder(NUMBERS, frame_id)
         self._decoder = JointStateDecoder()
 
     def encode(self, stamp_ns: int, throw: Throw) -> bytes:
@@ -57,10 +58,10 @@ def ball_names(count: int) -> tuple[str, ...]:
     return tuple(f"ball_{number}" for number in range(1, count + 1))
 
 
-def encode_balls(balls: BallStates) -> bytes:
-    """The serialised message, its `frame_id` the world."""
-    motion = balls.motion
-    return encode_multi_dof(balls.stamp_ns, balls.names, motion[:, _POSE], motion[:, _TWIST], ())
+def encode_balls(balls: BallStates, frame_id: str = WORLD) -> bytes:
+    """The serialised message."""
+    rows = (balls.motion[:, _POSE], balls.motion[:, _TWIST], ())
+    return encode_multi_dof(balls.stamp_ns, balls.names, *rows, frame_id=frame_id)
 
 
 def decode_balls(raw: bytes) -> BallStates:

@@ -75,11 +75,11 @@ class Topic:
         """The topic below a namespace; with an empty one it is the topic itself."""
         return replace(self, name=f"{namespace}/{self.name}") if namespace else self
 
-    def for_listener(self) -> "Topic":
-        """The topic for who must not miss anything, however seldom it takes what has come."""
+    def for_listener(self, depth: int = LISTENING_DEPTH) -> "Topic":
+        """The topic with a queue for a listener that must not miss what several publishers say."""
         qos = QoSProfile(
             history=HistoryPolicy.KEEP_LAST,
-            depth=LISTENING_DEPTH,
+            depth=depth,
             reliability=self.qos.reliability,
             durability=self.qos.durability,
         )

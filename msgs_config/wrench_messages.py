@@ -6,7 +6,7 @@ are any, are points of application in the link frames; everything else in the me
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -43,6 +43,7 @@ class WrenchArrays:
     links: tuple[str, ...]  # (m,)
     wrenches: FloatArray  # (m, 6): force N, torque N m; world axes
     points: FloatArray  # (m, 3) in m, link frames; or (0, 3)
+    frame_id: str = WORLD  # or the session that it is of
 
     @classmethod
     def of_rows(
@@ -51,6 +52,7 @@ class WrenchArrays:
         links: Sequence[str],
         wrenches: Rows,
         points: Rows,
+        frame_id: str = WORLD,
     ) -> "WrenchArrays":
         """From one wrench (6,) and one point (3,) a link."""
         return cls(
@@ -58,28 +60,36 @@ class WrenchArrays:
             tuple(links),
             np.array(wrenches, dtype=float).reshape(-1, 6),
             np.array(points, dtype=float).reshape(-1, 3),
+            frame_id,
         )
 
 
 def encode_wrenches(wrenches: WrenchArrays) -> bytes:
-    """The serialised message, its `frame_id` the world."""
+    """The serialised message."""
     transforms: Rows = ()  # mostly: then as little work as can be
     if len(wrenches.points):
         turns = np.tile(_NO_TURN_XYZW, (len(wrenches.points), 1))
         transforms = np.hstack((wrenches.points, turns))
-    return encode_multi_dof(wrenches.stamp_ns, wrenches.links, transforms, (), wrenches.wrenches)
+    rows = (transforms, (), wrenches.wrenches)
+    return encode_multi_dof(wrenches.stamp_ns, wrenches.links, *rows, frame_id=wrenches.frame_id)
 
 
 def encode_multi_dof(
-    stamp_ns: int, names: Sequence[str], transforms: Rows, twists: Rows, wrenches: Rows
+    stamp_ns: int,
+    names: Sequence[str],
+    transforms: Rows,
+    twists: Rows,
+    wrenches: Rows,
+    *,
+    frame_id: str = WORLD,
 ) -> bytes:
-    """A serialised MultiDOFJointState, its `frame_id` the world.
+    """A serialised MultiDOFJointState.
 
     Rows are of 7 (translation, rotation xyzw), 6 (linear, angular) and 6 numbers (force, torque).
     """
     content = bytearray(CDR_LITTLE_ENDIAN)
     content += struct.pack("<iI", *split_stamp(stamp_ns))
-    content += cdr_names(names, frame_id=WORLD)
+    content += cdr_names(names, frame_id)
     for rows in (transforms, twists, wrenches):
         content += struct.pack("<I", len(rows))
         if len(rows):
@@ -108,6 +118,9 @@ def _decode_plainly(raw: bytes) -> WrenchArrays | None:
     if not raw.startswith(CDR_LITTLE_ENDIAN):
         return None
     seconds, nanoseconds, length = struct.unpack_from("<iII", raw, 4)
+    if raw.find(b"\0", _HEADER_END, _HEADER_END + length) != _HEADER_END + length - 1:
+        return None
+    frame_id = str(raw[_HEADER_END : _HEADER_END + length - 1], "utf-8")
     count, offset = _count_at(raw, _HEADER_END + length)
     names = []
     for _ in range(count):
@@ -121,7 +134,7 @@ def _decode_plainly(raw: bytes) -> WrenchArrays | None:
     wrenches, offset = _doubles_at(raw, offset, 6)
     stamp_ns = seconds * NANOSECONDS_PER_SECOND + nanoseconds
     points = transforms[:, :3].copy() if len(transforms) else _NO_POINTS  # mostly
-    return WrenchArrays(stamp_ns, tuple(names), wrenches, points)
+    return WrenchArrays(stamp_ns, tuple(names), wrenches, points, frame_id)
 
 
 def _count_at(raw: bytes, offset: int) -> tuple[int, int]:
@@ -150,28 +163,31 @@ def _decode_slowly(raw: bytes) -> WrenchArrays:
     ]
     points = [(t.translation.x, t.translation.y, t.translation.z) for t in message.transforms]
     stamp_ns = stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
-    return WrenchArrays.of_rows(stamp_ns, message.joint_names, wrenches, points)
+    frame_id = str(message.header.frame_id)
+    return WrenchArrays.of_rows(stamp_ns, message.joint_names, wrenches, points, frame_id)
 
 
 class ContactEncoder:
     """Serialises what touches a character's links; fast for links that have touched together."""
 
-    def __init__(self, links: Sequence[str]) -> None:
+    def __init__(self, links: Sequence[str], frame_id: str = WORLD) -> None:
         """Names of all links, in the order of the arrays."""
         self._links = links
+        self._frame_id = frame_id
         self._heads: dict[bytes, bytes] = {}  # by which links touch: all before the numbers
 
     def encode(self, stamp_ns: int, wrenches: FloatArray, touching: BoolArray) -> bytes:
         """The serialised message with those of the wrenches (links, 6), N and N m, that touch.
 
-        It is `encode_wrenches` of `select`, to the byte.
+        It is `encode_wrenches` of `select`, with the frame's name, to the byte.
         """
         key = touching.tobytes()
         head = self._heads.get(key)
         if head is None:
             if len(self._heads) == _MOST_KEPT_HEADS:
                 self._heads.clear()
-            chosen = encode_wrenches(select(0, self._links, wrenches, touching))
+            selected = select(0, self._links, wrenches, touching)
+            chosen = encode_wrenches(replace(selected, frame_id=self._frame_id))
             head = self._heads[key] = chosen[: len(chosen) - 8 * 6 * np.count_nonzero(touching)]
         return with_stamp(head, stamp_ns) + wrenches[touching].tobytes()
 

@@ -7,7 +7,9 @@ from typing import TypeAlias
 from rclpy.node import Node
 
 from msgs_config.errors import CommandError, MessageError
+from msgs_config.messages import frame_id_of
 from msgs_config.polling import DirectSubscription
+from msgs_config.session import ANONYMOUS, ForeignSessions, session_of
 from msgs_config.tick_clock import TickClock
 from msgs_config.topics import Topic
 from msgs_config.warnings import Warnings
@@ -19,6 +21,30 @@ FirstTick: TypeAlias = Callable[[int], int]
 """The tick that a stamp in ns is for; raises CommandError if that is over."""
 
 
+class OwnSession:
+    """Rejects what names the session of another simulator; what names none may be for any."""
+
+    def __init__(self, session: str, warnings: Warnings) -> None:
+        self._session = session
+        self._warnings = warnings
+        self._foreign = ForeignSessions()
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many messages were rejected, by the topic's name."""
+        return self._foreign.counts
+
+    def rejects(self, topic: Topic, frame_id: str) -> bool:
+        """Whether a message with this `frame_id` is for another simulator; it is counted then."""
+        session = session_of(frame_id)
+        if session in (self._session, ANONYMOUS):
+            return False
+        line = self._foreign.reject(topic.name, session, self._session)
+        if line is not None:
+            self._warnings.say_once(line)
+        return True
+
+
 class _PastError(CommandError):
     """A message is for a tick that is over, which is told once, whatever its stamp."""
 
@@ -26,9 +52,13 @@ class _PastError(CommandError):
 class StampedInbox:
     """A topic whose messages act from the first tick not before their stamp; 0: from the next."""
 
-    def __init__(self, node: Node, topic: Topic, what: str, of: str, warnings: Warnings) -> None:
+    def __init__(
+        self, node: Node, topic: Topic, what: str, of: str, own: OwnSession, warnings: Warnings
+    ) -> None:
         """Subscribe; warnings begin with `what` and whom it is `of`."""
         self.counts = Counter[str]()
+        self._topic = topic
+        self._own = own
         self._what = what
         self._of = of
         self._warnings = warnings
@@ -51,6 +81,8 @@ class StampedInbox:
             if raw is None:
                 return
             try:
+                if self._own.rejects(self._topic, frame_id_of(raw)):
+                    continue
                 use(raw, first_tick)
                 self.counts["accepted"] += 1
             except (MessageError, CommandError) as error:

@@ -14,6 +14,7 @@ from msgs_config.node_parameters import LiveParameters, declare, given_parameter
 from msgs_config.parameters import Values
 from msgs_config.polling import Spinner
 from msgs_config.process import StopSignal
+from msgs_config.session import given_session, make_session
 from msgs_config.tick_clock import FIRST_TICK
 from msgs_config.topics import Outgoing
 from msgs_config.warnings import UNLOGGED, Warnings
@@ -34,6 +35,7 @@ from sim_node.patience import Due, Patience
 from sim_node.port import Port, open_ports, publish_configurations
 from sim_node.realtime import CommandHold
 from sim_node.report import report
+from sim_node.rivals import RivalWatch
 from sim_node.run_control import RunControl
 from sim_node.services import Services
 from sim_node.simulation import Simulation
@@ -69,9 +71,11 @@ class SimNode(Node):
         self._simulation = Simulation(roles, make_settings(values))
         self._initial_states = InitialStates(self, cast, self._simulation)
         declare(self, self._initial_states.known, values)
+        self._session = given_session(values) or make_session(self.get_fully_qualified_name())
         self._warnings = Warnings(self)
-        self._ports = open_ports(self, cast, self._simulation, self._warnings)
-        self._world_port = WorldPort(self, self._simulation, self._warnings)
+        self._ports = open_ports(self, cast, self._simulation, self._session, self._warnings)
+        self._rivals = RivalWatch(self, self._ports, self._session, self._warnings)
+        self._world_port = WorldPort(self, self._simulation, self._session, self._warnings)
         self._clock_topic = topics.create_publisher(self, topics.CLOCK)
         self._max_ticks = values.integer("max_ticks")
         self._patience = Patience(
@@ -104,7 +108,9 @@ class SimNode(Node):
             cast = self._initial_states.settle(stop, spinner)
             if cast is None:
                 return
-            publish_configurations(self._ports, cast, self._simulation.settings.world)
+            publish_configurations(
+                self._ports, cast, self._simulation.settings.world, self._session
+            )
             self._wait_for_subscribers(stop, spinner)
             self._begin_episode()
             while not stop and not self._finished:
@@ -261,11 +267,12 @@ class SimNode(Node):
             self._next_diagnostics = now + DIAGNOSTICS_PERIOD
             self._publish_diagnostics()
             self._tell_conflicts()
+            self._rivals.look()
         for due in self._patience.due(now):
             waits = self._control.runs and not self._complete
             if due is Due.REPUBLISH:
                 for port in self._ports:
-                    port.outputs.republish(with_state=waits)
+                    port.outputs.republish(with_state=waits, with_episode=self._rivals.seen)
             elif waits and due is Due.EXPLAIN:
                 self.get_logger().warning(self._describe_waiting())
             elif waits and self._simulation.tick > FIRST_TICK:  # before that it just waits
@@ -335,6 +342,7 @@ class SimNode(Node):
         values: dict[str, object] = {
             "tick": self._simulation.tick,
             "episode": self._simulation.episode,
+            "session": self._session,
             "paused": self._control.paused,
             "timeouts": self._timeouts,
             UNLOGGED: self._warnings.unlogged,

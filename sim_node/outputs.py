@@ -10,25 +10,29 @@ from std_msgs.msg import Header, String
 from msgs_config import topics
 from msgs_config.messages import JointStateEncoder, split_stamp, with_stamp
 from msgs_config.robot_description import robot_description
+from msgs_config.session import episode_text
 from msgs_config.topics import Outgoing, Topic
 from msgs_config.wrench_messages import ContactEncoder, WrenchArrays, encode_wrenches
 from sim_node.actor import Actor
 from sim_node.display import Display
 
-_NO_WRENCHES = encode_wrenches(WrenchArrays.of_rows(0, [], [], []))
-
 
 class Outputs:
     """The publishers of one character. A topic that nobody listens to costs nothing."""
 
-    def __init__(self, node: Node, actor: Actor, display_ticks: int) -> None:
-        """Offer the topics, below the character's name; markers come every `display_ticks`."""
+    def __init__(self, node: Node, actor: Actor, display_ticks: int, session: str) -> None:
+        """Offer the topics, below the character's name; markers come every `display_ticks`.
+
+        What is said names the simulator's session.
+        """
         self._actor = actor
+        self._session = session
+        self._no_wrenches = encode_wrenches(WrenchArrays.of_rows(0, [], [], [], session))
         namespace = actor.role.name
         self._display_ticks = display_ticks
-        self._encoder = JointStateEncoder(actor.layout.dof_names)
+        self._encoder = JointStateEncoder(actor.layout.dof_names, session)
         self._links = [link.name for link in actor.character.links]
-        self._contact_encoder = ContactEncoder(self._links)
+        self._contact_encoder = ContactEncoder(self._links, session)
 
         def offer(topic: Topic) -> Publisher:
             return topics.create_publisher(node, topic.under(namespace))
@@ -40,6 +44,7 @@ class Outputs:
         self._wrenches = offer(topics.APPLIED_WRENCH)
         self._display = Display(node, actor, namespace)
         self._last_state = b""
+        self._last_episode: Header | None = None
         description = robot_description(actor.character)
         if description is not None:
             self._description = offer(topics.ROBOT_DESCRIPTION)
@@ -63,7 +68,9 @@ class Outputs:
         """Publish that an episode begins with the state of this stamp."""
         seconds, nanoseconds = split_stamp(stamp_ns)
         stamp = Time(sec=seconds, nanosec=nanoseconds)
-        self._episode.publish(Header(stamp=stamp, frame_id=str(number)))
+        frame_id = episode_text(number, self._session)
+        self._last_episode = Header(stamp=stamp, frame_id=frame_id)
+        self._episode.publish(self._last_episode)
 
     def before_state(self) -> Iterator[Outgoing]:
         """What a controller may wait for beside a tick's state, which comes after it."""
@@ -87,12 +94,15 @@ class Outputs:
         if tick % self._display_ticks == 0 or self._actor.state.effort is None:
             self._display.publish_markers()
 
-    def republish(self, *, with_state: bool) -> None:
-        """Publish the markers again, and the last state, the same bytes, for who joined late.
+    def republish(self, *, with_state: bool, with_episode: bool) -> None:
+        """Publish the markers again, and the last state, the same bytes, for late joiners.
 
-        Who needs the contacts waits for those as well.
+        A controller that needs the contacts waits for those as well. The episode shows that a
+        simulator that is paused or held back is still there.
         """
         self._display.publish_markers()
+        if with_episode and self._last_episode is not None:
+            self._episode.publish(self._last_episode)
         if with_state:
             if self.wants_contacts:
                 self._contacts.publish(self._encode_contacts())
@@ -107,19 +117,20 @@ class Outputs:
         """What touched; nothing if nobody listened while it happened."""
         contacts, stamp_ns = self._actor.contacts, self._actor.state.stamp_ns
         if contacts is None:
-            return with_stamp(_NO_WRENCHES, stamp_ns)
+            return with_stamp(self._no_wrenches, stamp_ns)
         return self._contact_encoder.encode(stamp_ns, contacts.wrenches, contacts.touching)
 
     def _encode_applied(self) -> bytes:
         """What pushed during the tick."""
         pushes, stamp_ns = self._actor.pushes, self._actor.state.stamp_ns
         if not pushes:
-            return with_stamp(_NO_WRENCHES, stamp_ns)
+            return with_stamp(self._no_wrenches, stamp_ns)
         return encode_wrenches(
             WrenchArrays.of_rows(
                 stamp_ns,
                 [self._links[push.link] for push in pushes],
                 [push.wrench for push in pushes],
                 [push.point for push in pushes],
+                self._session,
             )
         )

@@ -10,6 +10,7 @@ from msgs_config.character import Character, Loading
 from msgs_config.character_loading import load_character
 from msgs_config.errors import CharacterError, ConfigurationError, LayoutError
 from msgs_config.parameters import Parameter, Value, Values, resolve
+from msgs_config.session import SESSION
 from msgs_config.shared_parameters import (
     CHARACTER,
     GRAVITY,
@@ -117,6 +118,7 @@ WORLD_PARAMETERS = [
         minimum=0.001,
         maximum=1000.0,
     ),
+    SESSION,
 ]
 CHARACTERS = Parameter(
     "characters",

@@ -14,7 +14,7 @@ from msgs_config.tick_clock import TickClock
 from msgs_config.warnings import Warnings
 from msgs_config.wrench_messages import decode_wrenches
 from sim_node.actor import Actor
-from sim_node.inbox import FirstTick, StampedInbox, forget
+from sim_node.inbox import FirstTick, OwnSession, StampedInbox, forget
 from sim_node.lockstep import LockstepBarrier, Verdict
 from sim_node.outputs import Outputs
 from sim_node.parameters import Cast, command_timeout_ns, display_ticks, is_realtime
@@ -36,6 +36,7 @@ class Port:
         actor: Actor,
         collector: Collector,
         outputs: Outputs,
+        session: str,
         warnings: Warnings,
     ) -> None:
         """Subscribe to the character's topics; `collector` judges its commands."""
@@ -43,6 +44,7 @@ class Port:
         self.actor = actor
         self.collector = collector
         self.outputs = outputs
+        self.states = topics.JOINT_STATES.under(namespace)
         self.torques = topics.JOINT_TORQUES.under(namespace)
         self.last_effort = collector.effort
         self._pushes = PushSchedule(actor.character)
@@ -50,13 +52,23 @@ class Port:
         self._commands = DirectSubscription(node, self.torques)
         self._warnings = warnings
         self._of = f" for '{namespace}'" if namespace else ""
-        wrench = topics.EXTERNAL_WRENCH.under(namespace)
-        self._wrenches = StampedInbox(node, wrench, "push", self._of, warnings)
+        self._own = OwnSession(session, warnings)
+        self._wrench = topics.EXTERNAL_WRENCH.under(namespace)
+        self._wrenches = StampedInbox(node, self._wrench, "push", self._of, self._own, warnings)
 
     @property
     def push_counts(self) -> Counter[str]:
         """How many pushes were taken and refused."""
         return self._wrenches.counts
+
+    @property
+    def foreign_counts(self) -> dict[str, object]:
+        """How many commands and pushes named the session of another simulator."""
+        counts = self._own.counts
+        return {
+            "foreign_commands": counts[self.torques.name],
+            "foreign_pushes": counts[self._wrench.name],
+        }
 
     @property
     def missing(self) -> list[str]:
@@ -82,6 +94,8 @@ class Port:
             return None
         try:
             command = self._decoder.decode(raw)
+            if self._own.rejects(self.torques, command.frame_id):
+                return Verdict.REJECTED
             indices = self.actor.layout.indices(command.names)
             verdict = self.collector.offer(command.stamp_ns, indices, command.effort)
         except (MessageError, LayoutError, CommandError) as error:
@@ -113,12 +127,16 @@ class Port:
         return self._pushes.take(tick)
 
 
-def open_ports(node: Node, cast: Cast, simulation: Simulation, warnings: Warnings) -> list[Port]:
-    """A port for each character."""
-    return [_open_port(node, actor, cast.values, warnings) for actor in simulation.actors]
+def open_ports(
+    node: Node, cast: Cast, simulation: Simulation, session: str, warnings: Warnings
+) -> list[Port]:
+    """A port for each character; all say the same session."""
+    return [_open_port(node, actor, cast.values, session, warnings) for actor in simulation.actors]
 
 
-def publish_configurations(ports: Iterable[Port], cast: Cast, world: WorldSettings) -> None:
+def publish_configurations(
+    ports: Iterable[Port], cast: Cast, world: WorldSettings, session: str
+) -> None:
     """Publish what the run of each character depends on, its initial state among it.
 
     Raises:
@@ -133,16 +151,17 @@ def publish_configurations(ports: Iterable[Port], cast: Cast, world: WorldSettin
                 terrain=world.terrain,
                 name=part.name,
                 characters=cast.names,
+                session=session,
             )
         )
 
 
-def _open_port(node: Node, actor: Actor, values: Values, warnings: Warnings) -> Port:
+def _open_port(node: Node, actor: Actor, values: Values, session: str, warnings: Warnings) -> Port:
     names, commanded = actor.layout.dof_names, actor.commanded
     collector: Collector = LockstepBarrier(names, commanded)
     if is_realtime(values):
         collector = CommandHold(names, commanded, command_timeout_ns(values))
     for note in actor.notes:
         node.get_logger().warning(f"{actor.role.prefix}{note}")
-    outputs = Outputs(node, actor, display_ticks(values))
-    return Port(node, actor, collector, outputs, warnings)
+    outputs = Outputs(node, actor, display_ticks(values), session)
+    return Port(node, actor, collector, outputs, session, warnings)

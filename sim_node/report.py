@@ -13,6 +13,7 @@ def report(port: Port) -> dict[str, object]:
     values: dict[str, object] = {verdict.value: collector.counts[verdict] for verdict in Verdict}
     for verdict in ("accepted", "rejected"):
         values[f"{verdict}_pushes"] = port.push_counts[verdict]
+    values |= port.foreign_counts
     values["saturated_ticks"] = sum(int(count) for count in actor.saturated_ticks)
     saturated = actor.saturated_ticks > 0
     names = [n for n, yes in zip(actor.character.vector_names, saturated, strict=True) if yes]

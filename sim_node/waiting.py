@@ -44,6 +44,13 @@ def publisher_names(node: Node, topic: Topic, *, wait_for_names: bool = True) ->
         time.sleep(_NAME_POLL)
 
 
+def all_publisher_names(node: Node, topic: Topic) -> list[str] | None:
+    """The full name of each publisher's node, one for each publisher; None if one is to come."""
+    infos = node.get_publishers_info_by_topic(topic.name)
+    names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos]
+    return None if any(_UNKNOWN in name for name in names) else sorted(names)
+
+
 def describe_publishers(node: Node, topic: Topic) -> str:
     """One sentence: the nodes that publish on a topic, and whose QoS does not fit."""
     infos = node.get_publishers_info_by_topic(topic.name)

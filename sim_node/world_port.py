@@ -9,7 +9,7 @@ from msgs_config.throw import Throw
 from msgs_config.throw_messages import BallStates, ThrowCodec, ball_names, encode_balls
 from msgs_config.topics import Outgoing
 from msgs_config.warnings import Warnings
-from sim_node.inbox import FirstTick, StampedInbox
+from sim_node.inbox import FirstTick, OwnSession, StampedInbox
 from sim_node.simulation import Simulation
 from sim_node.throwing import ThrowSchedule
 
@@ -17,20 +17,25 @@ from sim_node.throwing import ThrowSchedule
 class WorldPort:
     """Takes throws, and says which ones began and where the balls are."""
 
-    def __init__(self, node: Node, simulation: Simulation, warnings: Warnings) -> None:
+    def __init__(
+        self, node: Node, simulation: Simulation, session: str, warnings: Warnings
+    ) -> None:
         """Offer the topics, in the node's own namespace."""
+        self._session = session
+        self._own = OwnSession(session, warnings)
         self._simulation = simulation
         self._schedule = ThrowSchedule()
-        self._codec = ThrowCodec()
+        self._codec = ThrowCodec(session)
         self._told_ns = -1  # of the last throws that were published
-        self._inbox = StampedInbox(node, topics.THROW, "throw", "", warnings)
+        self._inbox = StampedInbox(node, topics.THROW, "throw", "", self._own, warnings)
         self._applied = topics.create_publisher(node, topics.APPLIED_THROW)
         self._thrown = topics.create_publisher(node, topics.THROWN)
 
     @property
     def counts(self) -> dict[str, object]:
         """How many throws were taken and refused, for the diagnostics."""
-        return {f"{kind}_throws": self._inbox.counts[kind] for kind in ("accepted", "rejected")}
+        counts = {f"{kind}_throws": self._inbox.counts[kind] for kind in ("accepted", "rejected")}
+        return {**counts, "foreign_throws": self._own.counts[topics.THROW.name]}
 
     def take_throws(self) -> list[Throw]:
         """The throws that begin with the present state, with those just sent."""
@@ -55,7 +60,7 @@ class WorldPort:
         if self._thrown.get_subscription_count():
             names = ball_names(len(simulation.balls))
             balls = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
-            yield self._thrown, encode_balls(balls)
+            yield self._thrown, encode_balls(balls, self._session)
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has all that was said, at the most `seconds`; whether so."""

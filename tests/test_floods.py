@@ -151,8 +151,9 @@ def test_a_controller_lives_through_simulators_that_come_and_go(
             simulator.wait()
         else:
             assert simulator.wait() == 0
-        states = dict(zip(client.states.ticks(), client.states.raw, strict=True))
-        runs.append([states[tick] for tick in range(1, 122)])
+        states = client.states.by_tick()
+        numbers = [(states[tick].position, states[tick].velocity) for tick in range(1, 122)]
+        runs.append([(position.tobytes(), speed.tobytes()) for position, speed in numbers])
         client.states.messages.clear()
         client.states.raw.clear()
 

@@ -621,15 +621,17 @@ def test_bytes_that_are_no_configuration_are_an_error_of_the_projects_own() -> N
 @pytest.mark.parametrize("name", shipped_characters())
 def test_a_configuration_is_json_that_any_language_reads_and_says_the_same(name: str) -> None:
     whole = character(name)
-    values = resolve(PARAMETERS + character_parameters(whole), {})
+    values = resolve(PARAMETERS + character_parameters(whole), {"session": "/a#1"})
 
-    text = configuration.describe(whole, values)
+    text = configuration.describe(whole, values, session="/b#2")
 
     json.loads(text, parse_constant=pytest.fail)  # JSON knows no Infinity and no NaN
     known = configuration.parse(text)
     assert known.layout.dof_names == whole.layout.dof_names
     assert known.effort_limits.tolist() == whole.effort_limits().tolist()
+    del values["session"]  # which is of no influence
     assert known.parameters == values
+    assert known.session == "/b#2"
 
 
 @pytest.mark.parametrize("name", shipped_characters())

@@ -62,7 +62,7 @@ def test_episode_clock_and_states_begin_at_tick_one_and_the_first_state_has_no_e
     assert len(state.effort) == 0
     client.spin_until(lambda: client.episodes.messages and client.clock.messages, "both")
     (episode,) = client.episodes.messages
-    assert (stamp_ns(episode), episode.frame_id) == (TICK_NS, "1")
+    assert (stamp_ns(episode), episode.frame_id) == (TICK_NS, f"1 {state.header.frame_id}")
     assert client.clock.last.clock.nanosec == TICK_NS
 
 
@@ -81,7 +81,9 @@ def test_the_configuration_holds_all_that_a_run_depends_on(
     assert content["joints"] == [{"name": "height", "type": "prismatic"}]
     assert content["mass"] == lift.mass
     names = {parameter.name for parameter in PARAMETERS + character_parameters(lift)}
-    assert set(content["parameters"]) == names
+    assert set(content["parameters"]) == names - {"session"}  # which is of no influence
+    assert content["session"] == client.state(1).header.frame_id
+    assert re.fullmatch("/sim_node#[0-9a-f]{12}", content["session"])
     assert content["parameters"]["initial_position"] == [0.25]
     assert content["parameters"]["initial_velocity"] == [0.0]
     assert content["parameters"]["gravity"] == 1.62
