@@ -17,7 +17,7 @@ endif
 # and for each worker of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help venv demo test quick hashes other-numpy bench soak kills long-recording format clean distclean
+.PHONY: help venv demo test quick hashes other-numpy bench soak kills noise long-recording format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -57,6 +57,9 @@ soak: .venv/.installed ## Run 500,000 ticks with disturbances; no tick lost, no 
 
 kills: .venv/.installed-test ## Kill the recorder 100 times; every bag is recovered
 	$(BIN)/python -m benchmarks.kills
+
+noise: .venv/.installed ## Run among 20,000 mutated messages on each topic; same states, no memory grown
+	$(BIN)/python -m benchmarks.noise
 
 long-recording: .venv/.installed ## Record 5 minutes at 1 kHz; no message lost
 	$(BIN)/python -m benchmarks.long_recording

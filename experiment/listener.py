@@ -124,8 +124,12 @@ class RunListener:
             StampedReference(state.stamp_ns, state.position, state.velocity)
         )
 
+    def _is_own(self, session: str) -> bool:
+        """Whether a status is of the simulator that is measured, or does not say of which."""
+        return self._configuration is None or session in ("", self._configuration.session)
+
     def _take_counts(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name == self._simulator:
-                values = {item.key: item.value for item in status.values}
+            values = {item.key: item.value for item in status.values}
+            if status.name == self._simulator and self._is_own(values.get("session", "")):
                 self._counts |= {name: int(values[name]) for name in self._counts if name in values}

@@ -28,6 +28,7 @@ _SET_BY_RUN = {
     "characters": "nobody: a run has one character; start sim_node itself for several",
     INITIAL_STATE: "the run itself: where the reference begins, unless initial_position says it",
     "max_ticks": "--duration",
+    "session": "the run itself, which makes one for all its nodes",
     "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",
 }
 _LOCKSTEP_TIMEOUT = 60.0  # s that one answer may take, on a machine that may be busy

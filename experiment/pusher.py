@@ -1,6 +1,7 @@
 """`pusher`: sends pushes and throws that were planned before a run, each for its tick."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rclpy.duration import Duration
@@ -13,6 +14,7 @@ from msgs_config.node_parameters import declare, given_parameters
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
+from msgs_config.session import SESSION, given_session
 from msgs_config.throw_messages import ThrowCodec
 from msgs_config.topics import Topic
 from msgs_config.wrench_messages import encode_wrenches
@@ -24,6 +26,7 @@ PARAMETERS = [
         "wait_for_subscribers", 1, "send when this many subscribe to external_wrench", maximum=1000
     ),
     Parameter("throw_subscribers", 1, "likewise to throw", maximum=1000),
+    SESSION,
 ]
 
 _PATIENCE = Duration(seconds=10)  # until the simulator has what was sent
@@ -44,17 +47,18 @@ class PusherNode(Node):
         super().__init__("pusher")
         values = resolve(PARAMETERS, given_parameters(self))
         declare(self, PARAMETERS, values)
+        session = given_session(values)
         pushes = read_pushes(Path(values.text("file")))
         self._outboxes = [
             _Outbox(
                 self,
                 topics.EXTERNAL_WRENCH,
-                [encode_wrenches(push.arrays()) for push in pushes],
+                [encode_wrenches(replace(push.arrays(), frame_id=session)) for push in pushes],
                 values.integer("wait_for_subscribers"),
             )
         ]
         if values.text("throws"):
-            throws, codec = read_throws(Path(values.text("throws"))), ThrowCodec()
+            throws, codec = read_throws(Path(values.text("throws"))), ThrowCodec(session)
             self._outboxes.append(
                 _Outbox(
                     self,

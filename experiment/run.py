@@ -16,6 +16,7 @@ from experiment.planned_throw import PlannedThrow, write_throws
 from experiment.processes import Child, Children
 from msgs_config import configuration
 from msgs_config.errors import RunError
+from msgs_config.session import SESSION, make_session
 
 _START_PATIENCE = 120.0  # s until the first answer, on a machine that may be busy with other things
 _POLL_PERIOD = 0.05  # s
@@ -45,12 +46,14 @@ def run_over_topics(
         RunError: one of the processes failed, with its own message, or what was planned came too
             late.
     """
+    # each process takes what is of this run alone, whoever else is in the domain
+    session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
     with _environment(directory) as environment, Children() as children:
 
         def start(name: str, module: str, parameters: Mapping[str, object], *more: str) -> Child:
             file = write_parameters(directory, name, parameters)
             log = directory / LOGS / f"{name}.log"
-            arguments = ["--ros-args", "--params-file", str(file), *more]
+            arguments = ["--ros-args", "--params-file", str(file), *session, *more]
             return children.start(lambda: Child(name, module, arguments, log, environment))
 
         listening = {
@@ -179,6 +182,7 @@ def run_in_process(
     figures = measurement.summary(wall_time=time.perf_counter() - started)
     counts = {"rejected_commands": 0, "duplicate_commands": 0}
     counts |= {"rejected_pushes": 0, "rejected_throws": 0}
-    losses: dict[str, object] = {"missing_ticks": 0, "dropped_references": 0, "lost_messages": {}}
+    losses: dict[str, object] = {"missing_ticks": 0, "dropped_references": 0}
+    losses |= {"lost_messages": {}, "foreign_messages": {}}
     summary = {"character": known.character} | figures | counts | losses
     write_figures(directory, summary, measurement.series())

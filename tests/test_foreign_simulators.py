@@ -302,6 +302,7 @@ def test_a_session_that_is_none_is_refused_in_one_line(processes: Processes) -> 
     nodes = [
         processes.controller("pendulum", session="mine"),
         processes.simulator(session="mine"),
+        processes.node(topics.RECORDER_NODE, session="mine"),
     ]
 
     for node in nodes:

@@ -15,6 +15,7 @@ from msgs_config import topics
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import LayoutError, MessageError, RecordingError
 from msgs_config.messages import JointStateDecoder, decode, state_in_layout
+from msgs_config.session import ANONYMOUS, session_of
 from msgs_config.shared_parameters import RATE
 from msgs_config.tick_clock import TickClock
 from msgs_config.wrench_messages import WrenchArrays, decode_wrenches
@@ -162,6 +163,7 @@ class Track:
         rate = self.rebuilt.known.parameters.get(RATE.name)
         if not isinstance(rate, int):
             raise RecordingError(f"the simulator's 'rate' is {rate}, not a number")
+        self._session = self.rebuilt.known.session
         self._layout, self._clock = self.rebuilt.known.layout, TickClock(rate)
         self._nothing = np.full(self._layout.size, np.nan).tobytes()
         early, self._early = self._early, []
@@ -211,6 +213,8 @@ class Track:
     def _take_command(self, raw: bytes, published_ns: int) -> None:
         with suppress(MessageError):  # nor did the simulator take it
             sent = self._commands.decode(raw)
+            if session_of(sent.frame_id) not in (ANONYMOUS, self._session):
+                return
             command = CommandArrays(sent.names, sent.effort, published_ns)
             self.commands.setdefault(sent.stamp_ns, []).append(command)
 

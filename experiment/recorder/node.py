@@ -2,6 +2,7 @@
 
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from experiment.bags.writer import BagWriter
 from experiment.figures import BAG, figures_directory, write_figures
 from experiment.listener import HEARD, RunListener
 from experiment.recorder.inbox import Inbox
+from experiment.recorder.session_filter import Heard, SessionFilter, session_in
 from experiment.recorder.topics import NamedTopics, RecordedTopic, contract_topics, simulator_name
 from msgs_config import topics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
@@ -20,6 +22,9 @@ from msgs_config.node_parameters import declare, given_parameters
 from msgs_config.parameters import Parameter, Values, resolve
 from msgs_config.polling import Spinner
 from msgs_config.process import StopSignal
+from msgs_config.session import REMEDY, SESSION, given_session, named
+from msgs_config.tick_clock import FIRST_TICK
+from msgs_config.warnings import Warnings
 
 PARAMETERS = [
     Parameter(
@@ -40,6 +45,7 @@ PARAMETERS = [
     Parameter("compression", NONE, "how the bag is compressed", choices=COMPRESSIONS),
     Parameter("topics", [], "names of topics to record beside those of the contract", texts=True),
     Parameter("exclude", [], "names of topics of the contract not to record", texts=True),
+    SESSION,
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
@@ -64,6 +70,8 @@ class RecorderNode(Node):
         self._directory = Path(values.text("directory"))
         self._progress_period = values.number("progress_period")
         self._failure: str | None = None
+        self._warnings = Warnings(self)
+        self._filter = SessionFilter(given_session(values), self._warnings.say_once)
         self._inboxes: list[Inbox] = []
         characters = values.texts("characters") or ("",)
         wanted = contract_topics(
@@ -111,6 +119,7 @@ class RecorderNode(Node):
                     break
         finally:
             spinner.close()
+            self._keep_all(self._filter.finish())
             self._close_bag()
         self._conclude()
 
@@ -148,17 +157,23 @@ class RecorderNode(Node):
     def _drain(self) -> int:
         """Take some of each topic's messages, all of them if it keeps up, in the order of time."""
         batch = [
-            (published_ns, inbox.recorded, raw)
+            Heard(inbox.recorded, raw, published_ns)
             for inbox in self._inboxes
             for published_ns, raw in inbox.take(_AT_ONCE)
         ]
-        batch.sort(key=lambda message: message[0])
-        for published_ns, recorded, raw in batch:
-            self._keep(recorded, raw, published_ns)
-            os.sched_yield()  # who works in the loop goes first
+        batch.sort(key=lambda message: message.published_ns)
+        for message in batch:
+            if kept := self._filter.take(message):
+                self._keep_all(kept)
+                os.sched_yield()  # who works in the loop goes first
         return len(batch)
 
-    def _keep(self, recorded: RecordedTopic, raw: bytes, published_ns: int) -> None:
+    def _keep_all(self, messages: list[Heard]) -> None:
+        for message in messages:
+            self._keep(message)
+
+    def _keep(self, message: Heard) -> None:
+        recorded, raw, published_ns = message
         try:
             if self._bag is not None:
                 self._bag.write(recorded.name, raw, published_ns)
@@ -172,7 +187,11 @@ class RecorderNode(Node):
             try:
                 listener.take(recorded.own_name, raw, published_ns)
             except ActuatedCharactersError as error:
-                self._fail(f"cannot measure '{recorded.name}': {error}")
+                sentence = f"cannot measure '{recorded.name}': {error}"
+                if self._filter.bound and session_in(message) is None:  # anybody may have sent it
+                    self._warnings.say_once(sentence)
+                else:
+                    self._fail(sentence)
 
     def _lose_bag(self, error: RecordingError) -> None:
         self._fail(str(error))
@@ -202,22 +221,36 @@ class RecorderNode(Node):
                 figures, series = listener.results()
                 if dropped := figures["dropped_references"]:
                     self.get_logger().warning(f"{dropped} references{of_it} belong to no state")
-                lost = {"lost_messages": self._lost_messages(name)}
+                lost = {
+                    "lost_messages": self._counts(name, lambda inbox: inbox.lost),
+                    "foreign_messages": self._counts(name, self._dropped),
+                }
                 directory = figures_directory(self._directory, name, is_alone=not name)
                 write_figures(directory, figures | lost, series)
             except RecordingError as error:
                 self._fail(f"{error}{of_it}")
+            if listener.last_tick <= FIRST_TICK and self._filter.dropped(self._states_of(name)):
+                self._fail(
+                    f"session {named(self._filter.bound)}{of_it} was recorded and never answered, "
+                    f"while others published states, too; {REMEDY}, or set '{SESSION.name}'"
+                )
             if listener.missing_ticks:
                 self._fail(f"{listener.missing_ticks} ticks{of_it} were missed")
         if self._failure is not None:
             raise RecordingError(self._failure)
 
-    def _lost_messages(self, character: str) -> dict[str, int]:
-        """By topic of a character, how many messages were lost; those of which none was are not."""
+    def _states_of(self, character: str) -> str:
+        return self.resolve_topic_name(topics.JOINT_STATES.under(character).name)
+
+    def _dropped(self, inbox: Inbox) -> int:
+        return self._filter.dropped(inbox.recorded.name)
+
+    def _counts(self, character: str, count: Callable[[Inbox], int]) -> dict[str, int]:
+        """By topic of a character, how many messages were lost or dropped, where any were."""
         return {
-            inbox.recorded.name: inbox.lost
+            inbox.recorded.name: count(inbox)
             for inbox in self._inboxes
-            if inbox.lost and inbox.recorded.character in (None, character)
+            if count(inbox) and inbox.recorded.character in (None, character)
         }
 
     def _fail(self, sentence: str) -> None:

@@ -1,5 +1,6 @@
 """`player`: stands in the controller's place, and sends what a bag has of it."""
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,11 +15,18 @@ from experiment.replay.player_script import Script, make_scripts, read_world
 from msgs_config import topics
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import RunError
-from msgs_config.messages import JointStateDecoder, JointStateEncoder, state_in_layout
+from msgs_config.messages import JointArrays, JointStateDecoder, JointStateEncoder, state_in_layout
 from msgs_config.node_parameters import declare, given_parameters
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
+from msgs_config.session import (
+    ANONYMOUS,
+    SESSION,
+    SessionBinding,
+    given_session,
+    session_of,
+)
 from msgs_config.shared_parameters import RATE
 from msgs_config.stamped import StampedState
 from msgs_config.throw_messages import ThrowCodec
@@ -29,8 +37,10 @@ PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
     Parameter("world", 0, "which of the bag's worlds to play, counted from 0"),
     Parameter("states", "states.npz", "where the states go that come back"),
+    SESSION,
 ]
 
+_MOST_FOREIGN = 1000  # states in a row
 _ACKNOWLEDGED = Duration(seconds=10)  # until the simulator has a push
 
 
@@ -49,8 +59,14 @@ class CommandPlayer(Node):
         self._file = Path(values.text("states"))
         world, _ = read_world(Path(values.text("recording")), values.integer("world"))
         self._resetting = self.create_client(Trigger, f"{topics.SIM_NODE}/reset")
-        self._thrower = _Thrower(self, world[0])
-        self._parts = [_Part(self, *each) for each in zip(world, make_scripts(world), strict=True)]
+        self._binding = SessionBinding(
+            given_session(values), lambda: self.count_publishers(topics.JOINT_STATES.name)
+        )
+        self._thrower = _Thrower(self, world[0], self._binding)
+        self._parts = [
+            _Part(self, *each, self._binding)
+            for each in zip(world, make_scripts(world), strict=True)
+        ]
         self._ticks = self._parts[0].script.ticks
         self._resets = self._parts[0].script.resets
 
@@ -79,6 +95,7 @@ class CommandPlayer(Node):
         watch, ticks = Watch(), Ticks()
         self._played = 0  # states that all characters have
         while not stop and self._played <= self._ticks:
+            self._binding.look(time.monotonic())
             received = [part.receive() for part in self._parts]
             if any(received):
                 spinner.received()
@@ -126,11 +143,11 @@ class CommandPlayer(Node):
 class _Thrower:
     """Sends what was thrown into a world."""
 
-    def __init__(self, node: Node, recording: Recording) -> None:
+    def __init__(self, node: Node, recording: Recording, binding: SessionBinding) -> None:
         """Offer the topic."""
+        self._binding = binding
         self._throws = recording.throws
         self._clock = TickClock(int(recording.parameters[RATE.name]))
-        self._codec = ThrowCodec()
         self._publisher = topics.create_publisher(node, topics.THROW)
 
     @property
@@ -143,7 +160,8 @@ class _Thrower:
         throws = self._throws[tick] if self._throws else ()
         for throw in throws:
             stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
-            self._publisher.publish(self._codec.encode(stamp_ns, throw))
+            codec = ThrowCodec(self._binding.bound or ANONYMOUS)
+            self._publisher.publish(codec.encode(stamp_ns, throw))
         if throws and not self._publisher.wait_for_all_acked(_ACKNOWLEDGED):
             raise RunError(f"the throws of tick {FIRST_TICK + tick} were not acknowledged")
 
@@ -151,9 +169,12 @@ class _Thrower:
 class _Part:
     """One character: what is sent to it, and the states that come back."""
 
-    def __init__(self, node: Node, recording: Recording, script: Script) -> None:
+    def __init__(
+        self, node: Node, recording: Recording, script: Script, binding: SessionBinding
+    ) -> None:
         """Offer the topics, below the character's name where there are several."""
         name = recording.world.name
+        self._binding = binding
         self.script = script
         self.states: list[StampedState] = []  # each once
         self.size = recording.layout.size
@@ -173,15 +194,16 @@ class _Part:
         return all(publisher.get_subscription_count() for publisher in publishers)
 
     def receive(self) -> bool:
-        """Take a state if one is there; whether there was one.
+        """Take a state if one is there; whether there was one. That of another simulator is none.
 
         Raises:
             RunError: it is not the next one.
         """
-        raw = self._inbox.take()
-        if raw is None:
+        arrays = self._next_state()
+        if arrays is None:
             return False
-        state = state_in_layout(self._layout, self._decoder.decode(raw))
+        state = state_in_layout(self._layout, arrays)
+        self._binding.take(session_of(arrays.frame_id))
         expected = self._clock.stamp_ns(FIRST_TICK + len(self.states))
         if state.stamp_ns == expected:
             self.states.append(state)
@@ -192,6 +214,20 @@ class _Part:
                 self._torques.publish(raw_command)
         return True
 
+    def _next_state(self) -> JointArrays | None:
+        """The next state of the bound simulator, before the first of any; None if there is none."""
+        for _ in range(_MOST_FOREIGN):
+            raw = self._inbox.take()
+            if raw is None:
+                return None
+            arrays = self._decoder.decode(raw)
+            session = session_of(arrays.frame_id)
+            if session == self._binding.bound or (
+                not self.states and self._binding.admits(session)
+            ):
+                return arrays
+        return None
+
     def forget(self) -> None:
         """Send nothing again: a reset answers the present state."""
         self._last_sent = []
@@ -201,7 +237,9 @@ class _Part:
         push = self.script.pushes[tick]
         if push is not None:
             stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
-            self._wrenches.publish(encode_wrenches(replace(push, stamp_ns=stamp_ns)))
+            session = self._binding.bound or ANONYMOUS
+            own = replace(push, stamp_ns=stamp_ns, frame_id=session)
+            self._wrenches.publish(encode_wrenches(own))
             if not self._wrenches.wait_for_all_acked(_ACKNOWLEDGED):
                 raise RunError(f"the push of tick {FIRST_TICK + tick} was not acknowledged")
 
@@ -212,7 +250,9 @@ class _Part:
         for command in self.script.commands[tick]:
             encoder = self._encoders.get(command.names)
             if encoder is None:
-                encoder = self._encoders[command.names] = JointStateEncoder(command.names)
+                session = self._binding.bound or ANONYMOUS
+                encoder = JointStateEncoder(command.names, session)
+                self._encoders[command.names] = encoder
             self._last_sent.append(encoder.encode(stamp_ns, effort=command.efforts))
         for raw in self._last_sent:
             self._torques.publish(raw)

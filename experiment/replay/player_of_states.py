@@ -15,6 +15,7 @@ from rclpy.parameter import Parameter as RosParameter
 from experiment.bags.recording import CommandArrays, read_recording
 from experiment.replay.player import PATIENCE, Ticks, Watch
 from experiment.replay.player_findings import commanded, merged
+from experiment.replay.player_session import NewSession
 from experiment.replay.player_steering import parameter_changes
 from experiment.replay.player_stream import (
     AROUND,
@@ -31,6 +32,7 @@ from msgs_config.node_parameters import declare, given_parameters
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.polling import DirectSubscription, Spinner
 from msgs_config.process import StopSignal
+from msgs_config.session import ANONYMOUS, SESSION, given_session, make_session, session_of
 from msgs_config.warnings import Warnings
 
 PARAMETERS = [
@@ -45,6 +47,7 @@ PARAMETERS = [
     Parameter(
         "fixed", [], "parameters of controller_node that are not changed as they were", texts=True
     ),
+    SESSION,
     Parameter("start_patience", PATIENCE, "wait this long for a controller; 0: for ever", unit="s"),
 ]
 
@@ -65,6 +68,8 @@ class StatePlayer(Node):
         values = resolve(PARAMETERS, given_parameters(self))
         declare(self, PARAMETERS, values)
         self._file = Path(values.text("commands"))
+        self._session = given_session(values) or make_session(self.get_fully_qualified_name())
+        self._said = NewSession(self._session)
         path = Path(values.text("recording"))
         self._start_patience = values.number("start_patience") or math.inf
         self._recording = read_recording(path, values.text("character") or None)
@@ -105,7 +110,7 @@ class StatePlayer(Node):
         """
         self._stop, self._spinner = stop, Spinner(self)
         try:
-            self._configuration.publish(self._stream.configuration)
+            self._configuration.publish(self._said.configuration(self._stream.configuration))
             self._wait(
                 self._is_heard,
                 lambda: (
@@ -142,14 +147,15 @@ class StatePlayer(Node):
             self._send_steering(row)
         stamp_ns = int(self._recording.stamps_ns[row])
         if begins:
-            self._episode.publish(self._stream.episodes[row])
+            self._episode.publish(self._said.episode(self._stream.episodes[row]))
         self._clock_topic.publish(encode_clock(stamp_ns))
         for name, raw in tick.around:
-            self._around[name].publish(raw)
-        self._state.publish(tick.state)
+            self._around[name].publish(self._said.beside_state(name, raw))
+        raw_state = self._said.state(tick.state)
+        self._state.publish(raw_state)
         if not wanted.any():
             return  # nor did it answer then, or nobody has heard it
-        self._wait_for_answer(row, stamp_ns, tick.state)
+        self._wait_for_answer(row, stamp_ns, raw_state)
         for change in self._changes.get(row, ()):
             self._set(change)
 
@@ -196,7 +202,8 @@ class StatePlayer(Node):
             except MessageError as error:
                 self._warnings.say_once(f"command ignored: {error}")
                 continue
-            if command.stamp_ns == stamp_ns:
+            is_own = session_of(command.frame_id) in (self._session, ANONYMOUS)
+            if is_own and command.stamp_ns == stamp_ns:
                 return CommandArrays(command.names, command.effort, 0)
         return None
 

@@ -18,6 +18,7 @@ from experiment.replay.player_steering import first_parameters
 from experiment.replay.world import simulator_values
 from msgs_config import topics
 from msgs_config.errors import ConfigurationError, RunError
+from msgs_config.session import SESSION, make_session
 from msgs_config.shared_parameters import CHARACTER, PLACEMENT
 from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
 
@@ -27,7 +28,13 @@ _OF_A_CHARACTER = (
     "initial_position",
     "initial_velocity",
 )
-_NOT_TO_BE_SET = (CHARACTER.name, PLACEMENT.name, "rate", "wait_for_subscribers")
+_NOT_TO_BE_SET = (
+    CHARACTER.name,
+    PLACEMENT.name,
+    SESSION.name,
+    "rate",
+    "wait_for_subscribers",
+)
 _APPLIED = (
     "not every tick has its commands in the bag, so the efforts that were really applied were "
     "sent, to a simulator in lockstep without effort limits and without delay"
@@ -61,12 +68,12 @@ def replay_commands(
     scripts = make_scripts(together)
     applies = scripts[0].applies
     failure: RunError | None = None
+    own = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
     with session() as run:
         file = run.directory / "states.npz"
-        player = run.start_player(
-            COMMANDS, {"recording": str(path.absolute()), "world": world, "states": str(file)}
-        )
-        parameters = _simulator_parameters(run.directory, together, applies)
+        playing = {"recording": str(path.absolute()), "world": world, "states": str(file)}
+        player = run.start_player(COMMANDS, playing | own)
+        parameters = _simulator_parameters(run.directory, together, applies) | own
         simulator = run.start(topics.SIM_NODE, parameters)
         try:
             wait_for_player(player, [simulator], progress, tell)
@@ -165,6 +172,7 @@ def replay_states(
             "commands": str(file),
             "steers": start,
             "fixed": sorted(settings),
+            SESSION.name: make_session(f"/{topics.SIM_NODE}"),
         }
         others = []
         if start:
@@ -172,6 +180,7 @@ def replay_states(
             parameters |= {
                 CHARACTER.name: str(write_character(run.directory, recording.character)),
                 "wait_for_subscribers": 1,
+                SESSION.name: playing[SESSION.name],
             }
             others.append(run.start(topics.CONTROLLER_NODE, parameters))
         else:
