@@ -106,7 +106,7 @@ class Simulators:
         return None
 
     def bind(self, frame_id: str) -> bool:
-        """Take a usable state with this `frame_id`; whether that binds to a simulator anew."""
+        """Take a usable state with this `frame_id`; whether that binds to a new simulator."""
         session = session_of(frame_id)
         is_new = self._binding.take(session)
         if is_new:

@@ -46,7 +46,7 @@ def run_over_topics(
         RunError: one of the processes failed, with its own message, or what was planned came too
             late.
     """
-    # each process takes what is of this run alone, whoever else is in the domain
+    # what other nodes in the domain say is of another session, and each process rejects it
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
     with _environment(directory) as environment, Children() as children:
 

@@ -188,7 +188,7 @@ class RecorderNode(Node):
                 listener.take(recorded.own_name, raw, published_ns)
             except ActuatedCharactersError as error:
                 sentence = f"cannot measure '{recorded.name}': {error}"
-                if self._filter.bound and session_in(message) is None:  # anybody may have sent it
+                if self._filter.bound and session_in(message) is None:  # it may be from any node
                     self._warnings.say_once(sentence)
                 else:
                     self._fail(sentence)
