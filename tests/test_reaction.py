@@ -28,6 +28,8 @@ from msgs_config.parameters import resolve
 from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import TickClock
 
+pytestmark = pytest.mark.slow
+
 LAYOUT = HUMANOID.layout
 CLOCK = TickClock(RATE_HZ)
 WEIGHT = 9.81 * HUMANOID.mass
