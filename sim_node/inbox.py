@@ -81,7 +81,7 @@ class StampedInbox:
             if raw is None:
                 return
             try:
-                if self._own.rejects(self._topic, frame_id_of(raw)):
+                if self._own.rejects(self._topic, _frame_id(raw)):
                     continue
                 use(raw, first_tick)
                 self.counts["accepted"] += 1
@@ -94,6 +94,14 @@ class StampedInbox:
     def forget(self) -> None:
         """Leave unread what was sent in the episode before."""
         forget(self._messages)
+
+
+def _frame_id(raw: bytes) -> str:
+    """The `frame_id` of a message; empty where it has none, which its decoder has a line for."""
+    try:
+        return frame_id_of(raw)
+    except MessageError:
+        return ""
 
 
 def forget(messages: DirectSubscription) -> None:

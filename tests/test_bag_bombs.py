@@ -1,6 +1,5 @@
 """Bags of some kilobytes that would unpack to gigabytes: refused in one line, in little memory."""
 
-import os
 import sqlite3
 import subprocess
 import sys
@@ -201,16 +200,29 @@ class Ended(NamedTuple):
     mebibytes: float  # that it had at most
 
 
+PEAK = "VmHWM:"
+# A process tells its peak itself: to its parent, the parent's own memory counts as well.
+WITH_PEAK = f"""
+import atexit, re, sys
+from experiment.cli import main
+def tell():
+    sys.stdout.flush()
+    print(re.search("{PEAK}.*", open("/proc/self/status").read())[0], flush=True)
+atexit.register(tell)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
 def run(*arguments: object) -> Ended:
     """The command line in a process of its own, and the memory that it took."""
-    command = [sys.executable, "-m", "experiment.cli", *map(str, arguments)]
+    command = [sys.executable, "-c", WITH_PEAK, *map(str, arguments)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     assert process.stdout is not None
     said = process.stdout.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
+    code = process.wait()
     process.stdout.close()
-    return Ended(process.returncode, said, usage.ru_maxrss / 1024)
+    said, _, peak = said.rpartition(PEAK)
+    return Ended(code, said, int(peak.split()[0]) / 1024)
 
 
 COMMANDS = {

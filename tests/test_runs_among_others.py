@@ -82,11 +82,12 @@ class Noise(Client):
         self._episodes = self.speak(topics.EPISODE)
         self._states = self.speak(topics.JOINT_STATES)
         self._whole = stamp
-        self.sessions: list[str] = []  # of all states that name one, in their order
-        self._heard = DirectSubscription(self.node, topics.JOINT_STATES.for_listener())
+        self.sessions: list[str] = []  # of all contacts that name one, in their order
+        # not the states: simulators wait until so many subscribe to them, the recorder among them
+        self._heard = DirectSubscription(self.node, topics.CONTACTS.for_listener())
 
     def hear(self) -> None:
-        """Take all states that have come."""
+        """Take all contacts that have come."""
         while (raw := self._heard.take()) is not None:
             with suppress(MessageError):
                 session = frame_id_of(raw)

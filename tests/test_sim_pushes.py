@@ -14,6 +14,7 @@ from msgs_config.joint_layout import ROOT
 from msgs_config.tick_clock import TickClock
 from sim_node.pushes import Push
 
+SESSION = "/sim_node#000000000001"  # of two runs that are compared byte by byte
 CLOCK = TickClock(240)
 THREE_TICKS = 3.0 / 240.0  # s
 FREE_BOX = str(DATA / "free_box.yaml")
@@ -274,7 +275,11 @@ def test_two_runs_with_the_same_stamped_pushes_are_the_same_to_the_byte(
     runs = []
     for _ in range(2):
         simulator = processes.simulator(
-            "humanoid", commanded_joints=_every_joint(), max_ticks=150, wait_for_subscribers=2
+            "humanoid",
+            session=SESSION,
+            commanded_joints=_every_joint(),
+            max_ticks=150,
+            wait_for_subscribers=2,
         )
         client.spin_until(client.wrenches.get_subscription_count, "a simulator that listens")
         for tick, force in ((30, 400.0), (60, -300.0), (61, 200.0)):

@@ -19,6 +19,7 @@ from msgs_config.tick_clock import TickClock
 
 CLOCK = TickClock(240)
 HELD_TICKS = 13
+SESSION = "/sim_node#000000000001"  # of two runs that are compared byte by byte
 HELD = 0.0521  # s, a command timeout: 12 ticks are 0.05 s
 SLOWLY = 0.25  # simulated over wall time, for tests that answer tick by tick
 
@@ -274,6 +275,7 @@ def test_in_lockstep_a_controller_that_is_killed_and_replaced_changes_nothing(
     def run(*, disturbed: bool) -> dict[int, bytes]:
         simulator = processes.simulator(
             "humanoid",
+            session=SESSION,
             real_time_factor=1.0 if disturbed else 0.0,
             max_ticks=240,
             wait_for_subscribers=2,

@@ -49,6 +49,7 @@ PARAMETERS = [
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
+_LONGEST_END = 20.0  # s that what is on its way at the stop may take
 _AT_ONCE = 1000  # messages of a topic, between flushes and answers to services
 _SERVICE_PERIOD = 0.1  # s between turns of the executor, which looks at each of many topics
 _FLUSH_PERIOD = 0.5  # s: what was published longer ago outlives even a kill of the recorder
@@ -114,14 +115,22 @@ class RecorderNode(Node):
                     if at <= now:
                         due[act] = now + act()
                 time.sleep(_DRAIN_PERIOD)
-            for _ in range(topics.LISTENING_DEPTH // _AT_ONCE):  # no more was there at the stop
-                if not self._drain():
-                    break
+            self._drain_rest()
         finally:
             spinner.close()
             self._keep_all(self._filter.finish())
             self._close_bag()
         self._conclude()
+
+    def _drain_rest(self) -> None:
+        """Take what was there at the stop, as far as that is done in a reasonable time."""
+        deadline = time.monotonic() + _LONGEST_END
+        for _ in range(topics.LISTENING_DEPTH // _AT_ONCE):  # no more was there
+            if not self._drain(gives_way=False):
+                return
+            if time.monotonic() > deadline:
+                break
+        self.get_logger().warning("messages still came at the end; the last ones are not recorded")
 
     def _search(self) -> float:
         """Record topics whose first publisher has come; returns when to look again, s."""
@@ -154,8 +163,12 @@ class RecorderNode(Node):
         """The last tick of which every character's state has come."""
         return min(listener.last_tick for listener in self._listeners.values())
 
-    def _drain(self) -> int:
-        """Take some of each topic's messages, all of them if it keeps up, in the order of time."""
+    def _drain(self, *, gives_way: bool = True) -> int:
+        """Take some of each topic's messages, all of them if it keeps up, in the order of time.
+
+        While the loop runs the nodes in it go first; at the end the recorder does not give way,
+        or a flood from others would hold it up.
+        """
         batch = [
             Heard(inbox.recorded, raw, published_ns)
             for inbox in self._inboxes
@@ -165,7 +178,8 @@ class RecorderNode(Node):
         for message in batch:
             if kept := self._filter.take(message):
                 self._keep_all(kept)
-                os.sched_yield()  # who works in the loop goes first
+                if gives_way:
+                    os.sched_yield()
         return len(batch)
 
     def _keep_all(self, messages: list[Heard]) -> None:
