@@ -405,9 +405,9 @@ class SimulatorClient(Client):
         self.wrenches = self.speak(topics.EXTERNAL_WRENCH.under(below))
         self.states = self.listen(topics.JOINT_STATES.under(below))
 
-    def state(self, tick: int) -> JointState:
+    def state(self, tick: int, patience: float = PATIENCE) -> JointState:
         """The state of a tick, once it has come."""
-        return self.spin_until(lambda: self._found(tick), f"state of tick {tick}")
+        return self.spin_until(lambda: self._found(tick), f"state of tick {tick}", patience)
 
     def _found(self, tick: int) -> JointState | None:
         return next((s for s in self.states.messages if tick_of(s) == tick), None)
