@@ -19,6 +19,8 @@ from experiment.bags.reader import read_messages
 from msgs_config.errors import RecordingError
 from tests.foreign_bags import Said, texts, write_jazzy_db3, write_mcap, write_metadata
 
+pytestmark = pytest.mark.slow
+
 GIB = 1024 * MIB
 TOPIC = "/sim_node/configuration"  # what every command reads first
 BLOCK = 128 * 1024  # bytes that a block of zstd may stand for

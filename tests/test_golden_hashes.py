@@ -6,6 +6,8 @@ import golden
 import pytest
 
 TABLE = golden.golden()
+QUICK = {"kuka_hold", "pendulum", "walk_reconstructed"}
+
 pytestmark = pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT)
 
 
@@ -15,7 +17,10 @@ def test_the_engines_are_those_of_the_table() -> None:
     assert golden.engines() == expected, "another engine may have other bits: make hashes"
 
 
-@pytest.mark.parametrize("name", TABLE["runs"])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in TABLE["runs"]],
+)
 def test_a_golden_run_has_the_states_of_the_table(name: str, tmp_path: Path) -> None:
     expected = TABLE["runs"][name]
 

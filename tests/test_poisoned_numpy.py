@@ -6,6 +6,11 @@ import golden
 import numpy as np
 import pytest
 
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT),
+]
+
 TABLE = golden.golden()["runs"]
 OF_EVERY_KIND = ["walk_480_delay", "reactive_hit", "panda_sine", "walk_reconstructed"]
 SENSITIVE = "walk_explicit_pd_2khz"  # blows up the last bits of a rotation
@@ -41,7 +46,6 @@ assert np.linalg.norm(np.ones(1)) != 1.0
 """
 
 
-@pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT)
 @pytest.mark.parametrize("name", OF_EVERY_KIND)
 def test_no_kernel_that_is_numpys_choice_takes_part(name: str, tmp_path: Path) -> None:
     summary = golden.summary_of(TABLE[name]["arguments"], tmp_path / "run", before=POISON)
@@ -49,7 +53,6 @@ def test_no_kernel_that_is_numpys_choice_takes_part(name: str, tmp_path: Path) -
     assert summary["state_hash"] == TABLE[name]["state_hash"]
 
 
-@pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT)
 @pytest.mark.parametrize(
     "environment",
     [

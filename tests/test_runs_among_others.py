@@ -24,6 +24,8 @@ from msgs_config.messages import frame_id_of, split_stamp
 from msgs_config.polling import DirectSubscription
 from msgs_config.session import is_session
 
+pytestmark = pytest.mark.slow
+
 TICKS = 480
 CONTROLLER = topics.CONTROLLER_NODE
 OTHER = "/other/sim_node#00000000000b"
