@@ -25,6 +25,7 @@ _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
 _MOST_KNOWN = 8  # simulators of which something is kept
 _MOST_AT_ONCE = 1000  # foreign states in a row
 _EXPLAIN_AFTER = 2.0  # s without a word of the episode
+_ALONE_AFTER = 1.0  # s in which another simulator would have been discovered
 
 
 @dataclass
@@ -63,6 +64,7 @@ class Simulators:
         self._rejected_episodes = 0
         self._now = 0.0
         self._lacks_episode_since: float | None = None
+        self._unusable_since: float | None = None
         depth = 2 * _MOST_KNOWN  # one of the one must not push out one of the other
         self._episodes = DirectSubscription(node, topics.EPISODE.for_listener(depth))
         self._configurations = DirectSubscription(node, _CONFIGURATION.for_listener(depth))
@@ -150,7 +152,8 @@ class Simulators:
             self._reject(topics.JOINT_STATES.name, session)
             return False
         if self._binding.bound is None and (error := self._error_of(session)) is not None:
-            self._warnings.say_once(f"state ignored: {error}")
+            if self._unusable_since is None:  # else that is what this node ends with
+                self._warnings.say_once(f"state ignored: {error}")
             return False
         return True
 
@@ -182,18 +185,23 @@ class Simulators:
         raw = self._configurations.take()
         if raw is not None:
             try:
-                found = configuration.parse(decode(raw, String).data)
-                if self._binding.bound not in (None, found.session):
-                    self._reject(_CONFIGURATION.name, found.session)
-                known = self._known_of(found.session)
-                known.configuration, known.is_checked, known.error = found, False, None
+                self._hear_configuration(configuration.parse(decode(raw, String).data))
             except MessageError as error:
                 self._warnings.say_once(f"configuration ignored: {error}")
-        bound = self._binding.bound
-        if bound is None:
+        if self._binding.bound is None:
             self._refuse_the_only_one()
-        elif raw is not None and bound in self._known:
-            self._judge(self._known[bound])
+
+    def _hear_configuration(self, found: RunConfiguration) -> None:
+        if self._binding.bound not in (None, found.session):
+            self._reject(_CONFIGURATION.name, found.session)
+        known = self._known_of(found.session)
+        is_first = known.configuration is None
+        known.configuration, known.is_checked, known.error = found, False, None
+        if self._binding.bound != found.session:
+            return
+        if is_first and self._checked(known) is not None and self._binding.release():
+            return  # its first state came before it, and another simulator may be there
+        self._judge(known)
 
     def _judge(self, known: _Known) -> None:
         """Raise the error if the bound simulator is not what this controller was made for."""
@@ -203,10 +211,17 @@ class Simulators:
             raise error
 
     def _refuse_the_only_one(self) -> None:
-        """Raise the error of the only simulator that there is, if it can never be bound to."""
+        """Raise the error of the only simulator that there is, if it can never be bound to.
+
+        A second one may be running for long and only not be discovered yet.
+        """
         told = [known for known in self._known.values() if known.configuration is not None]
         errors = [error for known in told if (error := self._checked(known)) is not None]
-        if errors and len(errors) == len(told) and self._count_publishers() <= 1:
+        if not errors or len(errors) < len(told) or self._count_publishers() > 1:
+            self._unusable_since = None
+        elif self._unusable_since is None:
+            self._unusable_since = self._now
+        elif self._now > self._unusable_since + _ALONE_AFTER:
             raise errors[-1]
 
     def _error_of(self, session: str) -> ActuatedCharactersError | None:

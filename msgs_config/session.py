@@ -134,6 +134,12 @@ class SessionBinding:
         self.hear(session)
         return is_new
 
+    def release(self) -> bool:
+        """Be bound to none again, unless the session was given; whether that is so."""
+        if not self._is_given:
+            self.bound = None
+        return not self._is_given
+
     def _has_ended(self) -> bool:
         if self._silence is None or self._silence < SILENT_AND_ALONE:
             return False

@@ -221,6 +221,25 @@ def test_a_simulator_that_is_not_the_controllers_is_passed_over_where_there_is_a
     assert node.exit_code is None
 
 
+def test_a_configuration_that_comes_after_the_first_state_does_not_end_the_controller(
+    processes: Processes, simulator: ControllerClient, other: ControllerClient
+) -> None:
+    measure, name, given = REFUSED_SIMULATORS["another rate"]
+    configurations = other.speak(topics.CONFIGURATION.of(topics.SIM_NODE))
+    node = processes.controller("pendulum", **SINE)
+    other.spin_until(configurations.get_subscription_count, "a controller that listens")
+    simulator.spin_until(simulator.states.get_subscription_count, "a controller")
+
+    other.ask(state(2, OTHER, first=True))
+    configurations.publish(in_session(description(name, measure(), **given), OTHER))
+    other.send(
+        state(10, OTHER, first=True), lambda: "state ignored: the simulator's" in node.stderr
+    )
+
+    assert list(simulator.ask(state(1, first=True)).effort) == expected(state(1), 1)
+    assert node.exit_code is None
+
+
 def test_contacts_of_another_simulator_are_no_hit(
     processes: Processes, simulator: ControllerClient
 ) -> None:
