@@ -6,6 +6,7 @@ change that is meant to alter states renews the file, in a commit of its own tha
     make hashes
 """
 
+import argparse
 import json
 import os
 import platform
@@ -18,6 +19,10 @@ from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+from experiment.commands.run import add_run, planned_run
+from experiment.figures import prepare_directory
+from experiment.run import run_in_process
 
 FILE = Path(__file__).parent / "data" / "state_hashes.json"
 ENGINES = ("pybullet", "mujoco-core")
@@ -60,22 +65,63 @@ def made_with() -> dict[str, str]:
     }
 
 
-def summary_of(
+def summary_here(arguments: str, folder: Path) -> dict[str, Any]:
+    """The summary of `actuated_characters run ARGUMENTS`, without pictures, by this process."""
+    options = _options(arguments)
+    assert options.in_process
+    run = planned_run(options)
+    prepare_directory(folder, overwrite=True)
+    run_in_process(
+        run.plan, folder, progress=lambda ticks: None, pushes=run.pushes, throws=run.throws
+    )
+    return _summary_in(folder)
+
+
+def _options(arguments: str) -> argparse.Namespace:
+    commands = argparse.ArgumentParser().add_subparsers()
+    add_run(commands)
+    return commands.choices["run"].parse_args(shlex.split(arguments))
+
+
+def summary_apart(
     arguments: str,
     folder: Path,
     *,
     before: str = "",
     environment: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """The summary of `actuated_characters run ARGUMENTS`; Python runs `before` first.
+    """`summary_here` of a process of its own; its Python runs `before` first.
 
     Raises:
         RuntimeError: the run failed; with what it said.
     """
-    script = f"{before}\nimport sys\nfrom experiment.cli import main\nsys.exit(main(sys.argv[1:]))"
-    command = ["run", *shlex.split(arguments), "--output", str(folder), "--overwrite"]
+    script = f"""{before}
+import sys
+from pathlib import Path
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+import golden
+golden.summary_here(sys.argv[1], Path(sys.argv[2]))
+"""
+    return _summary_of(["-c", script, arguments, str(folder)], folder, environment)
+
+
+def summary_over_topics(arguments: str, folder: Path) -> dict[str, Any]:
+    """The summary of the command with these arguments, but by processes that speak over topics.
+
+    Raises:
+        RuntimeError: the run failed; with what it said.
+    """
+    given = [argument for argument in shlex.split(arguments) if argument != "--in-process"]
+    command = ["-m", "experiment.cli", "run", *given]
+    return _summary_of([*command, "--no-record", "--output", str(folder)], folder)
+
+
+def _summary_of(
+    arguments: Sequence[str], folder: Path, environment: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """The summary that `python ARGUMENTS` leaves in a folder."""
     done = subprocess.run(
-        [sys.executable, "-c", script, *command],
+        [sys.executable, *arguments],
         env={**os.environ, **_THREADS, **(environment or {})},
         cwd=FILE.parents[2],
         stdin=subprocess.DEVNULL,
@@ -84,7 +130,11 @@ def summary_of(
         check=False,
     )
     if done.returncode:
-        raise RuntimeError(f"run {arguments}: exit code {done.returncode}\n{done.stderr}")
+        raise RuntimeError(f"{arguments}: exit code {done.returncode}\n{done.stderr}")
+    return _summary_in(folder)
+
+
+def _summary_in(folder: Path) -> dict[str, Any]:
     summary: dict[str, Any] = json.loads((folder / "summary.json").read_text("utf-8"))
     return summary
 
@@ -95,7 +145,7 @@ def renew(names: Sequence[str]) -> None:
     runs, chosen = content["runs"], list(names) or list(content["runs"])
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count()) as workers:
         summaries = workers.map(
-            lambda name: summary_of(runs[name]["arguments"], Path(folder) / name), chosen
+            lambda name: summary_apart(runs[name]["arguments"], Path(folder) / name), chosen
         )
         for name, summary in zip(chosen, summaries, strict=True):
             old = runs[name]

@@ -7,6 +7,7 @@ import pytest
 
 TABLE = golden.golden()
 QUICK = {"kuka_hold", "pendulum", "walk_reconstructed"}
+OVER_TOPICS = ["reactive_hit", "walk_480_delay", "panda_sine", "walk_reconstructed"]  # of each kind
 
 pytestmark = pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT)
 
@@ -22,10 +23,22 @@ def test_the_engines_are_those_of_the_table() -> None:
     [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in TABLE["runs"]],
 )
 def test_a_golden_run_has_the_states_of_the_table(name: str, tmp_path: Path) -> None:
-    expected = TABLE["runs"][name]
+    summary = golden.summary_here(TABLE["runs"][name]["arguments"], tmp_path / "run")
 
-    summary = golden.summary_of(expected["arguments"], tmp_path / "run")
+    assert_as_in_the_table(name, summary)
 
-    found = {key: summary[key] for key in expected if key != "arguments"}
-    wanted = {key: value for key, value in expected.items() if key != "arguments"}
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OVER_TOPICS)
+def test_over_topics_it_has_them_too(name: str, domain: int, tmp_path: Path) -> None:
+    del domain
+
+    summary = golden.summary_over_topics(TABLE["runs"][name]["arguments"], tmp_path / "run")
+
+    assert_as_in_the_table(name, summary)
+
+
+def assert_as_in_the_table(name: str, summary: dict[str, object]) -> None:
+    wanted = {key: value for key, value in TABLE["runs"][name].items() if key != "arguments"}
+    found = {key: summary[key] for key in wanted}
     assert found == wanted, f"made with {TABLE['made_with']}, here {golden.made_with()}"

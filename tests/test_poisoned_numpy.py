@@ -48,7 +48,7 @@ assert np.linalg.norm(np.ones(1)) != 1.0
 
 @pytest.mark.parametrize("name", OF_EVERY_KIND)
 def test_no_kernel_that_is_numpys_choice_takes_part(name: str, tmp_path: Path) -> None:
-    summary = golden.summary_of(TABLE[name]["arguments"], tmp_path / "run", before=POISON)
+    summary = golden.summary_apart(TABLE[name]["arguments"], tmp_path / "run", before=POISON)
 
     assert summary["state_hash"] == TABLE[name]["state_hash"]
 
@@ -65,6 +65,6 @@ def test_no_kernel_that_is_numpys_choice_takes_part(name: str, tmp_path: Path) -
 def test_the_processors_kernels_do_not_matter(environment: dict[str, str], tmp_path: Path) -> None:
     run = TABLE[SENSITIVE]
 
-    summary = golden.summary_of(run["arguments"], tmp_path / "run", environment=environment)
+    summary = golden.summary_apart(run["arguments"], tmp_path / "run", environment=environment)
 
     assert summary["state_hash"] == run["state_hash"]

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -136,6 +137,43 @@ def _add_recorded(run: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     from experiment.figures import plot_figures, prepare_directory
+
+    run = planned_run(options)
+    plan, motion = run.plan, _name_of(run.plan.controller)
+    name = f"{plan.character.name}-{Path(motion).stem}"
+    directory = (options.output or Path("runs") / name).absolute()
+    prepare_directory(directory, overwrite=options.overwrite)
+    for note in run.notes:
+        print(note)
+    if run.pushes and not options.push:
+        print(f"{options.clip} brings {len(run.pushes)} pushes (--push none: without them)")
+    with progress_bar(f"{plan.character.name}: {motion}", plan.ticks, "ticks") as bar:
+
+        def progress(ticks: int) -> None:
+            bar.update(bar.task_ids[0], completed=min(ticks, plan.ticks))
+
+        try:
+            _run_plan(options, run, directory, progress)
+        except KeyboardInterrupt:
+            print(f"the results in {directory} are not complete", file=sys.stderr)
+            raise
+        progress(plan.ticks)
+    plot_figures(directory)
+    _report(directory)
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """What the command's options ask for."""
+
+    plan: "Plan"
+    pushes: "Sequence[PlannedPush]"
+    throws: "Sequence[PlannedThrow]"
+    notes: Sequence[str]  # what whoever runs it should know
+
+
+def planned_run(options: argparse.Namespace) -> PlannedRun:
+    """What is to be run; raises ActuatedCharactersError where it cannot be."""
     from experiment.planned_throw import plan_throws
 
     settings = node_settings(options.set, _NODES)
@@ -145,27 +183,7 @@ def _run(options: argparse.Namespace) -> None:
     plan = _checked_plan(options, simulator, controller, found_in)
     pushes = _pushes(options.push, plan, found_in)
     throws, in_the_way = plan_throws(plan, options.throw)
-    motion = _name_of(plan.controller)
-    name = f"{plan.character.name}-{Path(motion).stem}"
-    directory = (options.output or Path("runs") / name).absolute()
-    prepare_directory(directory, overwrite=options.overwrite)
-    for note in (*plan.notes, *in_the_way):
-        print(note)
-    if pushes and not options.push:
-        print(f"{options.clip} brings {len(pushes)} pushes (--push none: without them)")
-    with progress_bar(f"{plan.character.name}: {motion}", plan.ticks, "ticks") as bar:
-
-        def progress(ticks: int) -> None:
-            bar.update(bar.task_ids[0], completed=min(ticks, plan.ticks))
-
-        try:
-            _run_plan(options, plan, directory, progress, pushes=pushes, throws=throws)
-        except KeyboardInterrupt:
-            print(f"the results in {directory} are not complete", file=sys.stderr)
-            raise
-        progress(plan.ticks)
-    plot_figures(directory)
-    _report(directory)
+    return PlannedRun(plan, pushes, throws, [*plan.notes, *in_the_way])
 
 
 def _checked_plan(
@@ -207,15 +225,13 @@ def _check_excludable(name: str) -> None:
 
 def _run_plan(
     options: argparse.Namespace,
-    plan: "Plan",
+    run: PlannedRun,
     directory: Path,
     progress: Callable[[int], None],
-    *,
-    pushes: "Sequence[PlannedPush]",
-    throws: "Sequence[PlannedThrow]",
 ) -> None:
     from experiment.run import run_in_process, run_over_topics
 
+    plan, pushes, throws = run.plan, run.pushes, run.throws
     if options.in_process:
         run_in_process(plan, directory, progress=progress, pushes=pushes, throws=throws)
         return
