@@ -1,6 +1,6 @@
 """What the tests of the reactions share: a humanoid that a ball hits, both sides in one process."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -88,8 +88,12 @@ def run(
     ticks: int,
     throws: tuple[Throw, ...] = (),
     mass: float = 2.0,
+    is_over: Callable[[Sequence[ModeReport], int], bool] = lambda modes, stamp_ns: False,
 ) -> Run:
-    """Let a humanoid be driven as the parameters say while a ball of some kg is thrown at it."""
+    """Let a humanoid be driven as the parameters say while a ball of some kg is thrown at it.
+
+    It is over before all ticks if that is so by its modes and its time.
+    """
     control = driver(given)
     start = control._own_reference.sample(0.0)
     layout, commanded = HUMANOID.layout, HUMANOID.layout.actuated_joint_names
@@ -126,6 +130,8 @@ def run(
             efforts.append(effort)
             references.append(reference)
             balls.append(ball.state.velocity[:3])
+            if is_over(modes, actor.state.stamp_ns):
+                break
     assert layout.size == len(positions[0])
     return Run(
         np.array(positions),
