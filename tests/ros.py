@@ -10,7 +10,7 @@ import sys
 import time
 from array import array
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from forked import Fork, be_killed_with_parent
 from geometry_msgs.msg import Transform, Vector3, Wrench
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.client import Client as ServiceClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -33,7 +34,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from msgs_config import topics
 from msgs_config.joint_layout import ROOT
-from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
+from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.topics import Topic
 
 PATIENCE = 30.0
@@ -239,9 +240,11 @@ class Processes:
 class Inbox:
     """What has come on a topic, oldest first."""
 
-    messages: list[Any]
-    raw: list[bytes]
-    sent_ns: list[int]  # wall time
+    messages: list[Any] = field(default_factory=list)  # which a test may clear
+    raw: list[bytes] = field(default_factory=list)
+    sent_ns: list[int] = field(default_factory=list)  # wall time
+    _seen: list[Any] = field(default_factory=list)  # messages that have been looked at
+    _first: dict[int, Any] = field(default_factory=dict)  # by stamp, ns
 
     def __len__(self) -> int:
         return len(self.messages)
@@ -250,6 +253,16 @@ class Inbox:
     def last(self) -> Any:
         """The newest message."""
         return self.messages[-1]
+
+    def of_stamp(self, stamp: int) -> Any | None:
+        """The first message with a stamp in ns, of which there are thousands to choose from."""
+        if self._seen and not (self.messages and self.messages[0] is self._seen[0]):
+            self._seen.clear()
+            self._first.clear()
+        for message in self.messages[len(self._seen) :]:
+            self._seen.append(message)
+            self._first.setdefault(stamp_ns(message), message)
+        return self._first.get(stamp)
 
     def ticks(self) -> list[int]:
         """The ticks of the messages, at the default rate."""
@@ -267,6 +280,7 @@ class Client:
         self.node = Node(name, context=context)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
+        self._clients: dict[str, ServiceClient] = {}
 
     def close(self) -> None:
         """Leave the graph."""
@@ -275,7 +289,7 @@ class Client:
 
     def listen(self, topic: Topic, qos: QoSProfile | None = None) -> Inbox:
         """Subscribe to a topic."""
-        inbox = Inbox([], [], [])
+        inbox = Inbox()
 
         def keep(raw: bytes, info: dict[str, int]) -> None:
             inbox.raw.append(raw)
@@ -314,18 +328,15 @@ class Client:
 
     def call(self, service_type: Any, name: str, request: Any) -> Any:
         """Call a service, and return its response."""
-        client = self.node.create_client(service_type, name)
-        try:
-            self.spin_until(client.service_is_ready, f"service {name}")
-            future = client.call_async(request)
-            self.spin_until(future.done, f"response of {name}")
-            return future.result()
-        finally:
-            self.node.destroy_client(client)
+        future = self.begin_call(service_type, name, request)
+        self.spin_until(future.done, f"response of {name}")
+        return future.result()
 
     def begin_call(self, service_type: Any, name: str, request: Any) -> Future:
         """Call a service whose response may take long; it is the result of what is returned."""
-        client = self.node.create_client(service_type, name)
+        if name not in self._clients:  # one that is new has to be discovered first
+            self._clients[name] = self.node.create_client(service_type, name)
+        client = self._clients[name]
         self.spin_until(client.service_is_ready, f"service {name}")
         return client.call_async(request)
 
@@ -406,11 +417,11 @@ class SimulatorClient(Client):
         self.states = self.listen(topics.JOINT_STATES.under(below))
 
     def state(self, tick: int, patience: float = PATIENCE) -> JointState:
-        """The state of a tick, once it has come."""
-        return self.spin_until(lambda: self._found(tick), f"state of tick {tick}", patience)
-
-    def _found(self, tick: int) -> JointState | None:
-        return next((s for s in self.states.messages if tick_of(s) == tick), None)
+        """The state of a tick, once it has come; at the default rate."""
+        stamp = TickClock(240).stamp_ns(tick)
+        return self.spin_until(
+            lambda: self.states.of_stamp(stamp), f"state of tick {tick}", patience
+        )
 
     def first_state(self) -> JointState:
         """The state of tick 1, once the simulator hears commands and pushes as well."""
@@ -475,12 +486,12 @@ class ControllerClient(Client):
 
     def ask(self, state: JointState) -> JointState:
         """The torques that answer a state, which is sent until it is answered."""
-        self.send(state, lambda: self._found(self.torques, state))
-        return self._found(self.torques, state)
+        stamp = stamp_ns(state)
+        return self.send(state, lambda: self.torques.of_stamp(stamp))
 
     def reference(self, state: JointState) -> JointState:
         """The reference of a state that was answered."""
-        return self.spin_until(lambda: self._found(self.references, state), "its reference")
+        return self.spin_until(lambda: self.references.of_stamp(stamp_ns(state)), "its reference")
 
     def send(self, state: JointState, condition: Callable[[], Any]) -> Any:
         """Send a state again and again until the condition gives something true."""
@@ -488,6 +499,3 @@ class ControllerClient(Client):
         return self.spin_sending(
             lambda: self.states.publish(state), condition, f"an answer to the state of {stamp} ns"
         )
-
-    def _found(self, inbox: Inbox, state: JointState) -> JointState | None:
-        return next((m for m in inbox.messages if stamp_ns(m) == stamp_ns(state)), None)

@@ -40,7 +40,7 @@ def test_a_flood_while_it_waits_takes_a_bounded_memory(
     for publisher, raw in ((client.wrenches, push), (client.torques, stale)):
         for count in range(20_000):
             publisher.publish(raw)
-            if count % 100 == 0:
+            if count % 1000 == 0:
                 client.get_parameters(topics.SIM_NODE, ["gravity"])  # it takes what has come
 
     # 200 MB of pushes; the middleware and the node keep 5000 of them each
@@ -143,7 +143,7 @@ def test_a_controller_lives_through_simulators_that_come_and_go(
     node = processes.controller("humanoid", reference="clip", root_assistance=False)
     runs = []
 
-    for killed in (False, True, False, True, False):
+    for killed in (False, True, False):
         simulator = processes.simulator(
             "humanoid", max_ticks=0 if killed else 120, wait_for_subscribers=2
         )

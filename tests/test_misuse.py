@@ -36,7 +36,7 @@ from sim_node.pushes import Push
 pytestmark = pytest.mark.slow
 
 CLOCK = TickClock(240)
-MESSAGES = 10_000
+MESSAGES = 4_000
 A_TICK = 100  # messages
 LARGEST = 1e3  # N m, of what is sent: more would make it diverge, which is another matter
 HUGE = 0xFFFF_FFF0
@@ -96,7 +96,7 @@ def judge_command(layout: JointLayout, raw: bytes, now_ns: int) -> tuple[str, Jo
     return "accepted", command
 
 
-@pytest.mark.parametrize(("name", "messages"), [("pendulum", MESSAGES), ("humanoid", 3000)])
+@pytest.mark.parametrize(("name", "messages"), [("pendulum", MESSAGES), ("humanoid", 2000)])
 def test_no_bytes_on_the_topic_of_commands_are_applied_but_commands(
     processes: Processes, client: SimulatorClient, name: str, messages: int
 ) -> None:

@@ -19,6 +19,7 @@ from msgs_config.tick_clock import TickClock
 
 CLOCK = TickClock(240)
 HELD_TICKS = 13
+TICKS = 150  # of a run in lockstep
 SESSION = "/sim_node#000000000001"  # of two runs that are compared byte by byte
 HELD = 0.0521  # s, a command timeout: 12 ticks are 0.05 s
 SLOWLY = 0.25  # simulated over wall time, for tests that answer tick by tick
@@ -277,19 +278,18 @@ def test_in_lockstep_a_controller_that_is_killed_and_replaced_changes_nothing(
             "humanoid",
             session=SESSION,
             real_time_factor=1.0 if disturbed else 0.0,
-            max_ticks=240,
+            max_ticks=TICKS,
             wait_for_subscribers=2,
         )
         controller = start()
         if disturbed:
-            for goal in (60, 150):
-                client.spin_until(
-                    lambda goal=goal: client.states.messages and tick_of(client.states.last) > goal,
-                    f"tick {goal}",
-                )
-                kill(controller)
-                controller = start()
-        client.spin_until(lambda: 241 in client.states.ticks()[-2:], "the last state")
+            client.spin_until(
+                lambda: client.states.messages and tick_of(client.states.last) > TICKS // 2,
+                "half of the ticks",
+            )
+            kill(controller)
+            controller = start()
+        client.spin_until(lambda: TICKS + 1 in client.states.ticks()[-2:], "the last state")
         assert simulator.wait() == 0
         controller.end()
         states = dict(zip(client.states.ticks(), client.states.raw, strict=True))
@@ -302,5 +302,5 @@ def test_in_lockstep_a_controller_that_is_killed_and_replaced_changes_nothing(
 
     undisturbed, disturbed = run(disturbed=False), run(disturbed=True)
 
-    assert list(undisturbed) == list(range(1, 242))
+    assert list(undisturbed) == list(range(1, TICKS + 2))
     assert disturbed == undisturbed

@@ -5,18 +5,25 @@ import itertools
 import pytest
 
 from benchmarks import soak as soak_module
+from benchmarks import soak_findings
 from benchmarks.soak import soak
 from msgs_config.polling import DirectSubscription
 
 
 @pytest.mark.slow
-def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(domain: int) -> None:
+def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     del domain  # the processes inherit it
+    monkeypatch.setattr(soak_findings, "SETTLED", 2_000)
+    for module in (soak_module, soak_findings):
+        monkeypatch.setattr(module, "MEMORY_PERIOD", 500)
 
-    found = soak(15_000, seed=2, progress=lambda tick: None)
+    found = soak(5_000, seed=2, progress=lambda tick: None)
 
     assert found.problems == []
-    assert found.ticks == 15_000
+    assert found.ticks == 5_000
+    assert all(len(samples) == 11 for samples in found.memory.values())
     assert set(found.growth) == {"sim_node", "controller_node"}
     assert set(found.disturbances) == {"push", "pause", "reset", "set_gain", "set_duration"}
 
