@@ -21,6 +21,15 @@ def pytest_xdist_auto_num_workers() -> int:
     return processors + (processors + 1) // 2
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put first those that share what takes long to make.
+
+    A worker begins with the first tests of its part, and another one that is idle takes over the
+    last ones: it would have to make anew what they share.
+    """
+    items.sort(key=lambda item: item.get_closest_marker("sharing") is None)
+
+
 @pytest.fixture(scope="session")
 def domain() -> Iterator[int]:
     """A ROS domain that nobody else on this machine uses; the tests' processes inherit it."""

@@ -29,7 +29,7 @@ from msgs_config.parameters import resolve
 from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import TickClock
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 LAYOUT = HUMANOID.layout
 CLOCK = TickClock(RATE_HZ)

@@ -22,7 +22,7 @@ from msgs_config import topics
 from msgs_config.errors import RecordingError
 from msgs_config.versions import installed_versions
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 LOWEST, LARGEST = 0, 62  # bits
 

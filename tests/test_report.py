@@ -26,7 +26,7 @@ from msgs_config import topics
 from msgs_config.errors import RecordingError
 from msgs_config.topics import Topic
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 HOSTILE = "/<script>alert('x')</script>&amp;"
 VOID = {"meta", "img"}

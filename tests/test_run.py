@@ -25,7 +25,7 @@ from msgs_config import topics
 from msgs_config.character_loading import load_character
 from msgs_config.messages import JointStateDecoder, state_in_layout
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 TICKS = 480
 WALK = ("run", "--character", "humanoid", "--clip", "walk", "--duration", "2")

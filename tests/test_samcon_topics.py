@@ -14,7 +14,7 @@ from experiment.samcon.reconstruction import Job, reconstruct
 from experiment.samcon.settings import preset
 from msgs_config.character_loading import load_character
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 DURATION = 0.3  # s
 PUSHES = ("chest:150,0,0@0.1", "root:0,100,0@0.25")

@@ -18,7 +18,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character_loading import load_character
 from sim_node.world import WorldSettings
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 BODY = RigidBody(2.0, np.array([0.3, 0.5, 0.9]))
 TIMES = np.linspace(0.0, 2.0, 801)

@@ -20,7 +20,7 @@ from experiment.studies.study import Case, Findings
 from msgs_config.dynamics import DynamicsModel
 from msgs_config.tick_clock import TickClock
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 GRAVITY = 9.81
 

@@ -14,7 +14,7 @@ from experiment.studies.study import Case, Findings
 from msgs_config.throw import Throw
 from msgs_config.throw_messages import BallStates, ball_names
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 GRAVITY = 9.81
 

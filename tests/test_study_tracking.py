@@ -25,7 +25,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.bullet import pybullet
 from sim_node.world import WorldSettings
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 PERIOD = 1.0 / 240  # s
 

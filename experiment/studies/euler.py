@@ -45,20 +45,24 @@ class Motion:
 
 def axes(turn_xyzw: FloatArray) -> FloatArray:
     """Rotation matrices (..., 3, 3), body to world, of quaternions (..., 4) of any length."""
-    x, y, z, w = np.moveaxis(np.asarray(turn_xyzw), -1, 0)
+    x, y, z, w = (turn_xyzw[..., entry] for entry in range(4))
     norm = x * x + y * y + z * z + w * w
     rows = (
         (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
         (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
     )
-    matrices: FloatArray = np.moveaxis(np.array(rows) / norm, (0, 1), (-2, -1))
-    return matrices
+    matrices: FloatArray = np.array(rows) / norm
+    return matrices.transpose(*range(2, matrices.ndim), 0, 1)
 
 
 def net_load(loads: Sequence[Load], turn_xyzw: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Force (3,) in N and torque (..., 3) in N m about the centre, world, at turns (..., 4)."""
-    turn = axes(turn_xyzw)
+    return _net_load(loads, axes(turn_xyzw))
+
+
+def _net_load(loads: Sequence[Load], turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """`net_load` at rotation matrices (..., 3, 3)."""
     force, torque = np.zeros(3), np.zeros((*turn.shape[:-2], 3))
     for load in loads:
         force += load.force
@@ -99,8 +103,9 @@ def move(body: RigidBody, start: Motion, loads: Sequence[Load], times: FloatArra
 def _rate(body: RigidBody, loads: Sequence[Load], state: FloatArray) -> FloatArray:
     """The rate (13,) of centre, quaternion, velocity and angular velocity: `dq/dt = q w / 2`."""
     turn, velocity, spin = state[3:7], state[7:10], state[10:13]
-    force, torque = net_load(loads, turn)
-    torque_in_body = axes(turn).T @ torque
+    matrix = axes(turn)
+    force, torque = _net_load(loads, matrix)
+    torque_in_body = matrix.T @ torque
     vector, scalar = turn[:3], turn[3]
     turning = 0.5 * np.append(scalar * spin + _cross(vector, spin), -vector @ spin)
     acceleration = angular_acceleration(body.inertia, spin, torque_in_body)
@@ -111,5 +116,8 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """`numpy.cross` of (..., 3) each, much sooner for single vectors."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    product: FloatArray = np.stack((y * w - z * v, z * u - x * w, x * v - y * u), axis=-1)
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product[..., 0] = y * w - z * v
+    product[..., 1] = z * u - x * w
+    product[..., 2] = x * v - y * u
     return product
