@@ -13,7 +13,7 @@ from controller_node.feedback_gains import FeedbackGains
 from experiment.cli import main
 from experiment.loop import ticks_in_process
 from experiment.planned_push import planned_push
-from experiment.samcon import trials
+from experiment.samcon import fitting, trials
 from experiment.samcon.features import Features
 from experiment.samcon.fitting import State, fitted
 from experiment.samcon.gain_space import Gains, GainSpace, names
@@ -114,24 +114,36 @@ def test_the_fit_is_the_same_on_two_processes_and_costs_what_it_says() -> None:
     assert told[0].cost == mean_cost(alone) < mean_cost({})
 
 
+FEW = 8
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Feedbacks of a population."""
+    monkeypatch.setattr(fitting, "POPULATION", FEW)
+
+
+@pytest.mark.usefixtures("few")
 def test_a_fit_never_ends_with_a_worse_feedback_than_it_began_with() -> None:
-    best = fitted(PROBLEM, SETTINGS, Fit(16), 1)
+    best = fitted(PROBLEM, SETTINGS, Fit(FEW), 1)
     for _ in range(2):  # a fit of what was fitted tries others around it
-        better = fitted(replace(PROBLEM, feedback=best), SETTINGS, Fit(16), 1)
+        better = fitted(replace(PROBLEM, feedback=best), SETTINGS, Fit(FEW), 1)
 
         assert mean_cost(better) <= mean_cost(best)
         best = better
 
 
+@pytest.mark.usefixtures("few")
 def test_a_fit_of_longer_and_longer_runs_is_no_worse_at_the_last(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(trials, "_FIRST_RUN", 0.1)  # s, two windows
+    monkeypatch.setattr(fitting, "_TEST_EVERY", 2)  # populations
     told: list[State] = []
 
-    best = fitted(PROBLEM, SETTINGS, Fit(9 * 16), 1, told.append)
+    best = fitted(PROBLEM, SETTINGS, Fit(5 * FEW), 1, told.append)
 
-    assert [state.level.windows for state in told][::4] == [2, 3, 4]
+    assert [state.level.windows for state in told][::2] == [2, 3, 4]
     assert told[-1].cost == mean_cost(best) <= mean_cost(PROBLEM.feedback)
 
 

@@ -116,7 +116,9 @@ def test_a_feedback_of_other_joints_is_refused() -> None:
 
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(window_fitting, "_FIRST_RUNS", 4)
+    monkeypatch.setattr(window_fitting, "_FIRST_RUNS", 3)
+    monkeypatch.setattr(window_fitting, "_PUSHED", 1)
+    monkeypatch.setattr(window_fitting, "_NOISES", (0.02,))
     monkeypatch.setattr(window_fitting, "_FINAL_RUNS", 1)
 
 
