@@ -189,14 +189,16 @@ class Processes:
         self._folder, self._fresh = folder, fresh
         self._started: list[Process] = []
 
-    def node(self, name: str, namespace: str = "", **parameters: object) -> Process:
+    def node(
+        self, name: str, namespace: str = "", *, fresh: bool = False, **parameters: object
+    ) -> Process:
         """Start one of the package's nodes; a name's dots are written as double underscores."""
         given = {name.replace("__", "."): value for name, value in parameters.items()}
         file = self._folder / f"{len(self._started)}_{name}.yaml"
         file.write_text(yaml.safe_dump({f"/**/{name}": {"ros__parameters": given}}))
         arguments = ["--ros-args", "--params-file", str(file)]
         arguments += ["-r", f"__ns:=/{namespace}"] if namespace else []
-        if self._fresh:
+        if self._fresh or fresh:
             return self.python("-m", MODULES[name], *arguments)
         return self._start(arguments, forked_module=MODULES[name])
 

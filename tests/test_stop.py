@@ -50,6 +50,15 @@ def processes(domain: int, tmp_path: Path) -> Iterator[Processes]:
     started.end()
 
 
+@pytest.fixture
+def forked(domain: int, tmp_path: Path) -> Iterator[Processes]:
+    """Starts processes that are soon there; how those end that are not `fresh` is not looked at."""
+    del domain
+    started = Processes(tmp_path)
+    yield started
+    started.end()
+
+
 @contextmanager
 def observer(domain: int) -> Iterator[SimulatorClient]:
     """A client that leaves the graph again."""
@@ -155,20 +164,20 @@ def hear_states(client: SimulatorClient) -> None:
 
 
 def waiting(processes: Processes, client: SimulatorClient) -> Process:
-    simulator = processes.simulator()
+    simulator = processes.simulator(fresh=True)
     client.first_state()
     return simulator
 
 
 def waiting_for_subscribers(processes: Processes, client: SimulatorClient) -> Process:
-    simulator = processes.simulator(wait_for_subscribers=9)
+    simulator = processes.simulator(fresh=True, wait_for_subscribers=9)
     client.spin_until(lambda: client.configuration.messages, "configuration")
     return simulator
 
 
-def running(processes: Processes, client: SimulatorClient) -> Process:
+def running(processes: Processes, client: SimulatorClient, *, fresh: bool = True) -> Process:
     processes.controller()
-    simulator = processes.simulator()
+    simulator = processes.simulator(fresh=fresh)
     hear_states(client)
     return simulator
 
@@ -180,34 +189,35 @@ def paused(processes: Processes, client: SimulatorClient) -> Process:
 
 
 def in_real_time(processes: Processes, client: SimulatorClient) -> Process:
-    simulator = processes.simulator(mode="realtime")
+    simulator = processes.simulator(fresh=True, mode="realtime")
     hear_states(client)
     return simulator
 
 
 def slowed_down(processes: Processes, client: SimulatorClient) -> Process:
-    simulator = processes.simulator(mode="realtime", real_time_factor=0.001, wait_for_subscribers=1)
+    slowly = {"mode": "realtime", "real_time_factor": 0.001, "wait_for_subscribers": 1}
+    simulator = processes.simulator(fresh=True, **slowly)
     client.first_state()
     return simulator
 
 
 def idle(processes: Processes, client: SimulatorClient) -> Process:
     configuration = client.listen(topics.CONFIGURATION.of(topics.CONTROLLER_NODE))
-    controller = processes.controller()
+    controller = processes.controller(fresh=True)
     client.spin_until(lambda: configuration.messages, "configuration")
     return controller
 
 
 def answering(processes: Processes, client: SimulatorClient) -> Process:
     processes.simulator()
-    controller = processes.controller()
+    controller = processes.controller(fresh=True)
     hear_states(client)
     return controller
 
 
 def recording(processes: Processes, client: SimulatorClient) -> Process:
-    recorder = processes.node("recorder", directory="recording", progress_period=0.05)
-    running(processes, client)
+    recorder = processes.node("recorder", fresh=True, directory="recording", progress_period=0.05)
+    running(processes, client, fresh=False)
     client.spin_until(lambda: re.search(r"tick \d\d", recorder.stdout), "ticks")
     return recorder
 
@@ -229,26 +239,26 @@ SITUATIONS: list[Situation] = [
 @pytest.mark.parametrize("number", SIGNALS)
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_a_signal_ends_a_node_within_a_second_and_leaves_nothing_behind(
-    processes: Processes, own_graph: int, situation: Situation, number: signal.Signals
+    forked: Processes, own_graph: int, situation: Situation, number: signal.Signals
 ) -> None:
     before = set(SHARED_MEMORY.iterdir())  # by others, some of whom may have been killed
     with observer(own_graph) as client:
-        node = situation(processes, client)
+        node = situation(forked, client)
 
         files = end(node, number) - before
 
         assert_ended_well(node)
-        processes.end()
+        forked.end()
     assert files
     assert not left_behind(files)
 
 
 @pytest.mark.parametrize("situation", [running, recording])
 def test_more_signals_disturb_nothing(
-    processes: Processes, own_graph: int, situation: Situation
+    forked: Processes, own_graph: int, situation: Situation
 ) -> None:
     with observer(own_graph) as client:
-        node = situation(processes, client)
+        node = situation(forked, client)
 
         end(node, signal.SIGINT, signal.SIGTERM, signal.SIGINT)
 
@@ -269,7 +279,7 @@ while rclpy.ok():
 
 
 def test_a_signal_ends_a_recorder_to_whom_more_comes_than_it_can_take(
-    processes: Processes, own_graph: int, tmp_path: Path
+    forked: Processes, own_graph: int, tmp_path: Path
 ) -> None:
     (tmp_path / "flooding.py").write_text(FLOODING)
 
@@ -277,13 +287,12 @@ def test_a_signal_ends_a_recorder_to_whom_more_comes_than_it_can_take(
         return recorder.stdout.count("flushed")
 
     with observer(own_graph) as client:
-        recorder = processes.node(
-            "recorder", directory="recording", topics=["flood"], progress_period=0.05
-        )
-        running(processes, client)
+        told = {"directory": "recording", "topics": ["flood"], "progress_period": 0.05}
+        recorder = forked.node("recorder", fresh=True, **told)
+        running(forked, client, fresh=False)
         client.spin_until(lambda: re.search(r"tick \d\d", recorder.stdout), "ticks")
         for _ in range(FLOODS):
-            processes.python("-m", "flooding")
+            forked.python("-m", "flooding")
         client.spin_until(lambda: client.node.count_subscribers("flood"), "the flood recorded")
         before = flushes(recorder)
         client.spin_until(lambda: flushes(recorder) > before + 2, "flushes")
