@@ -5,6 +5,7 @@ made of triangles, so that a link would collide with nothing.
 """
 
 import re
+from hashlib import sha256
 from math import isfinite
 from pathlib import Path
 
@@ -14,6 +15,8 @@ MAX_LINE = 4000  # characters; the engine cuts longer ones
 
 _OBJ_LISTS = ("v", "vt", "vn")  # in the order in which a corner of a face names them
 _OBJ_CORNER = re.compile(r"-?\d+(/-?\d+|//-?\d+|/-?\d+/-?\d+)?", re.ASCII)
+
+_sound = set[bytes]()  # digests of .obj files that were checked
 
 
 def check_mesh(path: Path) -> None:
@@ -27,7 +30,7 @@ def check_mesh(path: Path) -> None:
         raise CharacterError(f"mesh {path} is to collide with; it must be an .obj or .stl file")
     try:
         if suffix == ".obj":
-            _check_obj(path.read_bytes().decode("latin-1"))
+            _check_obj_once(path.read_bytes())
         else:
             _check_stl(path)
     except (OSError, ValueError) as error:
@@ -40,6 +43,14 @@ def _check_stl(path: Path) -> None:
         count = int.from_bytes(file.read(84)[80:], "little")
     if count == 0 or path.stat().st_size != 84 + 50 * count:
         raise ValueError("it is no whole binary STL file; the engine reads no text")
+
+
+def _check_obj_once(raw: bytes) -> None:
+    """Check a text that has not been found to be sound: a process loads each mesh several times."""
+    digest = sha256(raw).digest()
+    if digest not in _sound:
+        _check_obj(raw.decode("latin-1"))
+        _sound.add(digest)
 
 
 def _check_obj(text: str) -> None:

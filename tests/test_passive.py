@@ -165,11 +165,12 @@ def test_a_limb_that_is_swung_against_its_limit_is_stopped_and_gains_no_energy(
     with World(WorldSettings(step_s=STEP, gravity=0.0, ground=False)) as world:
         body = world.add(passing_through_itself(HUMANOID))
         body.set_state(position, velocity)
-        for _ in range(240):
+        for tick in range(240):
             position, velocity = body.read()
             effort = passive.effort(position, velocity)
             stored.append(potential(limit, position[entries]))
-            energies.append(body.links.kinetic_energy())
+            if tick % 4 == 0:  # it takes as long as all the rest
+                energies.append(body.links.kinetic_energy())
             touched += bool(effort.any())
 
             # Act

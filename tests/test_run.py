@@ -457,7 +457,7 @@ WRONG: dict[str, tuple[tuple[str, ...], list[str]]] = {
 }
 
 
-@pytest.mark.parametrize("wrong", ["character", "clip", "joint", "gain"])
+@pytest.mark.parametrize("wrong", ["character", "gain"])
 def test_an_error_is_one_clear_line_and_leaves_nothing_behind(
     processes: Processes, tmp_path: Path, wrong: str
 ) -> None:
