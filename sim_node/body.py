@@ -14,8 +14,8 @@ from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.bullet import load_urdf, pybullet
 from msgs_config.character import Character
+from msgs_config.geometry import frames
 from msgs_config.joint_layout import JointType
-from sim_node import frames
 from sim_node.links import Links
 
 _UNLIMITED_SPEED = 1e9  # Bullet clamps at 100 otherwise, and a divergence would stay unseen

@@ -25,9 +25,8 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character, SoftLimit
 from msgs_config.dynamics import DynamicsModel
-from msgs_config.geometry import fixed_order
-from sim_node import frames
-from sim_node.frames import Triple
+from msgs_config.geometry import fixed_order, frames
+from msgs_config.geometry.frames import Triple
 
 _MOST_PIVOTS = 50
 _ROUNDING = 1e-12  # of a force, that may be wrong without consequence

@@ -5,8 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from msgs_config import rotations
-from msgs_config.geometry import fixed_order
-from sim_node import frames
+from msgs_config.geometry import fixed_order, frames
 
 numbers = st.floats(-3.0, 3.0)
 vectors = st.tuples(numbers, numbers, numbers)

@@ -77,7 +77,7 @@ KNOW_NO_ROS = [
     "sim_node.aim",
     "sim_node.back_pressure",
     "sim_node.camera",
-    "sim_node.frames",
+    "msgs_config.geometry.frames",
     "sim_node.canvas",
     "sim_node.compositing",
     "sim_node.ground",
