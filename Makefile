@@ -17,7 +17,7 @@ endif
 # and for each worker of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help venv demo test quick hashes other-numpy bench soak kills noise long-recording format clean distclean
+.PHONY: help venv demo backflip test quick hashes other-numpy bench soak kills noise long-recording format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -27,6 +27,9 @@ venv: .venv/.installed ## Set up .venv
 
 demo: .venv/.installed ## Let the humanoid walk for 20 s and record it in runs/demo
 	$(BIN)/actuated_characters run --character humanoid --clip walk --duration 20 --output runs/demo --overwrite
+
+backflip: .venv/.installed-plan ## Let the humanoid do a backflip by its joints alone, planned; in runs/backflip
+	$(BIN)/actuated_characters run --clip backflip --duration 1.75 --planner predictive --output runs/backflip --overwrite
 
 test: .venv/.installed-test ## Check style and types, run the tests
 	$(BIN)/ruff check
@@ -93,6 +96,11 @@ distclean: clean ## Remove .venv too
 	@echo "installing the package into .venv ..."
 	@$(BIN)/python -m pip install -qq -e '.[wheels]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
 	@touch $@
+
+.venv/.installed-plan: $(PACKAGING) | .venv/.created
+	@echo "installing the package and what the planner needs into .venv ..."
+	@$(BIN)/python -m pip install -qq -e '.[wheels,plan]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
+	@touch .venv/.installed $@
 
 .venv/.installed-test: $(PACKAGING) | .venv/.created
 	@echo "installing the package and its test tools into .venv ..."

@@ -51,6 +51,8 @@ setup(
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-rclpy[fastrtps]>=7.1.6,<7.2",
         ],
+        # `planner: predictive`, whose rollouts numba compiles (210 MB together, BSD-2).
+        "plan": ["llvmlite>=0.44", "numba>=0.61,<0.70"],
         # `actuated_characters reconstruct --fit N`: CMA-ES, in Python alone (0.3 MB, BSD-3).
         "fit": ["cma>=4.0,<5"],
         # `actuated_characters reconstruct --cluster ADDRESS`, on several machines.
@@ -66,6 +68,7 @@ setup(
             "mcap>=1.2,<2",
             "mcap-ros2-support>=0.5.5,<0.7",
             "mypy>=2.4,<2.5",
+            "numba>=0.61,<0.70",
             "pytest>=7.4,<10",
             "pytest-xdist>=3.5,<4",
             "ruff>=0.17.5,<0.18",

@@ -1,6 +1,8 @@
 """The controller without ROS: state in, effort and reference out."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -35,6 +37,28 @@ class Settings:
     strengths: FloatArray | None = None  # (b,) shares of the gains that count; None: all of them
 
 
+class Planner(Protocol):
+    """What keeps a motion by offsets to the tracking errors. It remembers the ticks before."""
+
+    def between_rollouts(self, act: Callable[[], None]) -> None:
+        """Have something done again and again while it plans."""
+
+    def begin_episode(self, episode: int) -> None:
+        """Forget all; `episode` is the tick of the episode's first state."""
+
+    def change_reference(self) -> None:
+        """Say that the reference is another one from now on."""
+
+    def offset(
+        self,
+        tick: int,
+        state: StampedState,
+        gains: GainArrays,
+        desired_at: Callable[[int], ReferenceState],
+    ) -> FloatArray:
+        """What is added to the tracking errors (n,) of a state at a tick of the episode."""
+
+
 @dataclass(frozen=True)
 class _Drive:
     """How firmly it is driven, as long as nothing changes."""
@@ -58,9 +82,9 @@ class Controller:
     """Inverse dynamics in ticks: `(q, v, desired state) -> effort`.
 
     A function of what the state's message holds and of the tick, so that the same state always
-    gets the same answer; only the law `pid`, a behaviour that reacts and a clip's window feedback
-    remember the ticks before, and a trajectory or strengths that were taken hold until the episode
-    ends.
+    gets the same answer; only the law `pid`, a behaviour that reacts, a planner and a clip's window
+    feedback remember the ticks before, and a trajectory or strengths that were taken hold until the
+    episode ends.
     """
 
     def __init__(
@@ -73,10 +97,12 @@ class Controller:
         gravity: float,
         series: EffortSeries | None = None,
         behaviour: BehaviourChoice | None = None,
+        planner: Planner | None = None,
     ) -> None:
         """Build the model of the dynamics; `series` is what the law `feedforward` applies.
 
-        Without a behaviour it tracks the reference, whatever comes.
+        Without a behaviour it tracks the reference, whatever comes. A planner goes with the
+        behaviour tracking and the law `stable_pd`.
 
         Raises:
             CharacterError: a joint moves neither mass nor inertia, or a foot is none.
@@ -95,6 +121,7 @@ class Controller:
         self._plant = Plant(self.layout, self._model, self.clock.period_s, series)
         self._balance = Balance(character, character.feet) if character.feet else None
         self._law: Law = make_law(settings.law, self._plant)
+        self._planner = planner
         self.check(settings)
         self._settings = settings
         self._drive: _Drive | None = None
@@ -103,6 +130,11 @@ class Controller:
         self._strengths = StrengthSchedule(self.layout)
         self._no_contacts = np.zeros((len(character.links), 6))
         self.mode: ModeReport | None = None  # since which state what is done; None before the first
+
+    def while_planning(self, act: Callable[[], None]) -> None:
+        """Have something done again and again while a planner plans; not to change this one."""
+        if self._planner is not None:
+            self._planner.between_rollouts(act)
 
     @property
     def needs_contacts(self) -> bool:
@@ -122,6 +154,8 @@ class Controller:
             self._law = make_law(settings.law, self._plant)
         self._settings = settings
         self._drive = None
+        if self._planner is not None:
+            self._planner.change_reference()  # its velocity may count, or no more
 
     def check(self, settings: Settings) -> None:
         """Raise ConfigurationError if settings cannot be taken."""
@@ -130,6 +164,12 @@ class Controller:
             raise ConfigurationError(
                 f"parameter 'balance' needs the key 'feet' in {self._character.file}"
             )
+        if self._planner is not None and settings.law != "stable_pd":
+            raise ConfigurationError(
+                f"a planner foresees the law stable_pd alone; 'law' is {settings.law}"
+            )
+        if self._planner is not None and settings.balance is not None:
+            raise ConfigurationError("a planner keeps balance itself; 'balance' must be false")
 
     def _check_inertia(self, character: Character) -> None:
         """A joint that moves no inertia would make the mass matrix singular."""
@@ -167,6 +207,8 @@ class Controller:
         self._reference = before.replaced(points, start, now)
         self._behaviour.carry = Carry()
         self._next = None
+        if self._planner is not None:
+            self._planner.change_reference()
 
     def weaken(self, strengths: Strengths, *, episode_ns: int) -> None:
         """Take strengths that count from their stamp on, until the next ones or the episode's end.
@@ -189,6 +231,8 @@ class Controller:
         self._reference = self._own_reference
         if isinstance(self._reference, RespondingReference):
             self._reference.begin_episode()
+        if self._planner is not None:
+            self._planner.begin_episode(self.clock.first_tick_from(episode_ns))
         self._law = make_law(self._settings.law, self._plant)
         self._next = None
 
@@ -202,8 +246,14 @@ class Controller:
 
         Not the stamps' difference: rounded to whole ns, it is another one in another episode.
         """
-        episode_tick = self.clock.first_tick_from(self._episode_ns or 0)
-        ticks = self.clock.first_tick_from(stamp_ns) - episode_tick
+        return self._time_of(self.clock.first_tick_from(stamp_ns) - self._episode_tick)
+
+    @property
+    def _episode_tick(self) -> int:
+        return self.clock.first_tick_from(self._episode_ns or 0)
+
+    def _time_of(self, ticks: int) -> float:
+        """Time in s of a number of ticks since the episode's first state."""
         since_ns = self.clock.stamp_ns(FIRST_TICK + ticks) - self.clock.stamp_ns(FIRST_TICK)
         return since_ns / NANOSECONDS_PER_SECOND
 
@@ -250,7 +300,7 @@ class Controller:
             velocity=state.velocity,
             now=self._desired(directive.now),
             upcoming=self._desired(directive.upcoming),
-            response=self._response(time, state),
+            response=self._response(time, state, directive.gains),
         )
         effort = self._effort(instant, directive.gains)
         desired = instant.now
@@ -288,8 +338,11 @@ class Controller:
             )
         return self.layout.clipped(effort, gains.effort_limits)
 
-    def _response(self, time: float, state: StampedState) -> FloatArray | None:
-        """What a reference with feedback adds to the tracking errors (n,); None without."""
+    def _response(self, time: float, state: StampedState, gains: GainArrays) -> FloatArray | None:
+        """What planner or feedback add to the tracking errors (n,); None without."""
+        if self._planner is not None:
+            tick = self.clock.tick(state.stamp_ns) - self._episode_tick
+            return self._planner.offset(tick, state, gains, self._desired_at)
         if isinstance(self._reference, RespondingReference):
             return self._reference.response(time, state.position, state.velocity)
         return None
@@ -299,6 +352,10 @@ class Controller:
         if self._next is not None and self._next[0] == time:
             return self._next[1]
         return self._reference.sample(time)
+
+    def _desired_at(self, tick: int) -> ReferenceState:
+        """What is to be tracked at a tick, counted from the episode's first state."""
+        return self._desired(self._reference.sample(self._time_of(tick)))
 
     def _desired(self, reference: ReferenceState) -> ReferenceState:
         """The reference as the settings have it tracked."""

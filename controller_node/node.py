@@ -9,13 +9,13 @@ from rclpy.node import Node
 
 from controller_node.actuation import Actuation
 from controller_node.behaviours.base import ModeReport
-from controller_node.behaviours.settings import check_terrain
 from controller_node.contact_inbox import ContactInbox
 from controller_node.motion import make_motion
 from controller_node.outputs import Answer, Outputs
 from controller_node.parameters import (
     PARAMETERS,
     character_parameters,
+    check_terrain,
     commanded_joints,
     make_controller,
     make_settings,
@@ -64,7 +64,7 @@ class ControllerNode(Node):
         for note in self._character.notes:
             self.get_logger().warning(note)
         self._layout = self._character.layout
-        self._declared = PARAMETERS + character_parameters(self._character)
+        self._declared = PARAMETERS + character_parameters(self._character, given)
         self._values = resolve(self._declared, given)
         declare(self, self._declared, self._values)
         motion = make_motion(self._character, self._values)
@@ -72,6 +72,8 @@ class ControllerNode(Node):
             self.get_logger().warning(note)
         self._controller = make_controller(self._character, motion.reference, self._values)
         self._answer: Answer | None = None
+        self._is_answering = False
+        self._upcoming: Values | None = None
         self._episode_ns: int | None = None
         self._warnings = Warnings(self)
         self._diagnostics = DiagnosticsPublisher(self)
@@ -128,6 +130,7 @@ class ControllerNode(Node):
                 was made for.
         """
         spinner = Spinner(self)
+        self._controller.while_planning(spinner.serve)
         try:
             while not stop:
                 self._report()
@@ -180,7 +183,7 @@ class ControllerNode(Node):
                 f"than '{self._character.name}'; set 'character' to the simulator's"
             )
         self._controller.check_agreement(simulator.probe)
-        check_terrain(self._values.text("behaviour"), simulator.parameters.get("terrain"))
+        check_terrain(self._values, simulator.parameters.get("terrain"))
         for name in ("rate", "placement"):
             its, own = simulator.parameters.get(name), self._values[name]
             if its != own:
@@ -221,12 +224,16 @@ class ControllerNode(Node):
         self._trajectories.take(state.stamp_ns, episode_ns)
         self._strengths.take(state.stamp_ns, episode_ns)
         started = time.perf_counter()
+        self._is_answering = True
         effort, reference = self._controller.answer(state, episode_ns, contacts)
+        self._is_answering = False
         self._answer = self._outputs.answer(raw, state, effort, reference)
         self._answer_times.add(time.perf_counter() - started)
         self._counts["answered"] += 1
         self._tell_mode()
         self._outputs.publish(self._answer)
+        if self._upcoming is not None:
+            self._take_parameters(self._upcoming)
 
     def _is_answered(self, raw: bytes) -> bool:
         """Whether a state, serialised, is the one that was answered last, of the same simulator."""
@@ -319,6 +326,10 @@ class ControllerNode(Node):
 
     def _take_parameters(self, values: Values) -> None:
         """Take changed settings, all at once; they count from the next state on."""
+        if self._is_answering:  # services are answered while it plans
+            self._upcoming = values
+            return
+        self._upcoming = None
         self._values = values
         self._controller.settings = make_settings(self._character, values)
         self._publish_configuration()

@@ -1,17 +1,23 @@
 """The parameters of `controller_node`, and the controller that they make."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from controller_node.balance import BalanceGains
+from controller_node.behaviours import settings as behaviour_settings
 from controller_node.behaviours.make import choose_behaviour
-from controller_node.behaviours.settings import BEHAVIOUR_PARAMETERS
-from controller_node.controller import Controller, Settings
+from controller_node.controller import Controller, Planner, Settings
 from controller_node.effort_series import read_effort_series
 from controller_node.laws import LAWS, GainArrays
 from controller_node.motion import MOTION_PARAMETERS
+from controller_node.planner import settings as planner_settings
+from controller_node.planner.settings import NO_PLANNER, PREDICTIVE
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
 from msgs_config.character import ROOT_TORQUE, Character
+from msgs_config.errors import ConfigurationError
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Parameter, Values
 from msgs_config.session import SESSION
@@ -27,7 +33,8 @@ PARAMETERS = [
         "feedforward", "", "the law feedforward's CSV file: time_s and degrees of freedom's efforts"
     ),
     *MOTION_PARAMETERS,
-    *BEHAVIOUR_PARAMETERS,
+    *behaviour_settings.BEHAVIOUR_PARAMETERS,
+    *planner_settings.PLANNER_PARAMETERS,
     Parameter(
         "root_assistance", True, "drive a floating base by the lecture's root force and torque"
     ),
@@ -73,11 +80,17 @@ PARAMETERS = [
 ]
 
 
-def character_parameters(character: Character) -> list[Parameter]:
-    """The parameters whose names and defaults depend on the character: gains and limits."""
+def character_parameters(
+    character: Character, given: Mapping[str, object] = MappingProxyType({})
+) -> list[Parameter]:
+    """The parameters whose names and defaults depend on the character: gains and limits.
+
+    With a planner, which the parameters given may name, some gains are others.
+    """
     parameters = []
+    planned = character.planning.gains if given.get("planner") == PREDICTIVE else {}
     for name, limit in zip(character.vector_names, character.effort_limits(), strict=True):
-        gains = character.gains[name]
+        gains = planned.get(name, character.gains[name])
         parameters += [
             Parameter(
                 f"gains.{name}.p",
@@ -159,8 +172,9 @@ def _is_ragdoll(values: Values) -> bool:
 
 
 def _assists(values: Values) -> bool:
-    """Whether the root is driven; a ragdoll's is not."""
-    return values.flag("root_assistance") and not _is_ragdoll(values)
+    """Whether the root is driven; a ragdoll's is not, nor that of planned joint torques."""
+    plans = values.text("planner") != NO_PLANNER
+    return values.flag("root_assistance") and not plans and not _is_ragdoll(values)
 
 
 def _balance_gains(values: Values) -> BalanceGains:
@@ -186,6 +200,36 @@ def make_controller(character: Character, reference: Reference, values: Values) 
         gravity=values.number("gravity"),
         series=read_effort_series(character.layout, path) if path else None,
         behaviour=choose_behaviour(character, values),
+        planner=make_planner(character, values),
+    )
+
+
+def check_terrain(values: Values, terrain: object) -> None:
+    """Raise ConfigurationError if the parameters' values do not go with a simulator's terrain.
+
+    `terrain` is the simulator's parameter, None if unknown.
+    """
+    behaviour_settings.check_terrain(values.text("behaviour"), terrain)
+    planner_settings.check_terrain(values.text("planner"), terrain)
+
+
+def make_planner(character: Character, values: Values) -> Planner | None:
+    """The planner that the parameters' values say; None without one.
+
+    Raises:
+        ConfigurationError: it cannot be had for the character, or beside the other values.
+    """
+    settings = planner_settings.make_settings(character, values)
+    if settings is None:
+        return None
+    try:
+        from controller_node.planner.planner import PredictivePlanner
+    except ImportError as error:
+        raise ConfigurationError(
+            f"planner 'predictive' needs numba ({error}): pip install 'actuated_characters[plan]'"
+        ) from error
+    return PredictivePlanner(
+        character, settings, rate_hz=values.integer("rate"), gravity=values.number("gravity")
     )
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from controller_node import parameters as controller_parameters
 from controller_node.agreement import check_agreement
 from controller_node.behaviours.make import choose_behaviour
-from controller_node.behaviours.settings import check_terrain
 from controller_node.controller import check_reference
 from controller_node.motion import make_motion
 from controller_node.references.base import Reference
@@ -79,7 +78,8 @@ def make_plan(
     controller_given = {**reference, **controller_given}
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller = resolve(
-        controller_parameters.PARAMETERS + controller_parameters.character_parameters(character),
+        controller_parameters.PARAMETERS
+        + controller_parameters.character_parameters(character, controller_given),
         controller_given,
     )
     motion = make_motion(character, controller)
@@ -90,7 +90,7 @@ def make_plan(
         **as_values(motion.first_state()),
     }
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
-    check_terrain(controller.text("behaviour"), simulator.text("terrain"))
+    controller_parameters.check_terrain(controller, simulator.text("terrain"))
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
     notes = character.notes + motion.notes

@@ -45,7 +45,7 @@ class ShapeType(Enum):
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape that is seen. `pose` is in the link frame, `mesh` an absolute path."""
+    """A shape that is seen or touched. `pose` is in the link frame, `mesh` an absolute path."""
 
     type: ShapeType
     size: tuple[float, ...]  # m; for a mesh factors
@@ -104,7 +104,8 @@ class Link:
     mass: float
     inertia_diagonal: Vector  # kg m^2, in the inertial frame
     inertial_pose: Pose  # in the link frame
-    shapes: tuple[Shape, ...] = ()
+    shapes: tuple[Shape, ...] = ()  # that are seen
+    collision_shapes: tuple[Shape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,16 @@ class Gains:
     stiffness: float = 0.0  # N m/rad or N/m
     damping: float = 0.0  # N m s/rad or N s/m
     integral: float = 0.0  # N m/(rad s) or N/(m s)
+
+
+@dataclass(frozen=True)
+class Planning:
+    """What differs where joint torques are planned."""
+
+    sigma: dict[str, float | Vector] = field(default_factory=dict)
+    """By joint: how far its reference may be moved, rad or m; the measure of offsets."""
+    gains: dict[str, Gains] = field(default_factory=dict)
+    """By joint, instead of its others."""
 
 
 @dataclass(frozen=True)
@@ -172,6 +183,7 @@ class Character:
     rest_position: tuple[float, ...]  # (n,), message form
     clips: ClipFormat
     feet: tuple[str, ...] = ()  # the links that it stands on
+    planning: Planning = Planning()
     notes: tuple[str, ...] = ()  # what its author may have overlooked
     placement: Placement = Placement()
 

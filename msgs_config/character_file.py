@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from msgs_config import files
-from msgs_config.character import ClipFormat, Gains, Loading, SoftLimit, Vector
+from msgs_config.character import ClipFormat, Gains, Loading, Planning, SoftLimit, Vector
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.joint_bounds import with_bounds
 from msgs_config.urdf_check import check_urdf, has_world_base
@@ -16,6 +16,8 @@ CHARACTERS_DIRECTORY = Path(__file__).parent / "characters"
 
 _LARGEST = sys.float_info.max
 _SHOWN = 200  # characters
+_LEAST_SIGMA = 1e-6  # rad or m
+_NO_GAINS = Gains()
 _KEYS = [
     "urdf",
     "scale",
@@ -29,6 +31,7 @@ _KEYS = [
     "root_assistance",
     "clips",
     "feet",
+    "planner",
 ]
 _JOINT_KEYS = [
     "stiffness",
@@ -60,6 +63,7 @@ class CharacterFile:
     assistance: dict[str, Gains]
     clips: ClipFormat
     feet: tuple[str, ...]
+    planning: Planning
 
 
 def shipped_characters() -> list[str]:
@@ -139,6 +143,7 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
         assistance={name: part.gains() for name, part in reader.parts("root_assistance").items()},
         clips=_clip_format(reader.part("clips")),
         feet=tuple(reader.names("feet", "links", default=[])),
+        planning=_planning(reader.part("planner"), joints),
     )
 
 
@@ -199,6 +204,21 @@ def _clip_format(clips: "_Reader") -> ClipFormat:
     if pattern.name.count("*") != 1:
         raise clips.wrong("files", pattern.name, "a path with one '*'")
     return ClipFormat(str(pattern), tuple(joints), clips.choice("up_axis", ["z", "y"]))
+
+
+def _planning(planner: "_Reader", joints: dict[str, "_Reader"]) -> Planning:
+    """What is said for the planner; a gain that it leaves out is that of `joints`."""
+    planner.check_keys(["sigma", "gains"])
+    sigma, gains = planner.part("sigma"), planner.parts("gains")
+    for part in gains.values():
+        part.check_keys(["stiffness", "damping", "integral"])
+    return Planning(
+        {name: sigma.sigma(name) for name in sigma.content},
+        {
+            name: part.gains(joints[name].gains() if name in joints else Gains())
+            for name, part in gains.items()
+        },
+    )
 
 
 class _Reader:
@@ -293,11 +313,23 @@ class _Reader:
             raise self.wrong(key, value, f"a list of {what}")
         return value
 
-    def gains(self) -> Gains:
+    def sigma(self, key: str) -> float | Vector:
+        """A positive number, or three of them."""
+        value = self.content.get(key)
+        if not isinstance(value, list):
+            return self.number(key, minimum=_LEAST_SIGMA)
+        if len(value) != 3:
+            raise self.wrong(key, value, "a number or a list of three")
+        parts = {f"{key}[{index}]": item for index, item in enumerate(value)}
+        numbers = _Reader(self.file, parts, self._prefix)
+        x, y, z = (numbers.number(part, minimum=_LEAST_SIGMA) for part in parts)
+        return (x, y, z)
+
+    def gains(self, default: Gains = _NO_GAINS) -> Gains:
         return Gains(
-            stiffness=self.number("stiffness", default=0.0, minimum=0.0),
-            damping=self.number("damping", default=0.0, minimum=0.0),
-            integral=self.number("integral", default=0.0, minimum=0.0),
+            stiffness=self.number("stiffness", default=default.stiffness, minimum=0.0),
+            damping=self.number("damping", default=default.damping, minimum=0.0),
+            integral=self.number("integral", default=default.integral, minimum=0.0),
         )
 
 

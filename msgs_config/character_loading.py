@@ -29,7 +29,7 @@ from msgs_config.character_file import CharacterFile, read_character_file
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.joint_layout import ROOT, JointLayout, JointType
 from msgs_config.meshes import resolve_meshes
-from msgs_config.shapes import read_shapes
+from msgs_config.shapes import read_collision_shapes, read_shapes
 from msgs_config.urdf_check import links_without_inertial
 
 _JOINT_TYPES = {
@@ -58,7 +58,8 @@ def make_character(file: CharacterFile) -> Character:
     urdf = file.loading.urdf_path
     robot = files.parse_xml(urdf, file.loading.urdf_text, CharacterError)
     resolve_meshes(robot, urdf)
-    shapes = read_shapes(robot, urdf, file.loading.scale)
+    seen = read_shapes(robot, urdf, file.loading.scale)
+    touched = read_collision_shapes(robot, urdf, file.loading.scale)
     client = connect()
     try:
         body = load_urdf(client, file.loading)
@@ -66,7 +67,10 @@ def make_character(file: CharacterFile) -> Character:
     finally:
         pybullet.disconnect(client)
     _check_finite(urdf, links)
-    links = [replace(link, shapes=shapes[link.name]) for link in _depth_first(links)]
+    links = [
+        replace(link, shapes=seen[link.name], collision_shapes=touched[link.name])
+        for link in _depth_first(links)
+    ]
     for link in links[1:]:
         if link.joint.name in (ROOT, ROOT_TORQUE) and link.joint.type is not JointType.FIXED:
             raise CharacterError(
@@ -88,6 +92,7 @@ def make_character(file: CharacterFile) -> Character:
         rest_position=_rest_position(file, layout),
         clips=file.clips,
         feet=file.feet,
+        planning=file.planning,
         notes=_notes(file, layout, links, links_without_inertial(robot)),
     )
 
@@ -194,7 +199,13 @@ def _depth_first(links: list[Link]) -> list[Link]:
 
 
 def _check_joint_names(file: CharacterFile, layout: JointLayout) -> None:
-    for key, names in (("joints", file.gains), ("clips.joints", file.clips.joints)):
+    planning = file.planning
+    for key, names in (
+        ("joints", file.gains),
+        ("clips.joints", file.clips.joints),
+        ("planner.sigma", planning.sigma),
+        ("planner.gains", planning.gains),
+    ):
         for name in names:
             if name not in layout.actuated_joint_names:
                 sentence = one_of("joint", name, layout.actuated_joint_names)

@@ -37,7 +37,7 @@ class DynamicsModel:
         self._diagonal = self._model.M_rowadr + self._model.M_rownnz - 1
         # no position at all: no distance, no angle, and as quaternions (wxyz) no turn
         self._identity = np.zeros(self._model.nq)
-        self._identity[_quaternion_starts(self._model)] = 1.0
+        self._identity[quaternion_starts(self._model)] = 1.0
         self._start, self._desired = self._identity.copy(), self._identity.copy()
 
     def update(self, position: FloatArray, velocity: FloatArray) -> None:
@@ -188,7 +188,7 @@ class DynamicsModel:
         return jacobian
 
 
-def _quaternion_starts(model: mujoco.MjModel) -> list[int]:
+def quaternion_starts(model: mujoco.MjModel) -> list[int]:
     """First entry of each quaternion among MuJoCo's positions."""
     before = {mujoco.mjtJoint.mjJNT_BALL: 0, mujoco.mjtJoint.mjJNT_FREE: 3}
     return [
@@ -202,10 +202,21 @@ def _compile(character: Character, gravity: float) -> mujoco.MjModel:
     """MuJoCo's model of a character, its bodies in the order of the character's links."""
     spec = mujoco.MjSpec()
     spec.option.gravity = (0.0, 0.0, -gravity)
-    spec.compiler.balanceinertia = False
+    add_links(spec, character)
+    return compile_exactly(spec, character)
+
+
+def add_links(spec: mujoco.MjSpec, character: Character) -> list[mujoco.MjsBody]:
+    """Add a character's links and joints, without shapes; the bodies are in the links' order."""
     bodies = [spec.worldbody]
     for link in character.links:
         bodies.append(_add_body(bodies[link.parent + 1], link))
+    return bodies[1:]
+
+
+def compile_exactly(spec: mujoco.MjSpec, character: Character) -> mujoco.MjModel:
+    """Compile a model with the links of a character, whose inertia is kept to the last bit."""
+    spec.compiler.balanceinertia = False
     model = spec.compile()
     # set afterwards: the compiler refuses a link with mass but without inertia, which is sound
     # wherever the joints above it cannot turn it about its centre of mass alone

@@ -1,4 +1,4 @@
-"""The shapes that are seen of each link, read from its URDF."""
+"""The shapes of each link, those that are seen and those that collide, read from its URDF."""
 
 from pathlib import Path
 from xml.etree import ElementTree
@@ -31,14 +31,39 @@ def read_shapes(
         CharacterError: a shape is malformed; names the file and the link.
     """
     colors = _named_colors(robot)
-    shapes: dict[str, tuple[Shape, ...]] = {}
-    for link in robot.findall("link"):
-        seen = link.findall("visual") or link.findall("collision")
-        try:
-            shapes[link.get("name", "")] = tuple(_shape(part, colors, scale) for part in seen)
-        except CharacterError as error:
-            raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
-    return shapes
+    return {
+        link.get("name", ""): _shapes(
+            link, link.findall("visual") or link.findall("collision"), colors, urdf, scale
+        )
+        for link in robot.findall("link")
+    }
+
+
+def read_collision_shapes(
+    robot: ElementTree.Element, urdf: Path, scale: float
+) -> dict[str, tuple[Shape, ...]]:
+    """The shapes of each link by its name with which it touches others; as `read_shapes` otherwise.
+
+    Raises:
+        CharacterError: a shape is malformed; names the file and the link.
+    """
+    return {
+        link.get("name", ""): _shapes(link, link.findall("collision"), {}, urdf, scale)
+        for link in robot.findall("link")
+    }
+
+
+def _shapes(
+    link: ElementTree.Element,
+    parts: list[ElementTree.Element],
+    colors: dict[str, Quadruple],
+    urdf: Path,
+    scale: float,
+) -> tuple[Shape, ...]:
+    try:
+        return tuple(_shape(part, colors, scale) for part in parts)
+    except CharacterError as error:
+        raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
 
 
 def _named_colors(robot: ElementTree.Element) -> dict[str, Quadruple]:

@@ -50,7 +50,11 @@ EDGE = {  # the files that speak ROS, beside all of experiment/
 FINDS_PACKAGES = "msgs_config/files.py"  # ament_index_python, to resolve package://
 ENGINES = {
     "pybullet": {"msgs_config/bullet.py"},
-    "mujoco": {"msgs_config/dynamics.py"},
+    "mujoco": {
+        "msgs_config/dynamics.py",
+        "controller_node/planner/compiled/engine.py",
+        "controller_node/planner/contact_model.py",
+    },
 }
 MAY_USE_BULLET = {
     "msgs_config/character_loading.py",
@@ -389,7 +393,7 @@ def test_every_python_package_that_is_imported_is_required() -> None:
     arguments = setup_arguments()
     requirements = ast.literal_eval(arguments["install_requires"])
     extras = ast.literal_eval(arguments["extras_require"])
-    requirements += extras["video"] + extras["cluster"] + extras["fit"]
+    requirements += extras["video"] + extras["cluster"] + extras["fit"] + extras["plan"]
     names = {re.split(r"[<>=[]", requirement)[0] for requirement in requirements}
     required = {distributions.get(name, name) for name in names}
     imported = {

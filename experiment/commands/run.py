@@ -55,6 +55,12 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         "get up; or react to hits",
     )
     run.add_argument(
+        "--planner",
+        choices=["none", "predictive"],
+        help="keep the motion by joint torques alone, planned ahead (predictive: without root "
+        "assistance; needs the extra 'plan'), or not (none, the default)",
+    )
+    run.add_argument(
         "--duration",
         type=float,
         metavar="S",
@@ -177,7 +183,8 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
     from experiment.planned_throw import plan_throws
 
     settings = node_settings(options.set, _NODES)
-    _set_behaviour(options.behaviour, settings["controller_node"])
+    for name in ("behaviour", "planner"):
+        _set_option(name, getattr(options, name), settings["controller_node"])
     simulator, controller = settings["sim_node"], settings["controller_node"]
     found_in = bring_parameters(options.character, options.clip, simulator, controller)
     plan = _checked_plan(options, simulator, controller, found_in)
@@ -280,14 +287,12 @@ def _pushes(texts: list[str], plan: "Plan", found_in: "FoundWith | None") -> "li
     return pushes_within(found_in.pushes, plan)
 
 
-def _set_behaviour(behaviour: str | None, controller: dict[str, object]) -> None:
-    """Set what `--behaviour` says. Raises ConfigurationError if `--set` says another one."""
-    if behaviour is None:
-        return
-    if controller.setdefault("behaviour", behaviour) != behaviour:
+def _set_option(name: str, value: str | None, controller: dict[str, object]) -> None:
+    """Set what an option says. Raises ConfigurationError if `--set` says another value."""
+    if value is not None and controller.setdefault(name, value) != value:
         raise ConfigurationError(
-            f"--behaviour is {behaviour}, and --set controller_node.behaviour is "
-            f"{controller['behaviour']}; give one of them"
+            f"--{name} is {value}, and --set controller_node.{name} is {controller[name]}; "
+            "give one of them"
         )
 
 

@@ -1,0 +1,1 @@
+"""Tracking with joint torques alone, by looking ahead in a model of the world."""

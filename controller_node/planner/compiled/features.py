@@ -1,0 +1,88 @@
+"""What of a state is compared with the reference, in compiled code."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controller_node.planner.compiled import mass_matrix
+from controller_node.planner.compiled.decorator import compiled
+from controller_node.planner.compiled.law import Joints
+from controller_node.planner.compiled.mass_matrix import Tree
+from controller_node.planner.compiled.rotations import axes, quaternion, to_parent, turn_between
+from msgs_config.arrays import FloatArray, IntArray
+
+
+class Watched(NamedTuple):
+    """What the features are made of."""
+
+    end_effectors: IntArray  # (k,) of MuJoCo's bodies
+    mass: float  # kg
+
+
+@compiled
+def write_features(
+    row: FloatArray,
+    target: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    mass: FloatArray,
+    points: FloatArray,
+    centre: FloatArray,
+    tree: Tree,
+    joints: Joints,
+    watched: Watched,
+) -> None:
+    """Write the features (f,) of a state against the rotations of a target position.
+
+    In this order: rotation of the root (3,) and of the joints (n - 6,) from the target's, its
+    frames, rad or m; velocity of the root's rotation (3,) and of the joints (n - 6,); centre of
+    mass (3,) m and its velocity (3,) m/s; angular momentum about it (3,) N m s; places of the end
+    effectors (3 k,) m; all in world axes but the joints' and the root's own.
+
+    Args:
+        row: The result (f,).
+        target: Position that MuJoCo has of the reference.
+        position: Position of the state.
+        velocity: Of the state (n,).
+        mass: Entries (e,) of the mass matrix in the state.
+        points: Origins (bodies, 3) of the links, m.
+        centre: Centre of mass (3,), m.
+        tree: Where the mass matrix's entries are.
+        joints: Where the joints are.
+        watched: What else there is to look at.
+    """
+    n = len(velocity)
+    root = quaternion(position, 3)
+    turn = turn_between(quaternion(target, 3), root)
+    for i in range(3):
+        row[i] = turn[i]
+    _write_joints(row, target, position, joints)
+    row[n - 3 : 2 * n - 6] = velocity[3:]
+    momentum, last = np.empty(6), 2 * n - 6
+    mass_matrix.base_momentum(mass, tree, velocity, momentum)
+    spin = to_parent(axes(root), (momentum[3], momentum[4], momentum[5]))
+    x, y, z = centre[0] - position[0], centre[1] - position[1], centre[2] - position[2]
+    for i in range(3):
+        row[last + i] = centre[i]
+        row[last + 3 + i] = momentum[i] / watched.mass
+    row[last + 6] = spin[0] - (y * momentum[2] - z * momentum[1])
+    row[last + 7] = spin[1] - (z * momentum[0] - x * momentum[2])
+    row[last + 8] = spin[2] - (x * momentum[1] - y * momentum[0])
+    for k in range(len(watched.end_effectors)):
+        for i in range(3):
+            row[last + 9 + 3 * k + i] = points[watched.end_effectors[k], i]
+
+
+@compiled
+def _write_joints(
+    row: FloatArray, target: FloatArray, position: FloatArray, joints: Joints
+) -> None:
+    """Write the joints' rotations and displacements from the target's after the root's rotation."""
+    for k in range(len(joints.ball_positions)):
+        start = joints.ball_positions[k]
+        turn = turn_between(quaternion(target, start), quaternion(position, start))
+        for i in range(3):
+            row[joints.ball_velocities[k] - 3 + i] = turn[i]
+    for k in range(len(joints.scalar_positions)):
+        entry = joints.scalar_positions[k]
+        row[joints.scalar_velocities[k] - 3] = position[entry] - target[entry]

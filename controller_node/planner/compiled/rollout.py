@@ -1,0 +1,194 @@
+"""One rollout: the law and the model of the world, tick after tick, without Python in between."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from controller_node.planner.compiled.decorator import compiled
+from controller_node.planner.compiled.engine import step_after_forces, step_before_forces
+from controller_node.planner.compiled.features import Watched, write_features
+from controller_node.planner.compiled.law import Joints, Law, Room, add_errors, stable_pd
+from controller_node.planner.compiled.mass_matrix import Tree
+from controller_node.planner.compiled.soft_limits import (
+    MOST_BOUNDS,
+    PassedBounds,
+    SoftLimits,
+    add_soft_limits,
+)
+from msgs_config.arrays import FloatArray
+
+_FASTEST = 1e3  # rad/s or m/s; what is faster has diverged
+
+
+class Engine(NamedTuple):
+    """MuJoCo's model and data by their addresses, and what of the data is read and written."""
+
+    model: int
+    data: int
+    position: FloatArray  # (q,) rotations as quaternions wxyz
+    velocity: FloatArray  # (n,)
+    warm_start: FloatArray  # (n,)
+    applied: FloatArray  # (n,) forces
+    bias: FloatArray  # (n,)
+    mass: FloatArray  # (e,) entries of the mass matrix
+    factor: FloatArray  # (e,) of it
+    inverse_diagonal: FloatArray  # (n,)
+    points: FloatArray  # (bodies, 3) m, origins of the links
+    centres: FloatArray  # (bodies, 3) m, centres of mass of what each body carries
+
+
+class Body(NamedTuple):
+    """What stays the same: the character and its law."""
+
+    tree: Tree
+    joints: Joints
+    limits: SoftLimits
+    law: Law
+    watched: Watched
+
+
+class Desired(NamedTuple):
+    """The reference over the horizon, and how the offsets are laid over it."""
+
+    first_tick: int  # of the horizon, since the episode began
+    knot_ticks: int  # from one knot to the next
+    first_knot: int  # number of the first of the knots that are given
+    check_ticks: int  # from one check to the next
+    positions: FloatArray  # (ticks + 1, q) as MuJoCo has them
+    velocities: FloatArray  # (ticks + 1, n)
+
+
+@compiled
+def knot_weight(tick: int, desired: Desired) -> tuple[int, float]:
+    """The knot before a tick among those given, and how far it is to the next one, 0 to 1."""
+    knot = tick // desired.knot_ticks
+    share = (tick - knot * desired.knot_ticks) / desired.knot_ticks
+    return knot - desired.first_knot, share
+
+
+@compiled
+def roll_out(
+    features: FloatArray,
+    start_position: FloatArray,
+    start_velocity: FloatArray,
+    knots: FloatArray,
+    desired: Desired,
+    body: Body,
+    engine: Engine,
+) -> bool:
+    """Simulate a horizon and write the features (checks, f) at its checks; whether that went well.
+
+    Args:
+        features: The result. Not all is written if the simulation diverges.
+        start_position: MuJoCo's position (q,).
+        start_velocity: Velocity (n,).
+        knots: Offsets (k, n - 6) of the actuated joints, rad or m; linear in between.
+        desired: The reference.
+        body: The character.
+        engine: What simulates it.
+    """
+    n = len(start_velocity)
+    room = Room(np.empty(n), np.empty(n), np.empty(n), np.empty_like(engine.mass), np.empty(n))
+    bounds = PassedBounds(
+        np.empty((MOST_BOUNDS, n)),
+        np.empty(MOST_BOUNDS),
+        np.empty(MOST_BOUNDS),
+        np.empty((MOST_BOUNDS, MOST_BOUNDS)),
+        np.empty((MOST_BOUNDS, MOST_BOUNDS + 1)),
+        np.empty(MOST_BOUNDS),
+        np.empty(MOST_BOUNDS, np.bool_),
+        np.empty(MOST_BOUNDS, np.intp),
+        np.empty(n),
+    )
+    engine.position[:] = start_position
+    engine.velocity[:] = start_velocity
+    engine.warm_start[:] = 0.0
+    ticks = len(desired.positions) - 1
+    for tick in range(ticks + 1):
+        step_before_forces(engine.model, engine.data)
+        check, since_check = divmod(tick, desired.check_ticks)
+        if check and not since_check:
+            _write_check(features[check - 1], desired.positions[tick], body, engine)
+        if tick < ticks:
+            _set_offset(room.error, knots, desired.first_tick + tick, desired)
+            target, target_velocity = desired.positions[tick + 1], desired.velocities[tick + 1]
+            _apply(target, target_velocity, body, engine, room, bounds)
+            if not _is_bounded(engine):
+                return False  # before MuJoCo writes a warning
+            step_after_forces(engine.model, engine.data)
+    return True
+
+
+@compiled
+def _is_bounded(engine: Engine) -> bool:
+    """Whether the state is one that goes on, and the forces are finite."""
+    bounded = True
+    for i in range(len(engine.velocity)):
+        bounded &= abs(engine.velocity[i]) < _FASTEST and abs(engine.applied[i]) < math.inf
+    return bounded
+
+
+@compiled
+def _set_offset(error: FloatArray, knots: FloatArray, tick: int, desired: Desired) -> None:
+    """Write the offset (n,) of a tick."""
+    knot, share = knot_weight(tick, desired)
+    error[:6] = 0.0
+    for i in range(knots.shape[1]):
+        before = knots[knot, i]
+        error[6 + i] = before + share * (knots[knot + 1, i] - before)
+
+
+@compiled
+def _apply(
+    target: FloatArray,
+    target_velocity: FloatArray,
+    body: Body,
+    engine: Engine,
+    room: Room,
+    bounds: PassedBounds,
+) -> None:
+    """Apply what the law, the passive damping and the soft limits do; `room` has the offset."""
+    applied, velocity, tree = engine.applied, engine.velocity, body.tree
+    add_errors(room.error, engine.position, target, body.joints)
+    stable_pd(applied, velocity, target_velocity, engine.bias, engine.mass, tree, body.law, room)
+    for i in range(len(velocity)):
+        applied[i] -= body.law.passive_damping[i] * velocity[i]
+    add_soft_limits(
+        applied,
+        engine.position,
+        velocity,
+        body.law.period,
+        body.limits,
+        engine.factor,
+        engine.inverse_diagonal,
+        tree,
+        bounds,
+    )
+
+
+@compiled
+def _write_check(row: FloatArray, target: FloatArray, body: Body, engine: Engine) -> None:
+    write_features(
+        row,
+        target,
+        engine.position,
+        engine.velocity,
+        engine.mass,
+        engine.points,
+        engine.centres[1],
+        body.tree,
+        body.joints,
+        body.watched,
+    )
+
+
+@compiled
+def features_of(
+    row: FloatArray, position: FloatArray, velocity: FloatArray, body: Body, engine: Engine
+) -> None:
+    """Write the features (f,) of a state against itself: those of a reference."""
+    engine.position[:] = position
+    engine.velocity[:] = velocity
+    step_before_forces(engine.model, engine.data)
+    _write_check(row, position, body, engine)

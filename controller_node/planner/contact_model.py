@@ -1,0 +1,197 @@
+"""The model of the world that the planner looks ahead in: MuJoCo with ground, contact and limits.
+
+It is built from the same description as everything else. Its law, its passive damping and its soft
+limits are those of controller and simulator (`controller_node.planner.compiled`); contact is
+MuJoCo's, which is not the simulator's, and so what is foreseen is not quite what will be.
+"""
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from controller_node.laws import GainArrays
+from controller_node.planner.compiled.features import Watched
+from controller_node.planner.compiled.law import Joints, Law
+from controller_node.planner.compiled.mass_matrix import Tree
+from controller_node.planner.compiled.rollout import Body, Engine
+from controller_node.planner.compiled.soft_limits import SoftLimits
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character, Shape, ShapeType
+from msgs_config.dynamics import add_links, compile_exactly, quaternion_starts
+
+_SOLVER_ITERATIONS = 10
+_CONTACT = (0.01, 1.0)  # time constant in s and damping ratio of contacts and of hinges' limits
+
+_GEOMETRIES = {
+    ShapeType.BOX: mujoco.mjtGeom.mjGEOM_BOX,
+    ShapeType.SPHERE: mujoco.mjtGeom.mjGEOM_SPHERE,
+    ShapeType.CYLINDER: mujoco.mjtGeom.mjGEOM_CYLINDER,
+    ShapeType.CAPSULE: mujoco.mjtGeom.mjGEOM_CAPSULE,
+    ShapeType.MESH: mujoco.mjtGeom.mjGEOM_MESH,
+}
+
+
+class ContactModel:
+    """A character with a floating base on the ground, simulated tick by tick.
+
+    Positions are MuJoCo's (q,): rotations as quaternions wxyz; velocities (n,) are the layout's.
+    """
+
+    def __init__(
+        self, character: Character, *, period_s: float, gravity: float, friction: float
+    ) -> None:
+        """Build the model; `friction` is that of a contact, the product of both surfaces'."""
+        self._character = character
+        self._period_s = period_s
+        self._model = _compile(character, period_s, gravity, friction)
+        self._data: list[mujoco.MjData] = []
+        self._identity = np.zeros(self._model.nq)
+        self._identity[quaternion_starts(self._model)] = 1.0
+        parents = {link.parent for link in character.links}
+        self.end_effectors = [
+            index for index in range(len(character.links)) if index not in parents
+        ]
+        """Links that carry no other, as indices of `Character.links`."""
+        self._tree = Tree(
+            self._model.M_rowadr.astype(np.intp),
+            self._model.M_rownnz.astype(np.intp),
+            self._model.M_colind.astype(np.intp),
+        )
+        self._joints = self._find_joints()
+        self._limits = self._find_limits()
+
+    @property
+    def feature_count(self) -> int:
+        """Length f of a row of `write_features`."""
+        return 2 * self._character.layout.size - 6 + 9 + 3 * len(self.end_effectors)
+
+    def position_of(self, position: FloatArray) -> FloatArray:
+        """A position (n,), message form, as MuJoCo has it (q,)."""
+        found: FloatArray = self._identity.copy()
+        mujoco.mj_integratePos(self._model, found, position, 1.0)
+        return found
+
+    def body(self, gains: GainArrays) -> Body:
+        """What rollouts need of the character and its gains; the root's do not count."""
+        layout = self._character.layout
+        actuated = np.arange(layout.size) >= 6
+        law = Law(
+            self._period_s,
+            np.where(actuated, gains.stiffness, 0.0),
+            np.where(actuated, gains.damping, 0.0),
+            self._character.passive_damping(),
+            gains.effort_limits.astype(float),
+            layout.vector_starts,
+            layout.vector_lengths,
+        )
+        watched = Watched(np.array(self.end_effectors, dtype=np.intp) + 1, self._character.mass)
+        return Body(self._tree, self._joints, self._limits, law, watched)
+
+    def engine(self) -> Engine:
+        """Something that simulates it, for one thread."""
+        data = mujoco.MjData(self._model)
+        self._data.append(data)  # it must outlive what points into it
+        return Engine(
+            self._model._address,
+            data._address,
+            data.qpos,
+            data.qvel,
+            data.qacc_warmstart,
+            data.qfrc_applied,
+            data.qfrc_bias,
+            data.M,
+            data.qLD,
+            data.qLDiagInv,
+            data.xpos,
+            data.subtree_com,
+        )
+
+    def _find_joints(self) -> Joints:
+        model = self._model
+        balls = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_BALL))
+        scalars = np.flatnonzero(model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE))
+        return Joints(
+            model.jnt_qposadr[balls].astype(np.intp),
+            model.jnt_dofadr[balls].astype(np.intp),
+            model.jnt_qposadr[scalars].astype(np.intp),
+            model.jnt_dofadr[scalars].astype(np.intp),
+        )
+
+    def _find_limits(self) -> SoftLimits:
+        model = self._model
+        limited = [
+            (model.joint(joint.name), joint.soft_limit)
+            for joint in self._character.moving_joints
+            if joint.soft_limit is not None
+        ]
+        return SoftLimits(
+            np.array([joint.qposadr[0] for joint, _ in limited], dtype=np.intp),
+            np.array([joint.dofadr[0] for joint, _ in limited], dtype=np.intp),
+            np.array([limit.lower for _, limit in limited]).reshape(-1, 3),
+            np.array([limit.upper for _, limit in limited]).reshape(-1, 3),
+            np.array([limit.stiffness for _, limit in limited]),
+            np.array([limit.damping for _, limit in limited]),
+        )
+
+
+def _compile(
+    character: Character, period_s: float, gravity: float, friction: float
+) -> mujoco.MjModel:
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False  # limits are in rad
+    option = spec.option
+    option.gravity = (0.0, 0.0, -gravity)
+    option.timestep = period_s
+    option.solver = mujoco.mjtSolver.mjSOL_PGS
+    option.iterations = _SOLVER_ITERATIONS
+    option.tolerance = 0.0  # always as many
+    option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    contact = {"friction": (friction, 0.0, 0.0), "solref": _CONTACT, "condim": 3}
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0.0, 0.0, 1.0), **contact)
+    for link, body in zip(character.links, add_links(spec, character), strict=True):
+        if np.isfinite(link.joint.lower):
+            (joint,) = body.joints
+            joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+            joint.range = (link.joint.lower, link.joint.upper)
+            joint.solref_limit = _CONTACT
+        for shape in link.collision_shapes:
+            body.add_geom(**_geometry(spec, shape), **contact)
+    for one, other in _apart(character):
+        spec.add_exclude(bodyname1=one, bodyname2=other)
+    return compile_exactly(spec, character)
+
+
+def _geometry(spec: mujoco.MjSpec, shape: Shape) -> dict[str, object]:
+    """A shape as MuJoCo has it, which takes half of what a length is; of a mesh its hull."""
+    turn = rotations.wxyz_from_xyzw(np.array(shape.pose.orientation_xyzw))
+    place: dict[str, object] = {"type": _GEOMETRIES[shape.type], "pos": shape.pose.position}
+    place["quat"] = turn
+    if shape.type is ShapeType.MESH:
+        mesh = spec.add_mesh(file=shape.mesh, scale=shape.size)
+        mesh.name = f"mesh {len(spec.meshes)}"
+        return {**place, "meshname": mesh.name}
+    if shape.type is ShapeType.BOX:
+        return {**place, "size": tuple(0.5 * edge for edge in shape.size)}
+    radius, *length = shape.size
+    half = 0.5 * length[0] if length else 0.0
+    return {**place, "size": (radius, half, 0.0)}
+
+
+def _apart(character: Character) -> Iterator[tuple[str, str]]:
+    """Pairs of links that do not touch each other: those above, or all without self-collision."""
+    links = character.links
+    for index, link in enumerate(links):
+        above = _ancestors(character, index)
+        for other in range(index):
+            if other in above or not character.loading.self_collision:
+                yield link.name, links[other].name
+
+
+def _ancestors(character: Character, index: int) -> set[int]:
+    found: set[int] = set()
+    while (index := character.links[index].parent) >= 0:
+        found.add(index)
+    return found

@@ -1,0 +1,86 @@
+"""Gauss-Newton steps whose derivatives come from samples.
+
+With x (d,) what is looked for, r(x) (m,) the residuals to be made small and p |x|^2 what large x
+cost, a step solves `(J' J + p + lambda) dx = -(J' r + p x)`. J is not known. Two estimates of it
+come from samples around x:
+
+- the ensemble's: with E (s, d) the samples' distances from x and Y (s, m) those of their residuals
+  from r, both over sqrt(s), J' is E' Y^-1 in the space that the samples span. (Evensen 2009, "Data
+  Assimilation: The Ensemble Kalman Filter"; Chen and Oliver 2013, "Levenberg-Marquardt forms of the
+  iterative ensemble smoother");
+- sensitivities A (d, m) that are remembered from plan to plan and corrected by each one's samples:
+  the least change of A that explains them, by ridge regression.
+"""
+
+import math
+
+import numpy as np
+
+from controller_node.planner.compiled import linear
+from msgs_config.arrays import FloatArray
+from msgs_config.geometry import fixed_order
+
+_RIDGE = 20.0  # of a correction, in the samples' variance
+_FIRST_RIDGE = 1e-6  # of the first sensitivities, for each of what is looked for
+
+
+def ensemble_step(
+    distances: FloatArray, changes: FloatArray, residuals: FloatArray, damping: float
+) -> FloatArray:
+    """The step (d,) of an ensemble.
+
+    Args:
+        distances: Of the samples (s, d) from where the step begins.
+        changes: Of the samples' residuals (s, m), with those of large x among them.
+        residuals: Where the step begins (m,), likewise.
+        damping: lambda.
+    """
+    count = len(distances)
+    scaled = changes / math.sqrt(count)
+    slopes = linear.product(scaled, residuals[:, np.newaxis])
+    shares = linear.solve(linear.gram(scaled), damping, slopes)
+    step: FloatArray = linear.product(_transposed(distances), shares)[:, 0]
+    return -step / math.sqrt(count)
+
+
+def corrected_sensitivities(
+    known: FloatArray | None, distances: FloatArray, changes: FloatArray
+) -> FloatArray:
+    """Sensitivities (d, m) after samples: distances (s, d) and their residuals' changes (s, m).
+
+    Without known ones they are those of the samples alone.
+    """
+    moved = distances - fixed_order.mean(distances, axis=0)
+    new = changes - fixed_order.mean(changes, axis=0)
+    ridge = _FIRST_RIDGE * distances.shape[1]
+    if known is not None:
+        new -= linear.product(moved, known)
+        ridge = _RIDGE
+    shares = linear.solve(linear.gram(moved), ridge, new)
+    correction = linear.product(_transposed(moved), shares)
+    return correction if known is None else known + correction
+
+
+def sensitivity_steps(
+    sensitivities: FloatArray,
+    residuals: FloatArray,
+    place: FloatArray,
+    penalty: float,
+    dampings: tuple[float, ...],
+) -> list[FloatArray]:
+    """The steps (d,) of sensitivities (d, m), one for each lambda.
+
+    Args:
+        sensitivities: A.
+        residuals: Where the steps begin (m,).
+        place: x (d,) there.
+        penalty: p, what large x cost.
+        dampings: lambda.
+    """
+    slopes = linear.product(sensitivities, residuals[:, np.newaxis]) + penalty * place[:, None]
+    products = linear.gram(sensitivities)
+    return [-linear.solve(products, penalty + damping, slopes)[:, 0] for damping in dampings]
+
+
+def _transposed(matrix: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(matrix.T)

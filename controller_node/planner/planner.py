@@ -1,0 +1,276 @@
+"""The planner: offsets to the reference that a model of the world says keep the motion.
+
+At a fixed period it looks ahead from the state in the message: it rolls out samples around the plan
+that it has, in a model with contact and the very law that will act, and takes Gauss-Newton steps
+towards the reference by how the samples' errors differ. Of all that it has tried the best is the
+plan. The offsets are added to the tracking errors of the joints; no force acts on the root.
+
+Sources: Liu et al. 2010, "Sampling-based Contact-rich Motion Control" (corrections of a reference
+by samples); Howell et al. 2022, "Predictive Sampling: Real-time Behaviour Synthesis with MuJoCo"
+(planning online in a model).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.laws import GainArrays
+from controller_node.planner.compiled.draws import normal_draws
+from controller_node.planner.compiled.rollout import Body, Desired
+from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.rollouts import Rollouts
+from controller_node.planner.search import Found, Problem, improve
+from controller_node.planner.settings import PlannerSettings
+from controller_node.references.base import ReferenceState
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+from msgs_config.stamped import StampedState
+
+_FIRST_ROUNDS = 6  # of the first plan: nothing has moved yet
+_LARGEST = 0.9  # sigma, of an offset
+_PENALTY = 0.2  # of an offset, for each sigma
+_FADING = 0.7  # of sensitivities, from plan to plan
+_LAST_WEIGHT = 2.0  # of the horizon's last check
+_FEWEST_DRAWS = 6
+
+DesiredAt = Callable[[int], ReferenceState]
+"""The desired state of a tick, counted from the episode's first state."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Offsets over a horizon, and what was learned while they were found."""
+
+    tick: int  # at which it was made, since the episode began
+    first_knot: int
+    offsets: FloatArray  # (k, n - 6) at the knots, rad or m
+    found: Found
+    areas: FloatArray  # (k,) ticks of the horizon that each knot counts for
+
+    def offset(self, tick: int, knot_ticks: int) -> FloatArray:
+        """The offset (n - 6,) of a tick, linear between the knots."""
+        knot = tick // knot_ticks
+        share = (tick - knot * knot_ticks) / knot_ticks
+        before, after = self.offsets[knot - self.first_knot : knot - self.first_knot + 2]
+        offset: FloatArray = before + share * (after - before)
+        return offset
+
+
+@dataclass(frozen=True)
+class _Target:
+    """The reference at one tick, as rollouts need it."""
+
+    position: FloatArray  # (q,)
+    velocity: FloatArray  # (n,)
+    features: FloatArray  # (f,)
+
+
+class PredictivePlanner:
+    """Plans for one character. It remembers its last plan, until an episode begins."""
+
+    def __init__(
+        self, character: Character, settings: PlannerSettings, *, rate_hz: int, gravity: float
+    ) -> None:
+        """Build the model of the world, once for each thread.
+
+        The first time on a machine the rollouts are compiled, which takes half a minute.
+        """
+        self._settings = settings
+        self._model = ContactModel(
+            character, period_s=1.0 / rate_hz, gravity=gravity, friction=settings.friction
+        )
+        self._rollouts = Rollouts(self._model, settings.workers)
+        self._feature_weights = _feature_weights(character, self._model, settings)
+        self._check_weights = _check_weights(settings.checks, self._model.feature_count)
+        self._unit = settings.noise * settings.sigma  # (n - 6,) of what is looked for
+        self._episode = 0
+        self._plan: Plan | None = None
+        self._targets: dict[int, _Target] = {}
+        self._compile(character)
+
+    @property
+    def plan(self) -> Plan | None:
+        """The plan in force."""
+        return self._plan
+
+    def between_rollouts(self, act: Callable[[], None]) -> None:
+        """Have something done again and again while it plans."""
+        self._rollouts.between = act
+
+    def begin_episode(self, episode: int) -> None:
+        """Forget plan and reference; `episode` is the tick of the episode's first state."""
+        self._episode = episode
+        self._plan = None
+        self._targets.clear()
+
+    def change_reference(self) -> None:
+        """Say that the reference is another one from now on; the plan stays."""
+        self._targets.clear()
+
+    def offset(
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+    ) -> FloatArray:
+        """What is added to the tracking errors (n,) of a state; zero for the root.
+
+        Args:
+            tick: Of the state, since the episode began.
+            state: What the controller was told.
+            gains: In force.
+            desired_at: The reference.
+        """
+        if self._plan is None or tick >= self._plan.tick + self._settings.period:
+            self._plan = self._planned(tick, state, gains, desired_at)
+        return np.concatenate((np.zeros(6), self._plan.offset(tick, self._settings.knots)))
+
+    def _compile(self, character: Character) -> None:
+        """Have all compiled before the first state waits for an answer: one rollout at rest."""
+        layout, settings = character.layout, self._settings
+        rest, nothing = np.array(character.rest_position), np.zeros(layout.size)
+        still = ReferenceState(layout.configuration(rest), nothing, nothing)
+        gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
+        problem = self._problem(0, 0, StampedState(0, rest, nothing, None), gains, lambda _: still)
+        count = (settings.horizon - 1) // settings.knots + 2
+        place = np.zeros(count * len(self._unit))
+        draws = normal_draws((0, 0), (0, 0), _FEWEST_DRAWS * place.size).reshape(-1, place.size)
+        found = improve(problem, place, draws, None)
+        improve(problem, found.place, draws, found.sensitivities)
+        self._targets.clear()
+
+    def _planned(
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+    ) -> Plan:
+        """A plan from a state."""
+        settings, old = self._settings, self._plan
+        first_knot = tick // settings.knots
+        count = (tick + settings.horizon - 1) // settings.knots + 2 - first_knot
+        areas = _areas(tick - first_knot * settings.knots, settings, count)
+        problem = self._problem(tick, first_knot, state, gains, desired_at)
+        place = np.zeros((count, len(self._unit)))
+        sensitivities, rounds = None, _FIRST_ROUNDS
+        if old is not None:
+            left = old.offsets[first_knot - old.first_knot :]
+            place[: len(left)] = left / self._unit
+            sensitivities, rounds = self._faded(old, tick, first_knot, areas), 1
+        found = Found(place.ravel(), np.inf, np.inf, sensitivities)
+        for number in range(rounds):
+            draws = normal_draws(
+                (settings.seed, self._episode), (number, tick), settings.samples * place.size
+            )
+            samples = draws.reshape(settings.samples, place.size)
+            found = improve(problem, found.place, samples, found.sensitivities)
+        offsets = found.place.reshape(place.shape) * self._unit
+        return Plan(tick, first_knot, offsets, found, areas)
+
+    def _problem(
+        self,
+        tick: int,
+        first_knot: int,
+        state: StampedState,
+        gains: GainArrays,
+        desired_at: DesiredAt,
+    ) -> Problem:
+        """What a plan from a state is to make small."""
+        settings, body = self._settings, self._model.body(gains)
+        desired, features = self._desired(tick, first_knot, desired_at, body)
+        position = self._model.position_of(state.position)
+
+        def residuals(places: FloatArray) -> FloatArray:
+            plans = places.reshape(len(places), -1, len(self._unit)) * self._unit
+            found, sound = self._rollouts.simulate(position, state.velocity, plans, desired, body)
+            rows = ((found - features) * self._feature_weights).reshape(len(places), -1)
+            rows[~sound] = np.inf
+            return rows
+
+        knots = (tick + settings.horizon - 1) // settings.knots + 2 - first_knot
+        penalty = _PENALTY * settings.noise
+        return Problem(
+            residuals, self._check_weights, penalty * penalty / knots, _LARGEST / settings.noise
+        )
+
+    def _desired(
+        self, tick: int, first_knot: int, desired_at: DesiredAt, body: Body
+    ) -> tuple[Desired, FloatArray]:
+        """The reference from a tick on, and its features (checks, f)."""
+        settings = self._settings
+        for known in [known for known in self._targets if known < tick]:
+            del self._targets[known]
+        ticks = range(tick, tick + settings.horizon + 1)
+        targets = [self._target(each, desired_at, body) for each in ticks]
+        desired = Desired(
+            tick,
+            settings.knots,
+            first_knot,
+            settings.period,
+            np.array([target.position for target in targets]),
+            np.array([target.velocity for target in targets]),
+        )
+        checked = targets[settings.period :: settings.period]
+        return desired, np.array([target.features for target in checked])
+
+    def _target(self, tick: int, desired_at: DesiredAt, body: Body) -> _Target:
+        if tick not in self._targets:
+            state = desired_at(tick)
+            position = self._model.position_of(state.configuration.position)
+            features = self._rollouts.features_of(position, state.velocity, body)
+            self._targets[tick] = _Target(position, state.velocity, features)
+        return self._targets[tick]
+
+    def _faded(self, old: Plan, tick: int, first_knot: int, areas: FloatArray) -> FloatArray | None:
+        """The sensitivities (d, m) of the plan before, at this one's knots and checks.
+
+        A knot's go with its part in the horizon. A new knot's are zero, a new check has the last
+        one's.
+        """
+        if old.found.sensitivities is None:
+            return None
+        settings = self._settings
+        known = old.found.sensitivities.reshape(
+            len(old.areas), len(self._unit), settings.checks, -1
+        )
+        passed = (tick - old.tick) // settings.period
+        checks = np.minimum(np.arange(settings.checks) + passed, settings.checks - 1)
+        faded = np.zeros((len(areas), *known.shape[1:]))
+        for knot, area in enumerate(areas):
+            before = knot + first_knot - old.first_knot
+            if before < len(known) and old.areas[before] > 0.0:
+                share = _FADING * min(1.0, area / old.areas[before])
+                faded[knot] = share * known[before][:, checks]
+        return faded.reshape(len(areas) * len(self._unit), -1)
+
+
+def _areas(since_knot: int, settings: PlannerSettings, count: int) -> FloatArray:
+    """For how many ticks of the horizon each knot (k,) counts, by its weight in each."""
+    ticks = (since_knot + np.arange(settings.horizon)) / settings.knots
+    from_knots = np.abs(ticks - np.arange(count)[:, np.newaxis])
+    return np.array([float(np.add.accumulate(row)[-1]) for row in np.maximum(1.0 - from_knots, 0)])
+
+
+def _check_weights(checks: int, features: int) -> FloatArray:
+    """The weights (m,) of the residuals of all checks: the mean of their squares counts."""
+    weights = np.full((checks, features), 1.0 / checks)
+    weights[-1] *= _LAST_WEIGHT
+    roots: FloatArray = np.sqrt(weights).ravel()
+    return roots
+
+
+def _feature_weights(
+    character: Character, model: ContactModel, settings: PlannerSettings
+) -> FloatArray:
+    """The weights (f,) of the features, in their order."""
+    weights, joints = settings.weights, len(settings.sigma)
+    ends = [
+        weights["feet" if character.links[index].name in character.feet else "hands"]
+        for index in model.end_effectors
+    ]
+    parts = [
+        (weights["root_rotation"], 3),
+        (weights["joints"], joints),
+        (weights["root_spin"], 3),
+        (weights["joint_rates"], joints),
+        (weights["centre_of_mass"], 3),
+        (weights["centre_of_mass_velocity"], 3),
+        (weights["angular_momentum"], 3),
+        *((weight, 3) for weight in ends),
+    ]
+    return np.repeat([weight for weight, _ in parts], [count for _, count in parts])

@@ -1,0 +1,105 @@
+"""One round of the search for a better plan: samples, Gauss-Newton steps, the best of all."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.planner import gauss_newton
+from msgs_config.arrays import FloatArray
+from msgs_config.geometry import fixed_order
+
+_DAMPINGS = (10.0, 1.0, 0.1)  # lambda of the steps
+_KEPT = 0.9  # of the samples; the worst say little of where it is good
+_FEWEST = 4  # samples that a step can be found from
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is to be made small: `|residuals(x) weights|^2 + penalty |x|^2`."""
+
+    residuals: Callable[[FloatArray], FloatArray]
+    """Of places (s, d) the residuals (s, m), not finite where a place leads to nothing."""
+    weights: FloatArray  # (m,)
+    penalty: float
+    largest: float  # of each entry of x
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a round has led to."""
+
+    place: FloatArray  # (d,) the best x
+    cost: float
+    alternative: float  # cost of the best of the others
+    sensitivities: FloatArray | None  # (d, m) of the residuals, not weighted
+
+
+def improve(
+    problem: Problem, place: FloatArray, draws: FloatArray, known: FloatArray | None
+) -> Found:
+    """Look around a place (d,) for a better one.
+
+    Args:
+        problem: What is to be made small.
+        place: Where to look around.
+        draws: Standard normal numbers (s, d): where the samples are, from there.
+        known: Sensitivities (d, m) of before.
+    """
+    places = _within(problem, np.concatenate((place[np.newaxis], place + draws)))
+    residuals = problem.residuals(places)
+    costs = _costs(problem, places, residuals)
+    kept = _best(costs[1:]) + 1
+    if not np.isfinite(costs[0]) or len(kept) < _FEWEST:
+        return _found(places, costs, known)
+    distances, changes = places[kept] - places[0], residuals[kept] - residuals[0]
+    sensitivities = gauss_newton.corrected_sensitivities(known, distances, changes)
+    steps = [
+        *_ensemble_steps(problem, places[0], distances, residuals[0], changes),
+        *gauss_newton.sensitivity_steps(
+            sensitivities * problem.weights,
+            residuals[0] * problem.weights,
+            places[0],
+            problem.penalty,
+            _DAMPINGS,
+        ),
+    ]
+    stepped = _within(problem, places[0] + np.array(steps))
+    more = _costs(problem, stepped, problem.residuals(stepped))
+    return _found(np.concatenate((places, stepped)), np.concatenate((costs, more)), sensitivities)
+
+
+def _ensemble_steps(
+    problem: Problem,
+    place: FloatArray,
+    distances: FloatArray,
+    residuals: FloatArray,
+    changes: FloatArray,
+) -> list[FloatArray]:
+    root = math.sqrt(problem.penalty)
+    whole = np.concatenate((changes * problem.weights, root * distances), axis=1)
+    here = np.concatenate((residuals * problem.weights, root * place))
+    return [gauss_newton.ensemble_step(distances, whole, here, each) for each in _DAMPINGS]
+
+
+def _within(problem: Problem, places: FloatArray) -> FloatArray:
+    return np.clip(places, -problem.largest, problem.largest)
+
+
+def _costs(problem: Problem, places: FloatArray, residuals: FloatArray) -> FloatArray:
+    """The costs (s,); infinite of what leads to nothing."""
+    weighted = residuals * problem.weights
+    costs = fixed_order.dot(weighted, weighted) + problem.penalty * fixed_order.dot(places, places)
+    return np.where(np.isfinite(costs), costs, np.inf)
+
+
+def _best(costs: FloatArray) -> FloatArray:
+    """The samples but the worst, in their order; of equal ones the first."""
+    best = np.argsort(costs, kind="stable")[: round(_KEPT * len(costs))]
+    return np.sort(best[np.isfinite(costs[best])])
+
+
+def _found(places: FloatArray, costs: FloatArray, sensitivities: FloatArray | None) -> Found:
+    first, second = np.argsort(costs, kind="stable")[:2]
+    return Found(places[first], float(costs[first]), float(costs[second]), sensitivities)

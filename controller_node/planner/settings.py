@@ -1,0 +1,147 @@
+"""The parameters of the planner, checked."""
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+from msgs_config.errors import ConfigurationError
+from msgs_config.joint_layout import JointType
+from msgs_config.parameters import Parameter, Values
+from msgs_config.shared_parameters import PLANE
+
+NO_PLANNER = "none"
+PREDICTIVE = "predictive"
+
+_WEIGHTS = {  # by name: the default, the unit, and of what
+    "root_rotation": (5.0, "1/rad", "the root's rotation"),
+    "joints": (1.0, "1/rad", "the joints' rotations"),
+    "root_spin": (0.3, "s/rad", "the root's angular velocity"),
+    "joint_rates": (0.02, "s/rad", "the joints' velocities"),
+    "centre_of_mass": (40.0, "1/m", "the centre of mass"),
+    "centre_of_mass_velocity": (10.0, "s/m", "the velocity of the centre of mass"),
+    "angular_momentum": (0.4, "1/(N m s)", "the angular momentum about the centre of mass"),
+    "feet": (10.0, "1/m", "the links that the character stands on"),
+    "hands": (2.0, "1/m", "the other links that carry no others"),
+}
+
+PLANNER_PARAMETERS = [
+    Parameter(
+        "planner",
+        NO_PLANNER,
+        "what keeps a floating base's motion by joint torques alone: nothing, or planning ahead "
+        "in a model of the world",
+        choices=(NO_PLANNER, PREDICTIVE),
+    ),
+    Parameter("plan.horizon", 0.6, "how far it looks", unit="s", minimum=0.05, maximum=5.0),
+    Parameter("plan.period", 0.05, "from one plan to the next", unit="s", minimum=1e-3, maximum=1),
+    Parameter(
+        "plan.knots", 0.15, "from one knot of a plan to the next", unit="s", minimum=0.01, maximum=5
+    ),
+    Parameter("plan.samples", 57, "rollouts that a plan is found from", minimum=8, maximum=10_000),
+    Parameter(
+        "plan.noise",
+        0.2,
+        "standard deviation of samples, as a share of the joints' sigma",
+        minimum=1e-3,
+        maximum=10.0,
+    ),
+    Parameter("plan.seed", 0, "of the samples", maximum=2**53),
+    Parameter("plan.friction", 0.45, "of contacts, as the planner takes it", maximum=10.0),
+    Parameter("plan.workers", 0, "threads; 0: one for each processor", maximum=256),
+    *(
+        Parameter(f"plan.weight.{name}", default, f"of the error of {what}", unit=unit)
+        for name, (default, unit, what) in _WEIGHTS.items()
+    ),
+]
+
+_SIGMA_TURN = 0.4  # rad, of joints that the character's file says nothing of
+_SIGMA_SLIDE = 0.05  # m
+
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """What plans depend on, times in ticks."""
+
+    horizon: int
+    period: int
+    knots: int
+    samples: int
+    noise: float
+    seed: int
+    friction: float
+    workers: int
+    weights: dict[str, float]
+    sigma: FloatArray  # (n - 6,) rad or m
+
+    @property
+    def checks(self) -> int:
+        """How often a rollout is compared with the reference."""
+        return self.horizon // self.period
+
+
+def make_settings(character: Character, values: Values) -> PlannerSettings | None:
+    """The planner's settings; None without one.
+
+    Raises:
+        ConfigurationError: it has no floating base, or is not alone with the law `stable_pd`.
+    """
+    if values.text("planner") == NO_PLANNER:
+        return None
+    if not character.layout.has_floating_base or character.layout.size == 6:
+        raise ConfigurationError(
+            f"planner 'predictive' is for a floating base with joints; '{character.name}' is none"
+        )
+    behaviour = values.text("behaviour")
+    if behaviour != "tracking":
+        raise ConfigurationError(
+            f"planner 'predictive' is for the behaviour tracking; 'behaviour' is {behaviour}"
+        )
+    rate = values.integer("rate")
+    period, knots = (_ticks(values, name, rate) for name in ("plan.period", "plan.knots"))
+    horizon = _ticks(values, "plan.horizon", rate)
+    if horizon < period:
+        raise ConfigurationError(
+            f"parameter 'plan.horizon' is {values.number('plan.horizon'):g}; it must be "
+            f"plan.period, {values.number('plan.period'):g} s, or more"
+        )
+    return PlannerSettings(
+        horizon=horizon - horizon % period,
+        period=period,
+        knots=knots,
+        samples=values.integer("plan.samples"),
+        noise=values.number("plan.noise"),
+        seed=values.integer("plan.seed"),
+        friction=values.number("plan.friction"),
+        workers=values.integer("plan.workers") or len(os.sched_getaffinity(0)),
+        weights={name: values.number(f"plan.weight.{name}") for name in _WEIGHTS},
+        sigma=_sigma(character),
+    )
+
+
+def check_terrain(planner: str, terrain: object) -> None:
+    """Raise ConfigurationError if the model of the world lacks a simulator's ground.
+
+    `terrain` is the simulator's parameter, None if unknown.
+    """
+    if planner == PREDICTIVE and terrain not in (None, PLANE):
+        raise ConfigurationError(
+            f"planner 'predictive' knows the ground at z = 0 alone, but sim_node's 'terrain' is "
+            f"{terrain}; it must be {PLANE}"
+        )
+
+
+def _ticks(values: Values, name: str, rate: int) -> int:
+    """A time as a whole number of ticks, the nearest, at least one."""
+    return max(round(values.number(name) * rate), 1)
+
+
+def _sigma(character: Character) -> FloatArray:
+    """Sigma (n - 6,) of the actuated entries."""
+    layout, sigma = character.layout, np.empty(character.layout.size)
+    for joint in layout.joints:
+        default = _SIGMA_SLIDE if joint.type is JointType.PRISMATIC else _SIGMA_TURN
+        sigma[joint.entries] = character.planning.sigma.get(joint.name, default)
+    return sigma[6:]

@@ -1,0 +1,294 @@
+"""The planner: its steps, its memory, its bits, what it refuses, and a motion that it keeps."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from physics import character
+
+from controller_node.controller import Controller
+from controller_node.motion import make_motion
+from controller_node.parameters import PARAMETERS, character_parameters, make_controller
+from controller_node.planner import gauss_newton
+from controller_node.planner.search import Problem, improve
+from experiment.loop import ticks_in_process
+from experiment.metrics import StateHash
+from experiment.plan import make_plan
+from msgs_config.arrays import FloatArray
+from msgs_config.errors import ConfigurationError
+from msgs_config.parameters import resolve
+from msgs_config.stamped import StampedState
+from msgs_config.tick_clock import TickClock
+
+HUMANOID = character("humanoid")
+CLOCK = TickClock(240)
+QUICK = {"planner": "predictive", "plan.samples": 12, "plan.horizon": 0.3}
+
+
+def states_of(duration: float, clip: str = "walk", **given: object) -> str:
+    """The hash of a run's states in this process."""
+    controller = {**QUICK, **{name.replace("__", "."): value for name, value in given.items()}}
+    plan = make_plan("humanoid", duration, {"reference": "clip", "clip": clip}, {}, controller)
+    ticks, states = list(ticks_in_process(plan)), StateHash()
+    for state in (*(tick.state for tick in ticks), ticks[-1].following):
+        states.add(state)
+    return states.hexdigest()
+
+
+def a_controller(**given: object) -> Controller:
+    """A controller that plans."""
+    named = {**QUICK, "reference": "clip", "clip": "walk", **given}
+    values = resolve(PARAMETERS + character_parameters(HUMANOID, named), named)
+    return make_controller(HUMANOID, make_motion(HUMANOID, values).reference, values)
+
+
+def states(controller: Controller, count: int) -> list[StampedState]:
+    """Some states near the walk, a tick apart."""
+    draw, found = np.random.default_rng(4), []
+    motion = make_motion(HUMANOID, resolve(PARAMETERS, {"reference": "clip", "clip": "walk"}))
+    for tick in range(count):
+        state = motion.reference.sample(tick / 240)
+        position = state.configuration.position + 0.01 * draw.normal(size=HUMANOID.layout.size)
+        found.append(StampedState(CLOCK.stamp_ns(1 + tick), position, state.velocity, None))
+    return found
+
+
+# Steps
+
+
+def linear_problem(penalty: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A Jacobian (m, d), residuals (m,) at a place (d,) with residuals linear in it."""
+    draw = np.random.default_rng(5)
+    return draw.normal(size=(11, 4)), draw.normal(size=11), draw.normal(size=4)
+
+
+def test_an_ensemble_that_spans_all_takes_the_step_of_gauss_and_newton() -> None:
+    jacobian, residuals, place = linear_problem(0.3)
+    distances = 2.0 * np.linalg.qr(np.random.default_rng(6).normal(size=(4, 4)))[0]  # E'E = s
+    whole = np.concatenate((jacobian, np.sqrt(0.3) * np.eye(4)))
+    here = np.concatenate((residuals, np.sqrt(0.3) * place))
+
+    step = gauss_newton.ensemble_step(distances, distances @ whole.T, here, 0.7)
+
+    expected = np.linalg.solve(
+        jacobian.T @ jacobian + (0.3 + 0.7) * np.eye(4), -(jacobian.T @ residuals + 0.3 * place)
+    )
+    np.testing.assert_allclose(step, expected, rtol=1e-9)
+
+
+def test_sensitivities_are_the_slopes_and_their_step_is_gauss_and_newtons() -> None:
+    jacobian, residuals, place = linear_problem(0.3)
+    distances = np.random.default_rng(7).normal(size=(30, 4))
+
+    found = gauss_newton.corrected_sensitivities(None, distances, distances @ jacobian.T)
+    (step,) = gauss_newton.sensitivity_steps(found, residuals, place, 0.3, (0.7,))
+
+    np.testing.assert_allclose(found, jacobian.T, atol=1e-4)
+    expected = np.linalg.solve(
+        jacobian.T @ jacobian + (0.3 + 0.7) * np.eye(4), -(jacobian.T @ residuals + 0.3 * place)
+    )
+    np.testing.assert_allclose(step, expected, atol=1e-4)
+
+
+def test_few_samples_correct_what_is_known_and_leave_the_rest() -> None:
+    jacobian, *_ = linear_problem(0.0)
+    along = np.zeros((8, 4))
+    along[:, 0] = 10.0 * np.random.default_rng(8).normal(size=8)
+    known = jacobian.T + np.eye(4, 11)
+
+    found = gauss_newton.corrected_sensitivities(known, along, along @ jacobian.T)
+
+    np.testing.assert_allclose(found[0], jacobian[:, 0], atol=0.1)
+    assert found[1:].tobytes() == known[1:].tobytes()
+
+
+def test_a_round_finds_the_least_of_a_linear_problem_and_never_what_is_worse() -> None:
+    jacobian, residuals, place = linear_problem(0.3)
+    weights = np.linspace(0.5, 2.0, 11)
+
+    def of_places(places: FloatArray) -> FloatArray:
+        rows: FloatArray = residuals + (places - place) @ jacobian.T
+        rows[places[:, 0] > 3.0] = np.inf
+        return rows
+
+    problem = Problem(of_places, weights, 0.3, 20.0)
+    cost = np.inf
+    sensitivities, here = None, np.zeros(4)
+    for number in range(12):
+        draws = np.random.default_rng(number).normal(size=(20, 4))
+        found = improve(problem, here, draws, sensitivities)
+        assert found.cost <= min(cost, found.alternative)
+        cost, here, sensitivities = found.cost, found.place, found.sensitivities
+
+    steep = weights[:, np.newaxis] * jacobian
+    least = np.linalg.solve(
+        steep.T @ steep + 0.3 * np.eye(4), steep.T @ (weights * (jacobian @ place - residuals))
+    )
+    assert cost == pytest.approx(
+        float(((weights * of_places(least[np.newaxis])[0]) ** 2).sum() + 0.3 * (least**2).sum()),
+        rel=1e-3,
+    )
+
+
+def test_nothing_is_found_where_all_comes_to_nothing() -> None:
+    problem = Problem(lambda places: np.full((len(places), 3), np.inf), np.ones(3), 0.1, 4.0)
+
+    found = improve(problem, np.zeros(2), np.ones((9, 2)), None)
+
+    assert found.place.tolist() == [0.0, 0.0]
+    assert found.cost == np.inf
+
+
+# Bits
+
+
+def test_neither_threads_nor_what_else_is_done_change_a_bit() -> None:
+    alone = states_of(0.2, plan__workers=1)
+
+    assert states_of(0.2, plan__workers=2) == alone
+    assert states_of(0.2, plan__workers=4) == alone
+    assert states_of(0.2, plan__seed=1) != alone
+
+
+def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all() -> None:
+    controller = a_controller()
+    sent = states(controller, 26)
+    first = sent[0].stamp_ns
+
+    def answers(repeats: int) -> bytes:
+        efforts = []
+        for state in sent:
+            for _ in range(repeats):
+                effort, _ = controller.answer(state, first)
+            efforts.append(effort)
+        return np.array(efforts).tobytes()
+
+    once = answers(1)
+    controller.begin_episode(first)
+    assert answers(3) == once
+
+
+def test_what_is_done_in_between_is_done_and_changes_nothing() -> None:
+    controller, other, done = a_controller(), a_controller(), []
+    controller.while_planning(lambda: done.append(0))
+    (state,) = states(controller, 1)
+
+    effort, _ = controller.answer(state, state.stamp_ns)
+    same, _ = other.answer(state, state.stamp_ns)
+
+    assert len(done) > 20
+    assert effort.tobytes() == same.tobytes()
+
+
+@pytest.mark.slow
+def test_the_processors_kernels_do_not_matter(tmp_path: Path) -> None:
+    """Code for any x86-64 gives what code for this one gives."""
+    script = "from test_planner import states_of\nprint(states_of(0.1))"
+    environment = {
+        **os.environ,
+        "NUMBA_CPU_NAME": "generic",
+        "NUMBA_CPU_FEATURES": "",
+        "NUMBA_CACHE_DIR": str(tmp_path),
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path]),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False
+    )
+
+    assert not done.returncode, done.stderr
+    assert done.stdout.split() == [states_of(0.1)]
+
+
+# A motion
+
+
+@pytest.mark.slow
+def test_a_walk_goes_on_by_its_joints_alone() -> None:
+    settings = {"planner": "predictive"}
+    plan = make_plan("humanoid", 1.2667, {"reference": "clip", "clip": "walk"}, {}, settings)
+    layout = HUMANOID.layout
+
+    distances, turns = [], []
+    for tick in ticks_in_process(plan):
+        assert tick.following.effort is not None
+        assert not tick.following.effort[:6].any()
+        wanted = plan.reference.sample(len(turns) / 240 + 1 / 240).configuration
+        difference = layout.difference(wanted, layout.configuration(tick.following.position))
+        distances.append(np.linalg.norm(difference[:3]))
+        turns.append(layout.norms(difference)[2:].mean())
+
+    assert max(distances) < 0.3
+    assert np.mean(distances) < 0.10
+    assert np.mean(turns) < 0.25
+
+
+# What it refuses
+
+
+REFUSED: dict[str, tuple[str, Mapping[str, object], str]] = {
+    "a fixed base": ("pendulum", {}, "floating base"),
+    "another behaviour": ("humanoid", {"behaviour": "ragdoll"}, "'behaviour' is ragdoll"),
+    "another law": ("humanoid", {"law": "pd"}, "'law' is pd"),
+    "virtual forces": ("humanoid", {"balance": True}, "'balance' must be false"),
+    "a short horizon": ("humanoid", {"plan.horizon": 0.05, "plan.period": 0.1}, "plan.horizon"),
+    "no samples": ("humanoid", {"plan.samples": 0}, "'plan.samples' is 0; it must be 8"),
+    "no planner": ("humanoid", {"planner": "clairvoyant"}, "planner"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_it_cannot_do_is_one_clear_line(case: str) -> None:
+    name, given, said = REFUSED[case]
+    whole = character(name)
+    named: dict[str, Any] = {**QUICK, **given}
+
+    with pytest.raises(ConfigurationError, match=r"plan|law") as caught:
+        values = resolve(PARAMETERS + character_parameters(whole, named), named)
+        make_controller(whole, make_motion(whole, values).reference, values)
+
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_it_knows_no_ground_but_the_plane() -> None:
+    with pytest.raises(ConfigurationError, match="'terrain' is none; it must be plane"):
+        make_plan("humanoid", 0.1, {"reference": "hold"}, {"terrain": "none"}, QUICK)
+
+
+def test_without_numba_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("controller_node.planner.")]:
+        if name != "controller_node.planner.settings":
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "numba", None)
+
+    with pytest.raises(ConfigurationError, match="pip install 'actuated_characters\\[plan\\]'"):
+        a_controller()
+
+
+# Over topics
+
+
+@pytest.mark.slow
+def test_over_topics_it_has_the_states_that_it_has_in_one_process(tmp_path: Path) -> None:
+    settings = [f"controller_node.{name}:={value}" for name, value in QUICK.items()]
+    command = ["run", "--clip", "walk", "--duration", "0.2", "--planner", "predictive"]
+    command += ["--output", str(tmp_path / "run")]
+    for each in settings:
+        command += ["--set", each]
+
+    done = subprocess.run(
+        [sys.executable, "-m", "experiment.cli", *command],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert not done.returncode, done.stderr
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))
+    assert summary["state_hash"] == states_of(0.2)
