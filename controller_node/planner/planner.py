@@ -10,6 +10,7 @@ by samples); Howell et al. 2022, "Predictive Sampling: Real-time Behaviour Synth
 (planning online in a model).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,7 +32,6 @@ _FIRST_ROUNDS = 6  # of the first plan: nothing has moved yet
 _LARGEST = 0.9  # sigma, of an offset
 _PENALTY = 0.2  # of an offset, for each sigma
 _FADING = 0.7  # of sensitivities, from plan to plan
-_LAST_WEIGHT = 2.0  # of the horizon's last check
 _FEWEST_DRAWS = 6
 
 DesiredAt = Callable[[int], ReferenceState]
@@ -82,7 +82,6 @@ class PredictivePlanner:
         )
         self._rollouts = Rollouts(self._model, settings.workers)
         self._feature_weights = _feature_weights(character, self._model, settings)
-        self._check_weights = _check_weights(settings.checks, self._model.feature_count)
         self._unit = settings.noise * settings.sigma  # (n - 6,) of what is looked for
         self._episode = 0
         self._plan: Plan | None = None
@@ -174,19 +173,18 @@ class PredictivePlanner:
         settings, body = self._settings, self._model.body(gains)
         desired, features = self._desired(tick, first_knot, desired_at, body)
         position = self._model.position_of(state.position)
+        weights = self._feature_weights / math.sqrt(settings.checks)  # the mean of squares counts
 
         def residuals(places: FloatArray) -> FloatArray:
             plans = places.reshape(len(places), -1, len(self._unit)) * self._unit
             found, sound = self._rollouts.simulate(position, state.velocity, plans, desired, body)
-            rows = ((found - features) * self._feature_weights).reshape(len(places), -1)
+            rows = ((found - features) * weights).reshape(len(places), -1)
             rows[~sound] = np.inf
             return rows
 
         knots = (tick + settings.horizon - 1) // settings.knots + 2 - first_knot
         penalty = _PENALTY * settings.noise
-        return Problem(
-            residuals, self._check_weights, penalty * penalty / knots, _LARGEST / settings.noise
-        )
+        return Problem(residuals, penalty * penalty / knots, _LARGEST / settings.noise)
 
     def _desired(
         self, tick: int, first_knot: int, desired_at: DesiredAt, body: Body
@@ -244,14 +242,6 @@ def _areas(since_knot: int, settings: PlannerSettings, count: int) -> FloatArray
     ticks = (since_knot + np.arange(settings.horizon)) / settings.knots
     from_knots = np.abs(ticks - np.arange(count)[:, np.newaxis])
     return np.array([float(np.add.accumulate(row)[-1]) for row in np.maximum(1.0 - from_knots, 0)])
-
-
-def _check_weights(checks: int, features: int) -> FloatArray:
-    """The weights (m,) of the residuals of all checks: the mean of their squares counts."""
-    weights = np.full((checks, features), 1.0 / checks)
-    weights[-1] *= _LAST_WEIGHT
-    roots: FloatArray = np.sqrt(weights).ravel()
-    return roots
 
 
 def _feature_weights(

@@ -17,11 +17,10 @@ _FEWEST = 4  # samples that a step can be found from
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be made small: `|residuals(x) weights|^2 + penalty |x|^2`."""
+    """What is to be made small: `|residuals(x)|^2 + penalty |x|^2`."""
 
     residuals: Callable[[FloatArray], FloatArray]
     """Of places (s, d) the residuals (s, m), not finite where a place leads to nothing."""
-    weights: FloatArray  # (m,)
     penalty: float
     largest: float  # of each entry of x
 
@@ -33,7 +32,7 @@ class Found:
     place: FloatArray  # (d,) the best x
     cost: float
     alternative: float  # cost of the best of the others
-    sensitivities: FloatArray | None  # (d, m) of the residuals, not weighted
+    sensitivities: FloatArray | None  # (d, m) of the residuals
 
 
 def improve(
@@ -58,11 +57,7 @@ def improve(
     steps = [
         *_ensemble_steps(problem, places[0], distances, residuals[0], changes),
         *gauss_newton.sensitivity_steps(
-            sensitivities * problem.weights,
-            residuals[0] * problem.weights,
-            places[0],
-            problem.penalty,
-            _DAMPINGS,
+            sensitivities, residuals[0], places[0], problem.penalty, _DAMPINGS
         ),
     ]
     stepped = _within(problem, places[0] + np.array(steps))
@@ -78,8 +73,8 @@ def _ensemble_steps(
     changes: FloatArray,
 ) -> list[FloatArray]:
     root = math.sqrt(problem.penalty)
-    whole = np.concatenate((changes * problem.weights, root * distances), axis=1)
-    here = np.concatenate((residuals * problem.weights, root * place))
+    whole = np.concatenate((changes, root * distances), axis=1)
+    here = np.concatenate((residuals, root * place))
     return [gauss_newton.ensemble_step(distances, whole, here, each) for each in _DAMPINGS]
 
 
@@ -89,8 +84,8 @@ def _within(problem: Problem, places: FloatArray) -> FloatArray:
 
 def _costs(problem: Problem, places: FloatArray, residuals: FloatArray) -> FloatArray:
     """The costs (s,); infinite of what leads to nothing."""
-    weighted = residuals * problem.weights
-    costs = fixed_order.dot(weighted, weighted) + problem.penalty * fixed_order.dot(places, places)
+    large = fixed_order.dot(places, places)
+    costs = fixed_order.dot(residuals, residuals) + problem.penalty * large
     return np.where(np.isfinite(costs), costs, np.inf)
 
 

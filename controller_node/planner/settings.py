@@ -35,12 +35,12 @@ PLANNER_PARAMETERS = [
         "in a model of the world",
         choices=(NO_PLANNER, PREDICTIVE),
     ),
-    Parameter("plan.horizon", 0.6, "how far it looks", unit="s", minimum=0.05, maximum=5.0),
+    Parameter("plan.horizon", 0.8, "how far it looks", unit="s", minimum=0.05, maximum=5.0),
     Parameter("plan.period", 0.05, "from one plan to the next", unit="s", minimum=1e-3, maximum=1),
     Parameter(
         "plan.knots", 0.15, "from one knot of a plan to the next", unit="s", minimum=0.01, maximum=5
     ),
-    Parameter("plan.samples", 57, "rollouts that a plan is found from", minimum=8, maximum=10_000),
+    Parameter("plan.samples", 40, "rollouts that a plan is found from", minimum=8, maximum=10_000),
     Parameter(
         "plan.noise",
         0.2,
