@@ -126,8 +126,9 @@ def _mean_of_square_wave(place: Samples, width: Samples) -> Samples:
 
 def _triangle_wave(place: Samples) -> Samples:
     """The square wave's integral from 0 on."""
-    wave: Samples = 1.0 - np.abs(place - 2.0 * np.floor(0.5 * place) - 1.0)
-    return wave
+    whole: Samples = np.floor(0.5 * place)
+    distance: Samples = np.abs(place - 2.0 * whole - 1.0)
+    return 1.0 - distance
 
 
 def _scale(view: View, height: int) -> float:
