@@ -13,6 +13,7 @@ from controller_node.behaviours.make import BehaviourChoice
 from controller_node.effort_series import EffortSeries
 from controller_node.feedback import RespondingReference
 from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
+from controller_node.planner.outlook import Outlook
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.moved import Carry, MovedReference
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
@@ -48,6 +49,10 @@ class Planner(Protocol):
 
     def change_reference(self) -> None:
         """Say that the reference is another one from now on."""
+
+    @property
+    def outlook(self) -> Outlook | None:
+        """What is expected of the plan in force, the same object as long as it is."""
 
     def offset(
         self,
@@ -135,6 +140,11 @@ class Controller:
         """Have something done again and again while a planner plans; not to change this one."""
         if self._planner is not None:
             self._planner.between_rollouts(act)
+
+    @property
+    def outlook(self) -> Outlook | None:
+        """What a planner expects of its plan; None without one."""
+        return None if self._planner is None else self._planner.outlook
 
     @property
     def needs_contacts(self) -> bool:

@@ -20,6 +20,7 @@ from controller_node.parameters import (
     make_controller,
     make_settings,
 )
+from controller_node.planner.outlook import Outlook
 from controller_node.simulators import Simulators
 from controller_node.strengths_topic import StrengthTopic
 from controller_node.trajectories import Trajectories
@@ -102,6 +103,7 @@ class ControllerNode(Node):
         )
         self._waiting: bytes | None = None  # a state, for the contacts of its tick
         self._told_mode: ModeReport | None = None
+        self._told_outlook: Outlook | None = None
         # after them: a simulator that has found this subscription has found the others as well
         self._states = DirectSubscription(self, topics.JOINT_STATES)
         commanded = np.flatnonzero(
@@ -253,8 +255,12 @@ class ControllerNode(Node):
                 self._contacts.restart()
 
     def _tell_mode(self) -> None:
-        """Publish what it does, if that is new."""
-        mode = self._controller.mode
+        """Publish what it does and what it plans, if that is new."""
+        mode, outlook = self._controller.mode, self._controller.outlook
+        if outlook is not None and outlook is not self._told_outlook:
+            self._told_outlook = outlook
+            assert self._answer is not None
+            self._outputs.publish_plan(outlook, self._answer.state.stamp_ns)
         if mode is not None and mode is not self._told_mode:
             self._told_mode = mode
             self._outputs.publish_mode(mode)

@@ -12,6 +12,8 @@ from trajectory_msgs.msg import JointTrajectory
 
 from controller_node.actuation import net_wrench
 from controller_node.behaviours.base import ModeReport
+from controller_node.plan_message import plan_message
+from controller_node.planner.outlook import Outlook
 from controller_node.strength import Strengths
 from msgs_config import topics
 from msgs_config.arrays import FloatArray, IntArray
@@ -52,6 +54,7 @@ class Outputs:
         self._trajectories = topics.create_publisher(node, topics.ACTIVE_TRAJECTORY)
         self._strengths = topics.create_publisher(node, topics.ACTIVE_STRENGTH)
         self._modes = topics.create_publisher(node, topics.MODE)
+        self._plans = topics.create_publisher(node, topics.PLAN)
 
     def publish_initial_state(self, state: StampedState) -> None:
         """Publish in which state the reference begins."""
@@ -123,6 +126,11 @@ class Outputs:
     def publish_mode(self, report: ModeReport) -> None:
         """Publish what it does, since when and why, as JSON."""
         self._modes.publish(String(data=json.dumps(report.content(), allow_nan=False)))
+
+    def publish_plan(self, outlook: Outlook, stamp_ns: int) -> None:
+        """Publish what is expected of a plan that was made in the state of a stamp."""
+        if self._plans.get_subscription_count():
+            self._plans.publish(plan_message(outlook, stamp_ns))
 
     def _net_wrench(self, answer: Answer) -> bytes:
         """The serialised message."""

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState, MultiDOFJointState
+from sensor_msgs.msg import JointState, MultiDOFJointState, PointCloud2
 from std_msgs.msg import Header, String
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
@@ -135,6 +135,7 @@ ACTIVE_TRAJECTORY = Topic("~/active_trajectory", JointTrajectory, LATCHED_QOS)
 STRENGTH = Topic("~/strength", JointState, STREAM_QOS)
 ACTIVE_STRENGTH = Topic("~/active_strength", JointState, CHANGES_QOS)
 MODE = Topic("~/mode", String, CHANGES_QOS)
+PLAN = Topic("~/plan", PointCloud2, STREAM_QOS)
 CLOCK = Topic("/clock", Clock, STREAM_QOS)
 EPISODE = Topic("episode", Header, LATCHED_QOS)
 CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS)

@@ -42,6 +42,7 @@ EDGE = {  # the files that speak ROS, beside all of experiment/
     "controller_node/contact_inbox.py",
     "controller_node/node.py",
     "controller_node/outputs.py",
+    "controller_node/plan_message.py",
     "controller_node/simulators.py",
     "controller_node/stamped_inbox.py",
     "controller_node/strengths_topic.py",

@@ -11,16 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 from physics import character
+from ros import stamp_ns
 
 from controller_node.controller import Controller
 from controller_node.motion import make_motion
 from controller_node.parameters import PARAMETERS, character_parameters, make_controller
+from controller_node.plan_message import plan_message
 from controller_node.planner import gauss_newton
 from controller_node.planner.search import Problem, improve
 from experiment.loop import ticks_in_process
 from experiment.metrics import StateHash
 from experiment.plan import make_plan
 from msgs_config.arrays import FloatArray
+from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import resolve
 from msgs_config.stamped import StampedState
@@ -116,13 +119,15 @@ def test_a_round_finds_the_least_of_a_linear_problem_and_never_what_is_worse() -
         rows[places[:, 0] > 3.0] = np.inf
         return rows
 
-    problem = Problem(of_places, 0.3, 20.0)
+    problem = Problem(of_places, lambda rows: rows, 0.3, 20.0)
     cost = np.inf
     sensitivities, here = None, np.zeros(4)
     for number in range(12):
         draws = np.random.default_rng(number).normal(size=(20, 4))
         found = improve(problem, here, draws, sensitivities)
-        assert found.cost <= min(cost, found.alternative)
+        assert found.cost <= cost
+        here_again = of_places(found.place[np.newaxis])[0]
+        np.testing.assert_allclose(found.deviations[0], here_again, rtol=1e-12, atol=1e-12)
         cost, here, sensitivities = found.cost, found.place, found.sensitivities
 
     least = np.linalg.solve(
@@ -135,9 +140,9 @@ def test_a_round_finds_the_least_of_a_linear_problem_and_never_what_is_worse() -
 
 
 def test_nothing_is_found_where_all_comes_to_nothing() -> None:
-    problem = Problem(lambda places: np.full((len(places), 3), np.inf), 0.1, 4.0)
+    nothing = Problem(lambda places: np.full((len(places), 3), np.inf), lambda rows: rows, 0.1, 4.0)
 
-    found = improve(problem, np.zeros(2), np.ones((9, 2)), None)
+    found = improve(nothing, np.zeros(2), np.ones((9, 2)), None)
 
     assert found.place.tolist() == [0.0, 0.0]
     assert found.cost == np.inf
@@ -224,6 +229,41 @@ def test_a_walk_goes_on_by_its_joints_alone() -> None:
     assert max(distances) < 0.3
     assert np.mean(distances) < 0.10
     assert np.mean(turns) < 0.25
+
+
+# What it says
+
+
+def test_it_says_where_each_plan_leads_and_what_that_costs() -> None:
+    controller = a_controller()
+    sent = states(controller, 13)
+    outlooks = []
+    for state in sent:
+        controller.answer(state, sent[0].stamp_ns)
+        outlooks.append(controller.outlook)
+    first, last = outlooks[0], outlooks[-1]
+    assert first is not None
+    assert last is not None
+
+    message = plan_message(first, sent[0].stamp_ns)
+
+    assert all(each is first for each in outlooks[:12])
+    assert last is not first
+    names = [field.name for field in message.fields]
+    rows = np.frombuffer(bytes(message.data), [(name, "<f8") for name in names])
+    assert (message.width, message.height, message.point_step) == (6, 1, 8 * len(names))
+    assert stamp_ns(message) == sent[0].stamp_ns
+    np.testing.assert_allclose(rows["time"], 0.05 * np.arange(1, 7))
+    motion = make_motion(HUMANOID, resolve(PARAMETERS, {"reference": "clip", "clip": "walk"}))
+    model = DynamicsModel(HUMANOID)
+    for row in rows:
+        model.update(motion.reference.sample(row["time"]).configuration.position, np.zeros(34))
+        centre = np.array([row["x"], row["y"], row["z"]])
+        assert float(np.linalg.norm(centre - model.centre_of_mass())) < 0.2
+    assert (rows["cost"] > 0.0).all()
+    assert rows["cost"].sum() < 1.5 * rows["alternative"].sum()
+    assert not rows["anchor_x"].any()
+    assert not rows["anchor_yaw"].any()
 
 
 # What it refuses

@@ -10,22 +10,25 @@ by samples); Howell et al. 2022, "Predictive Sampling: Real-time Behaviour Synth
 (planning online in a model).
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from controller_node.laws import GainArrays
+from controller_node.planner.anchor import Anchor, Balance, balance_of
+from controller_node.planner.comparison import Comparison
 from controller_node.planner.compiled.draws import normal_draws
 from controller_node.planner.compiled.rollout import Body, Desired
 from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.outlook import Outlook
 from controller_node.planner.rollouts import Rollouts
 from controller_node.planner.search import Found, Problem, improve
 from controller_node.planner.settings import PlannerSettings
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
+from msgs_config.geometry import fixed_order
 from msgs_config.stamped import StampedState
 
 _FIRST_ROUNDS = 6  # of the first plan: nothing has moved yet
@@ -45,8 +48,9 @@ class Plan:
     tick: int  # at which it was made, since the episode began
     first_knot: int
     offsets: FloatArray  # (k, n - 6) at the knots, rad or m
-    found: Found
+    sensitivities: FloatArray | None  # (k (n - 6), checks f) of features to offsets
     areas: FloatArray  # (k,) ticks of the horizon that each knot counts for
+    outlook: Outlook
 
     def offset(self, tick: int, knot_ticks: int) -> FloatArray:
         """The offset (n - 6,) of a tick, linear between the knots."""
@@ -66,6 +70,14 @@ class _Target:
     features: FloatArray  # (f,)
 
 
+@dataclass(frozen=True)
+class _Course:
+    """The reference over a horizon, and its features (checks, f)."""
+
+    rollout: Desired
+    features: FloatArray
+
+
 class PredictivePlanner:
     """Plans for one character. It remembers its last plan, until an episode begins."""
 
@@ -81,17 +93,19 @@ class PredictivePlanner:
             character, period_s=1.0 / rate_hz, gravity=gravity, friction=settings.friction
         )
         self._rollouts = Rollouts(self._model, settings.workers)
-        self._feature_weights = _feature_weights(character, self._model, settings)
+        self._comparison = Comparison(character, self._model, settings)
+        self._rate_hz = rate_hz
         self._unit = settings.noise * settings.sigma  # (n - 6,) of what is looked for
         self._episode = 0
         self._plan: Plan | None = None
+        self._anchor = Anchor()
         self._targets: dict[int, _Target] = {}
         self._compile(character)
 
     @property
-    def plan(self) -> Plan | None:
-        """The plan in force."""
-        return self._plan
+    def outlook(self) -> Outlook | None:
+        """What is expected of the plan in force, the same object as long as it is."""
+        return None if self._plan is None else self._plan.outlook
 
     def between_rollouts(self, act: Callable[[], None]) -> None:
         """Have something done again and again while it plans."""
@@ -101,6 +115,7 @@ class PredictivePlanner:
         """Forget plan and reference; `episode` is the tick of the episode's first state."""
         self._episode = episode
         self._plan = None
+        self._anchor = Anchor()
         self._targets.clear()
 
     def change_reference(self) -> None:
@@ -124,13 +139,14 @@ class PredictivePlanner:
 
     def _compile(self, character: Character) -> None:
         """Have all compiled before the first state waits for an answer: one rollout at rest."""
-        layout, settings = character.layout, self._settings
+        layout = character.layout
         rest, nothing = np.array(character.rest_position), np.zeros(layout.size)
         still = ReferenceState(layout.configuration(rest), nothing, nothing)
         gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
-        problem = self._problem(0, 0, StampedState(0, rest, nothing, None), gains, lambda _: still)
-        count = (settings.horizon - 1) // settings.knots + 2
-        place = np.zeros(count * len(self._unit))
+        position, body = self._model.position_of(rest), self._model.body(gains)
+        desired = self._desired(0, 0, lambda _: still, body)
+        problem = self._problem(position, nothing, desired, body)
+        place = np.zeros(self._knot_count(0) * len(self._unit))
         draws = normal_draws((0, 0), (0, 0), _FEWEST_DRAWS * place.size).reshape(-1, place.size)
         found = improve(problem, place, draws, None)
         improve(problem, found.place, draws, found.sensitivities)
@@ -142,54 +158,91 @@ class PredictivePlanner:
         """A plan from a state."""
         settings, old = self._settings, self._plan
         first_knot = tick // settings.knots
-        count = (tick + settings.horizon - 1) // settings.knots + 2 - first_knot
+        count = self._knot_count(tick)
         areas = _areas(tick - first_knot * settings.knots, settings, count)
-        problem = self._problem(tick, first_knot, state, gains, desired_at)
+        body = self._model.body(gains)
+        desired = self._desired(tick, first_knot, desired_at, body)
+        position, velocity = self._look(tick, state, body)
+        problem = self._problem(position, velocity, desired, body)
         place = np.zeros((count, len(self._unit)))
         sensitivities, rounds = None, _FIRST_ROUNDS
         if old is not None:
             left = old.offsets[first_knot - old.first_knot :]
             place[: len(left)] = left / self._unit
             sensitivities, rounds = self._faded(old, tick, first_knot, areas), 1
-        found = Found(place.ravel(), np.inf, np.inf, sensitivities)
+        best = place.ravel()
         for number in range(rounds):
             draws = normal_draws(
                 (settings.seed, self._episode), (number, tick), settings.samples * place.size
             )
             samples = draws.reshape(settings.samples, place.size)
-            found = improve(problem, found.place, samples, found.sensitivities)
-        offsets = found.place.reshape(place.shape) * self._unit
-        return Plan(tick, first_knot, offsets, found, areas)
+            found = improve(problem, best, samples, sensitivities)
+            best, sensitivities = found.place, found.sensitivities
+        offsets = best.reshape(place.shape) * self._unit
+        outlook = self._outlook(found, problem, desired)
+        return Plan(tick, first_knot, offsets, sensitivities, areas, outlook)
+
+    def _outlook(self, found: Found, problem: Problem, desired: _Course) -> Outlook:
+        """What is expected of a plan."""
+        checks = self._settings.checks
+        residuals = problem.residuals(found.deviations).reshape(2, checks, -1)
+        best = found.deviations[0].reshape(checks, -1)
+        centres, _ = self._comparison.balance(desired.features + best)
+        numbers: FloatArray = np.arange(1.0, checks + 1.0)
+        times = numbers * (self._settings.period / self._rate_hz)
+        costs, others = fixed_order.dot(residuals, residuals)
+        return Outlook(times, self._anchor.out_of(centres), costs, others, self._anchor)
+
+    def _look(self, tick: int, state: StampedState, body: Body) -> tuple[FloatArray, FloatArray]:
+        """A state in the reference's world, (q,) and (n,), which may have given way to it."""
+        position, target = self._model.position_of(state.position), self._targets[tick]
+        velocity = state.velocity.copy()  # a message's cannot be written to: another type
+        seen = self._anchor.into(position, velocity)
+        features = self._rollouts.features_of(*seen, body)
+        since_plan = tick - (tick if self._plan is None else self._plan.tick)
+        self._anchor = self._anchor.follow(
+            self._balance(seen[0], features),
+            self._balance(target.position, target.features),
+            tick / self._rate_hz,
+            since_plan / self._rate_hz,
+        )
+        return self._anchor.into(position, velocity)
+
+    def _balance(self, position: FloatArray, features: FloatArray) -> Balance:
+        centre, velocity = self._comparison.balance(features)
+        return balance_of(position, velocity, centre)
 
     def _problem(
-        self,
-        tick: int,
-        first_knot: int,
-        state: StampedState,
-        gains: GainArrays,
-        desired_at: DesiredAt,
+        self, position: FloatArray, velocity: FloatArray, desired: _Course, body: Body
     ) -> Problem:
         """What a plan from a state is to make small."""
-        settings, body = self._settings, self._model.body(gains)
-        desired, features = self._desired(tick, first_knot, desired_at, body)
-        position = self._model.position_of(state.position)
-        weights = self._feature_weights / math.sqrt(settings.checks)  # the mean of squares counts
+        settings, checks = self._settings, self._settings.checks
+        tick = desired.rollout.first_tick
+        gives_way = self._anchor.gives_way(tick / self._rate_hz)
 
-        def residuals(places: FloatArray) -> FloatArray:
+        def deviations(places: FloatArray) -> FloatArray:
             plans = places.reshape(len(places), -1, len(self._unit)) * self._unit
-            found, sound = self._rollouts.simulate(position, state.velocity, plans, desired, body)
-            rows = ((found - features) * weights).reshape(len(places), -1)
-            rows[~sound] = np.inf
+            found, sound = self._rollouts.simulate(position, velocity, plans, desired.rollout, body)
+            rows = (found - desired.features).reshape(len(places), -1)
+            rows[~sound] = np.nan
             return rows
 
-        knots = (tick + settings.horizon - 1) // settings.knots + 2 - first_knot
-        penalty = _PENALTY * settings.noise
-        return Problem(residuals, penalty * penalty / knots, _LARGEST / settings.noise)
+        def residuals(rows: FloatArray) -> FloatArray:
+            by_check = rows.reshape(*rows.shape[:-1], checks, -1)
+            return self._comparison.residuals(by_check, gives_way=gives_way).reshape(rows.shape)
 
-    def _desired(
-        self, tick: int, first_knot: int, desired_at: DesiredAt, body: Body
-    ) -> tuple[Desired, FloatArray]:
-        """The reference from a tick on, and its features (checks, f)."""
+        knots = self._knot_count(tick)
+        penalty = _PENALTY * settings.noise
+        largest = _LARGEST / settings.noise
+        return Problem(deviations, residuals, penalty * penalty / knots, largest)
+
+    def _knot_count(self, tick: int) -> int:
+        """How many knots a plan has that is made at a tick."""
+        settings = self._settings
+        return (tick + settings.horizon - 1) // settings.knots + 2 - tick // settings.knots
+
+    def _desired(self, tick: int, first_knot: int, desired_at: DesiredAt, body: Body) -> _Course:
+        """The reference from a tick on."""
         settings = self._settings
         for known in [known for known in self._targets if known < tick]:
             del self._targets[known]
@@ -204,7 +257,7 @@ class PredictivePlanner:
             np.array([target.velocity for target in targets]),
         )
         checked = targets[settings.period :: settings.period]
-        return desired, np.array([target.features for target in checked])
+        return _Course(desired, np.array([target.features for target in checked]))
 
     def _target(self, tick: int, desired_at: DesiredAt, body: Body) -> _Target:
         if tick not in self._targets:
@@ -220,12 +273,10 @@ class PredictivePlanner:
         A knot's go with its part in the horizon. A new knot's are zero, a new check has the last
         one's.
         """
-        if old.found.sensitivities is None:
+        if old.sensitivities is None:
             return None
         settings = self._settings
-        known = old.found.sensitivities.reshape(
-            len(old.areas), len(self._unit), settings.checks, -1
-        )
+        known = old.sensitivities.reshape(len(old.areas), len(self._unit), settings.checks, -1)
         passed = (tick - old.tick) // settings.period
         checks = np.minimum(np.arange(settings.checks) + passed, settings.checks - 1)
         faded = np.zeros((len(areas), *known.shape[1:]))
@@ -242,25 +293,3 @@ def _areas(since_knot: int, settings: PlannerSettings, count: int) -> FloatArray
     ticks = (since_knot + np.arange(settings.horizon)) / settings.knots
     from_knots = np.abs(ticks - np.arange(count)[:, np.newaxis])
     return np.array([float(np.add.accumulate(row)[-1]) for row in np.maximum(1.0 - from_knots, 0)])
-
-
-def _feature_weights(
-    character: Character, model: ContactModel, settings: PlannerSettings
-) -> FloatArray:
-    """The weights (f,) of the features, in their order."""
-    weights, joints = settings.weights, len(settings.sigma)
-    ends = [
-        weights["feet" if character.links[index].name in character.feet else "hands"]
-        for index in model.end_effectors
-    ]
-    parts = [
-        (weights["root_rotation"], 3),
-        (weights["joints"], joints),
-        (weights["root_spin"], 3),
-        (weights["joint_rates"], joints),
-        (weights["centre_of_mass"], 3),
-        (weights["centre_of_mass_velocity"], 3),
-        (weights["angular_momentum"], 3),
-        *((weight, 3) for weight in ends),
-    ]
-    return np.repeat([weight for weight, _ in parts], [count for _, count in parts])

@@ -55,7 +55,6 @@ class Rollouts:
         ticks = len(desired.positions) - 1
         last_knot, _ = knot_weight(desired.first_tick + ticks - 1, desired)
         assert plans.shape[1] >= last_knot + 2  # compiled code does not look
-        velocity = velocity.copy()  # a message's cannot be written to, which is another type
         checks = ticks // desired.check_ticks
         features = np.zeros((len(plans), checks, self._model.feature_count))
         sound = np.zeros(len(plans), dtype=np.bool_)

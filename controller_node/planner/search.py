@@ -17,10 +17,12 @@ _FEWEST = 4  # samples that a step can be found from
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be made small: `|residuals(x)|^2 + penalty |x|^2`."""
+    """What is to be made small: `|residuals(deviations(x))|^2 + penalty |x|^2`."""
 
+    deviations: Callable[[FloatArray], FloatArray]
+    """Of places (s, d) the deviations (s, m), not finite where a place leads to nothing."""
     residuals: Callable[[FloatArray], FloatArray]
-    """Of places (s, d) the residuals (s, m), not finite where a place leads to nothing."""
+    """Of deviations (s, m) the residuals (s, m); linear."""
     penalty: float
     largest: float  # of each entry of x
 
@@ -31,8 +33,8 @@ class Found:
 
     place: FloatArray  # (d,) the best x
     cost: float
-    alternative: float  # cost of the best of the others
-    sensitivities: FloatArray | None  # (d, m) of the residuals
+    deviations: FloatArray  # (2, m) that the best x leads to, and the best of the others
+    sensitivities: FloatArray | None  # (d, m) of the deviations
 
 
 def improve(
@@ -47,22 +49,29 @@ def improve(
         known: Sensitivities (d, m) of before.
     """
     places = _within(problem, np.concatenate((place[np.newaxis], place + draws)))
-    residuals = problem.residuals(places)
-    costs = _costs(problem, places, residuals)
+    deviations = problem.deviations(places)
+    costs = _costs(problem, places, deviations)
     kept = _best(costs[1:]) + 1
     if not np.isfinite(costs[0]) or len(kept) < _FEWEST:
-        return _found(places, costs, known)
-    distances, changes = places[kept] - places[0], residuals[kept] - residuals[0]
+        return _found(places, costs, deviations, known)
+    distances, changes = places[kept] - places[0], deviations[kept] - deviations[0]
+    residuals = problem.residuals(deviations[0])
     sensitivities = gauss_newton.corrected_sensitivities(known, distances, changes)
     steps = [
-        *_ensemble_steps(problem, places[0], distances, residuals[0], changes),
+        *_ensemble_steps(problem, places[0], distances, residuals, problem.residuals(changes)),
         *gauss_newton.sensitivity_steps(
-            sensitivities, residuals[0], places[0], problem.penalty, _DAMPINGS
+            problem.residuals(sensitivities), residuals, places[0], problem.penalty, _DAMPINGS
         ),
     ]
     stepped = _within(problem, places[0] + np.array(steps))
-    more = _costs(problem, stepped, problem.residuals(stepped))
-    return _found(np.concatenate((places, stepped)), np.concatenate((costs, more)), sensitivities)
+    of_steps = problem.deviations(stepped)
+    more = _costs(problem, stepped, of_steps)
+    return _found(
+        np.concatenate((places, stepped)),
+        np.concatenate((costs, more)),
+        np.concatenate((deviations, of_steps)),
+        sensitivities,
+    )
 
 
 def _ensemble_steps(
@@ -82,8 +91,9 @@ def _within(problem: Problem, places: FloatArray) -> FloatArray:
     return np.clip(places, -problem.largest, problem.largest)
 
 
-def _costs(problem: Problem, places: FloatArray, residuals: FloatArray) -> FloatArray:
+def _costs(problem: Problem, places: FloatArray, deviations: FloatArray) -> FloatArray:
     """The costs (s,); infinite of what leads to nothing."""
+    residuals = problem.residuals(deviations)
     large = fixed_order.dot(places, places)
     costs = fixed_order.dot(residuals, residuals) + problem.penalty * large
     return np.where(np.isfinite(costs), costs, np.inf)
@@ -95,6 +105,11 @@ def _best(costs: FloatArray) -> FloatArray:
     return np.sort(best[np.isfinite(costs[best])])
 
 
-def _found(places: FloatArray, costs: FloatArray, sensitivities: FloatArray | None) -> Found:
-    first, second = np.argsort(costs, kind="stable")[:2]
-    return Found(places[first], float(costs[first]), float(costs[second]), sensitivities)
+def _found(
+    places: FloatArray,
+    costs: FloatArray,
+    deviations: FloatArray,
+    sensitivities: FloatArray | None,
+) -> Found:
+    best = np.argsort(costs, kind="stable")[:2]
+    return Found(places[best[0]], float(costs[best[0]]), deviations[best], sensitivities)

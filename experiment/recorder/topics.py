@@ -31,6 +31,7 @@ _OF_EACH = [
     topics.STRENGTH.of(topics.CONTROLLER_NODE),
     topics.ACTIVE_STRENGTH.of(topics.CONTROLLER_NODE),
     topics.MODE.of(topics.CONTROLLER_NODE),
+    topics.PLAN.of(topics.CONTROLLER_NODE),
     topics.CONTACTS,
     topics.APPLIED_WRENCH,
     topics.ODOM,

@@ -1,0 +1,118 @@
+"""Where the reference stands: its place and heading give way to what it cannot absorb, and return.
+
+A push that moves the character by a step cannot be undone at once by its feet. So while it is
+perturbed the reference's world is moved and turned after the character, and later, slowly, back:
+a point p of it is at `R p + t` in the world, with R the turn about z by `yaw`.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from msgs_config import rotations
+from msgs_config.arrays import FloatArray
+
+_FAR = 0.28  # m of the centre of mass from the reference's: it is perturbed
+_FAST = 0.65  # m/s likewise; a walk that nobody pushes reaches 0.63
+_HELD = 1.0  # s after which that is over
+_FOLLOWS_IN = 0.3  # s, time constant with which the place gives way
+_TURNS_IN = 1.0  # s, the heading
+_RETURNS_IN = 3.0  # s, both on the way back
+_SLOWLY = 0.15  # m/s, at most, of the place on the way back
+
+
+@dataclass(frozen=True)
+class Balance:
+    """How a character moves over the ground, in the world or in the reference's."""
+
+    centre: complex  # m, of the centre of mass, x + i y
+    velocity: complex  # m/s
+    heading: float  # rad, yaw of the root
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """Where the reference's world is in the world; moved about the ground and turned about z."""
+
+    place: complex = 0j  # t, m, x + i y
+    yaw: float = 0.0  # rad
+    calm_from: float = 0.0  # s since the episode began, until when it gives way
+
+    def gives_way(self, time: float) -> bool:
+        """Whether the reference goes where the character is, at a time in s."""
+        return time < self.calm_from
+
+    def into(self, position: FloatArray, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """A state of the world in the reference's: MuJoCo's position (q,), velocity (n,)."""
+        if self.place == 0 and self.yaw == 0.0:
+            return position, velocity  # to the last bit
+        position, velocity = position.copy(), velocity.copy()
+        back = _turn(-self.yaw)
+        position[:2] = _pair(back * (complex(*position[:2]) - self.place))
+        velocity[:2] = _pair(back * complex(*velocity[:2]))
+        root = rotations.xyzw_from_wxyz(position[3:7])
+        turned = rotations.multiply(rotations.about_z(-self.yaw), root)
+        position[3:7] = rotations.wxyz_from_xyzw(turned)
+        return position, velocity
+
+    def out_of(self, points: FloatArray) -> FloatArray:
+        """Points (m, 3) of the reference's world in the world, m."""
+        shift = np.array((self.place.real, self.place.imag, 0.0))
+        placed: FloatArray = rotations.rotate(rotations.about_z(self.yaw), points) + shift
+        return placed
+
+    def follow(self, state: Balance, wanted: Balance, time: float, elapsed: float) -> "Anchor":
+        """Where it is next, after a look at a state and at the reference, both in the latter's.
+
+        Args:
+            state: The character.
+            wanted: The reference.
+            time: s since the episode began.
+            elapsed: s since the last look.
+        """
+        error = state.centre - wanted.centre
+        far = _length(error) > _FAR or _length(state.velocity - wanted.velocity) > _FAST
+        calm_from = time + _HELD if far else self.calm_from
+        if time < calm_from:
+            turned = math.remainder(state.heading - wanted.heading, math.tau)
+            yaw = self.yaw + min(elapsed / _TURNS_IN, 1.0) * turned
+            before = _turn(self.yaw) * state.centre + self.place
+            share = min(elapsed / _FOLLOWS_IN, 1.0)
+            place = before - _turn(yaw) * (state.centre - share * error)
+            return Anchor(place, yaw, calm_from)
+        return self._returned(wanted.centre, elapsed, calm_from)
+
+    def _returned(self, centre: complex, elapsed: float, calm_from: float) -> "Anchor":
+        """A part of the way back, as seen where the reference's centre of mass is."""
+        away = _turn(self.yaw) * centre + self.place - centre
+        share = min(elapsed / _RETURNS_IN, 1.0)
+        yaw = (1.0 - share) * self.yaw
+        if share * _length(away) > _SLOWLY * elapsed:
+            share = _SLOWLY * elapsed / _length(away)
+        place = centre + (1.0 - share) * away - _turn(yaw) * centre
+        return replace(self, place=place, yaw=yaw, calm_from=calm_from)
+
+
+def balance_of(position: FloatArray, velocity: FloatArray, centre: FloatArray) -> Balance:
+    """The balance of a state.
+
+    Args:
+        position: MuJoCo's (q,).
+        velocity: Of the centre of mass (3,), m/s.
+        centre: Of mass (3,), m.
+    """
+    heading = rotations.yaw(rotations.xyzw_from_wxyz(position[3:7]))
+    return Balance(complex(*centre[:2]), complex(*velocity[:2]), float(heading))
+
+
+def _turn(angle: float) -> complex:
+    return complex(math.cos(angle), math.sin(angle))
+
+
+def _length(number: complex) -> float:
+    return math.sqrt(number.real * number.real + number.imag * number.imag)
+
+
+def _pair(number: complex) -> FloatArray:
+    return np.array((number.real, number.imag))

@@ -1,0 +1,17 @@
+"""What is expected of a plan, for those who watch."""
+
+from dataclasses import dataclass
+
+from controller_node.planner.anchor import Anchor
+from msgs_config.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What a plan is expected to lead to at each of its checks."""
+
+    times: FloatArray  # (checks,) s after the state that it was made in
+    centres: FloatArray  # (checks, 3) m, of mass, in the world
+    costs: FloatArray  # (checks,) of the deviations from the reference; the plan's is their sum
+    alternatives: FloatArray  # (checks,) of the best of what was tried besides
+    anchor: Anchor  # where the reference's world was put
