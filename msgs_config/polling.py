@@ -41,6 +41,7 @@ class DirectSubscription:
         """Subscribe; with `events` also to what the middleware says of the subscription."""
         # as many as the middleware keeps, and like it the newest, lest a flood fill the memory
         self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
+        self.dropped = 0  # messages, as more came than were taken
         self._node = node
         # When the loop blocks in the executor, it is the executor that takes the message. It
         # hands a callback of two arguments the message's info too, which rclpy's types leave out.
@@ -55,6 +56,14 @@ class DirectSubscription:
         )
 
     def _keep(self, raw: bytes, info: dict[str, int]) -> None:
+        most = self._pending.maxlen
+        if most == len(self._pending) and most > 1:  # with a depth of 1 the newest is all
+            if not self.dropped:
+                self._node.get_logger().warning(
+                    f"'{self._subscription.topic_name}': more than {most} messages wait to be "
+                    "taken; the oldest are dropped, which is logged once"
+                )
+            self.dropped += 1
         self._pending.append(_received(raw, info))
 
     def close(self) -> None:
@@ -86,7 +95,7 @@ class Spinner:
 
     def __init__(self, node: Node, service_period: float = _SERVICE_PERIOD) -> None:
         """`service_period` is the time in s between turns of the executor in a busy loop."""
-        self._executor = SingleThreadedExecutor()
+        self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
         self._service_period = service_period
         self._busy_until = 0.0
