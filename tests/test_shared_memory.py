@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -121,7 +122,10 @@ def test_no_shared_memory_is_no_error(tmp_path: Path) -> None:
 
 def segments(process: Process) -> set[Path]:
     """The segments that a process holds the locks of."""
-    links = [os.readlink(link) for link in Path(f"/proc/{process.pid}/fd").iterdir()]
+    links = list[str]()
+    for link in Path(f"/proc/{process.pid}/fd").iterdir():
+        with suppress(FileNotFoundError):  # it was closed meanwhile
+            links.append(os.readlink(link))
     locks = [
         link for link in links if re.fullmatch(rf"{DIRECTORY}/fastrtps_[0-9a-f]{{16}}_el", link)
     ]

@@ -96,10 +96,10 @@ def check_tables(connection: sqlite3.Connection) -> None:
     """
     for table in ("messages", "topics", "message_definitions"):
         computed = connection.execute(
-            "SELECT 1 FROM sqlite_master WHERE name = ?1 "
+            "SELECT 1 FROM sqlite_master WHERE name = :table "
             "AND (type <> 'table' OR sql LIKE 'CREATE VIRTUAL%') "
-            "UNION SELECT 1 FROM pragma_table_xinfo(?1) WHERE hidden",
-            (table,),
+            "UNION SELECT 1 FROM pragma_table_xinfo(:table) WHERE hidden",
+            {"table": table},
         )
         if computed.fetchone() is not None:
             raise ValueError(f"its table '{table}' is computed, not stored")
