@@ -177,6 +177,19 @@ def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all() -
     assert answers(3) == once
 
 
+def test_a_state_of_before_is_planned_from_as_if_none_had_followed() -> None:
+    controller, fresh = a_controller(), a_controller()
+    sent = states(controller, 40)
+    first = sent[0].stamp_ns
+    for state in sent[::6]:
+        controller.answer(state, first)
+
+    effort, _ = controller.answer(sent[2], first)
+
+    expected, _ = fresh.answer(sent[2], first)
+    assert effort.tobytes() == expected.tobytes()
+
+
 def test_what_is_done_in_between_is_done_and_changes_nothing() -> None:
     controller, other, done = a_controller(), a_controller(), []
     controller.while_planning(lambda: done.append(0))

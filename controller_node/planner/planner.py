@@ -133,6 +133,8 @@ class PredictivePlanner:
             gains: In force.
             desired_at: The reference.
         """
+        if self._plan is not None and tick < self._plan.tick:
+            self._plan = None  # a state of before comes once more: what was planned since is over
         if self._plan is None or tick >= self._plan.tick + self._settings.period:
             self._plan = self._planned(tick, state, gains, desired_at)
         return np.concatenate((np.zeros(6), self._plan.offset(tick, self._settings.knots)))
