@@ -19,7 +19,7 @@ from controller_node.laws import GainArrays
 from controller_node.planner.anchor import Anchor, Balance, balance_of
 from controller_node.planner.comparison import Comparison
 from controller_node.planner.compiled.draws import normal_draws
-from controller_node.planner.compiled.rollout import Body, Desired
+from controller_node.planner.compiled.rollout import Body, Desired, knot_before
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.rollouts import Rollouts
@@ -54,8 +54,7 @@ class Plan:
 
     def offset(self, tick: int, knot_ticks: int) -> FloatArray:
         """The offset (n - 6,) of a tick, linear between the knots."""
-        knot = tick // knot_ticks
-        share = (tick - knot * knot_ticks) / knot_ticks
+        knot, share = knot_before(tick, knot_ticks)
         before, after = self.offsets[knot - self.first_knot : knot - self.first_knot + 2]
         offset: FloatArray = before + share * (after - before)
         return offset

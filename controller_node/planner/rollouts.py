@@ -14,7 +14,7 @@ from controller_node.planner.compiled.rollout import (
     Desired,
     Engine,
     features_of,
-    knot_weight,
+    knot_before,
     roll_out,
 )
 from controller_node.planner.contact_model import ContactModel
@@ -53,8 +53,9 @@ class Rollouts:
         The features of those that did not are zero.
         """
         ticks = len(desired.positions) - 1
-        last_knot, _ = knot_weight(desired.first_tick + ticks - 1, desired)
-        assert plans.shape[1] >= last_knot + 2  # compiled code does not look
+        last_knot, _ = knot_before(desired.first_tick + ticks - 1, desired.knot_ticks)
+        # compiled code does not look whether the knots are there
+        assert plans.shape[1] >= last_knot + 2 - desired.first_knot
         checks = ticks // desired.check_ticks
         features = np.zeros((len(plans), checks, self._model.feature_count))
         sound = np.zeros(len(plans), dtype=np.bool_)

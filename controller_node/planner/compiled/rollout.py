@@ -60,11 +60,10 @@ class Desired(NamedTuple):
 
 
 @compiled
-def knot_weight(tick: int, desired: Desired) -> tuple[int, float]:
-    """The knot before a tick among those given, and how far it is to the next one, 0 to 1."""
-    knot = tick // desired.knot_ticks
-    share = (tick - knot * desired.knot_ticks) / desired.knot_ticks
-    return knot - desired.first_knot, share
+def knot_before(tick: int, knot_ticks: int) -> tuple[int, float]:
+    """The number of the knot before a tick, and how far the tick is to the next one, 0 to 1."""
+    knot = tick // knot_ticks
+    return knot, (tick - knot * knot_ticks) / knot_ticks
 
 
 @compiled
@@ -132,7 +131,8 @@ def _is_bounded(engine: Engine) -> bool:
 @compiled
 def _set_offset(error: FloatArray, knots: FloatArray, tick: int, desired: Desired) -> None:
     """Write the offset (n,) of a tick."""
-    knot, share = knot_weight(tick, desired)
+    number, share = knot_before(tick, desired.knot_ticks)
+    knot = number - desired.first_knot
     error[:6] = 0.0
     for i in range(knots.shape[1]):
         before = knots[knot, i]
