@@ -16,7 +16,7 @@ class BackPressure:
 
     acknowledged: Callable[[float], bool]  # whether all have all, or get it within so many s
     every_ticks: int = 2000  # between questions; a publisher keeps the last 5000 messages
-    longest: float = 10.0  # s of wall time
+    longest: float = 30.0  # s of wall time
     turn: float = 0.02  # s of it between looks at everything else
     _last_tick: int = 0  # at which they were asked
     _gives_up_at: float = math.inf
