@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from msgs_config.probe import Probe
 from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.tick_clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 
+if TYPE_CHECKING:
+    from controller_node.planner.late_commands import LateCommands  # needs numba
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -40,6 +43,10 @@ class Settings:
 
 class Planner(Protocol):
     """What keeps a motion by offsets to the tracking errors. It remembers the ticks before."""
+
+    @property
+    def late_commands(self) -> "LateCommands":
+        """The commands that have not acted yet."""
 
     def between_rollouts(self, act: Callable[[], None]) -> None:
         """Have something done again and again while it plans."""
@@ -281,13 +288,15 @@ class Controller:
             ConfigurationError: the behaviour needs contacts, and there are none.
         """
         self._enter_episode(episode_ns)
+        tick = self.clock.tick(state.stamp_ns)
+        told, state = state, self._state_then(tick, state)
         next_stamp = self.clock.stamp_ns(self.clock.tick(state.stamp_ns) + 1)
         time, next_time = self._time(state.stamp_ns), self._time(next_stamp)
         now, upcoming = self._reference_at(time), self._reference_at(next_time)
         self._next = next_time, upcoming
         if contacts is None and self.needs_contacts:
             raise ConfigurationError("the behaviour needs the contacts of each state's tick")
-        drive = self._drive_at(state.stamp_ns)
+        drive = self._drive_at(told.stamp_ns)
         directive = self._behaviour.advance(
             Observation(
                 time=time,
@@ -303,7 +312,7 @@ class Controller:
                 assisted=drive.assisted,
             )
         )
-        self._report(directive.phase, state.stamp_ns)
+        self._report(directive.phase, told.stamp_ns)
         instant = Instant(
             time=time,
             position=state.position,
@@ -313,10 +322,21 @@ class Controller:
             response=self._response(time, state, directive.gains),
         )
         effort = self._effort(instant, directive.gains)
-        desired = instant.now
+        if self._planner is not None:
+            self._planner.late_commands.send(tick, effort)
+        desired = instant.now if state is told else self._desired_at(tick - self._episode_tick)
         return effort, StampedReference(
-            state.stamp_ns, desired.configuration.position, desired.velocity
+            told.stamp_ns, desired.configuration.position, desired.velocity
         )
+
+    def _state_then(self, tick: int, state: StampedState) -> StampedState:
+        """The state in which the answer to a tick's state acts, as far as it can be foreseen."""
+        late = None if self._planner is None else self._planner.late_commands
+        if late is None or not late.delay_ticks:
+            return state
+        position, velocity = late.state_then(tick, state.position, state.velocity)
+        stamp_ns = self.clock.stamp_ns(tick + late.delay_ticks)
+        return StampedState(stamp_ns, position, velocity, state.effort)
 
     def _drive_at(self, stamp_ns: int) -> _Drive:
         """What drives it at a stamp: worked out anew where the settings or the strengths change."""

@@ -15,7 +15,7 @@ from controller_node.outputs import Answer, Outputs
 from controller_node.parameters import (
     PARAMETERS,
     character_parameters,
-    check_terrain,
+    check_world,
     commanded_joints,
     make_controller,
     make_settings,
@@ -185,7 +185,7 @@ class ControllerNode(Node):
                 f"than '{self._character.name}'; set 'character' to the simulator's"
             )
         self._controller.check_agreement(simulator.probe)
-        check_terrain(self._values, simulator.parameters.get("terrain"))
+        check_world(self._values, simulator.parameters)
         for name in ("rate", "placement"):
             its, own = simulator.parameters.get(name), self._values[name]
             if its != own:

@@ -21,13 +21,20 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Parameter, Values
 from msgs_config.session import SESSION
-from msgs_config.shared_parameters import CHARACTER, GRAVITY, PLACEMENT, RATE
+from msgs_config.shared_parameters import (
+    CHARACTER,
+    COMMAND_DELAY,
+    GRAVITY,
+    PLACEMENT,
+    RATE,
+)
 
 PARAMETERS = [
     CHARACTER,
     PLACEMENT,
     RATE,
     GRAVITY,
+    COMMAND_DELAY,
     Parameter("law", "stable_pd", "the control law", choices=LAWS, live=True),
     Parameter(
         "feedforward", "", "the law feedforward's CSV file: time_s and degrees of freedom's efforts"
@@ -204,13 +211,13 @@ def make_controller(character: Character, reference: Reference, values: Values) 
     )
 
 
-def check_terrain(values: Values, terrain: object) -> None:
-    """Raise ConfigurationError if the parameters' values do not go with a simulator's terrain.
+def check_world(values: Values, simulator: Mapping[str, object]) -> None:
+    """Raise ConfigurationError if the parameters' values do not go with a simulator's.
 
-    `terrain` is the simulator's parameter, None if unknown.
+    A parameter that is not among the simulator's is taken as one that goes with them.
     """
-    behaviour_settings.check_terrain(values.text("behaviour"), terrain)
-    planner_settings.check_terrain(values.text("planner"), terrain)
+    behaviour_settings.check_terrain(values.text("behaviour"), simulator.get("terrain"))
+    planner_settings.check_world(values, simulator)
 
 
 def make_planner(character: Character, values: Values) -> Planner | None:

@@ -20,7 +20,8 @@ from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, as_values
 from sim_node.probe import measure_probe
 
-SHARED = ("rate", "gravity", "placement")  # the same on both sides; set on one, they count on both
+SHARED = ("rate", "gravity", "placement", "command_delay_ticks")
+"""The same on both sides; set on one, they count on both."""
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
@@ -90,7 +91,7 @@ def make_plan(
         **as_values(motion.first_state()),
     }
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
-    controller_parameters.check_terrain(controller, simulator.text("terrain"))
+    controller_parameters.check_world(controller, simulator)
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
     notes = character.notes + motion.notes

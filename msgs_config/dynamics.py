@@ -190,11 +190,11 @@ class DynamicsModel:
 
 def quaternion_starts(model: mujoco.MjModel) -> list[int]:
     """First entry of each quaternion among MuJoCo's positions."""
-    before = {mujoco.mjtJoint.mjJNT_BALL: 0, mujoco.mjtJoint.mjJNT_FREE: 3}
+    before = {int(mujoco.mjtJoint.mjJNT_BALL): 0, int(mujoco.mjtJoint.mjJNT_FREE): 3}
     return [
-        int(address) + before[kind]
+        int(address) + before[int(kind)]
         for address, kind in zip(model.jnt_qposadr, model.jnt_type, strict=True)
-        if kind in before
+        if int(kind) in before
     ]
 
 

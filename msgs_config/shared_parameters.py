@@ -14,6 +14,12 @@ CHARACTER = Parameter(
 )
 RATE = Parameter("rate", 240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000)
 GRAVITY = Parameter("gravity", 9.81, "gravity along -z", unit="m/s^2", maximum=1000.0)
+COMMAND_DELAY = Parameter(
+    "command_delay_ticks",
+    0,
+    "a command is applied this many ticks late; a planner counts with it",
+    maximum=100_000,
+)
 PLACEMENT = Parameter(
     "placement",
     [0.0, 0.0, 0.0, 0.0],

@@ -13,6 +13,7 @@ from msgs_config.parameters import Parameter, Value, Values, resolve
 from msgs_config.session import SESSION
 from msgs_config.shared_parameters import (
     CHARACTER,
+    COMMAND_DELAY,
     GRAVITY,
     NO_GROUND,
     PLACEMENT,
@@ -45,9 +46,7 @@ WORLD_PARAMETERS = [
     Parameter("terrain", PLANE, "the ground: plane, none, or the path of a URDF"),
     Parameter("solver_iterations", 10, "contact solver iterations a step", minimum=1, maximum=1000),
     Parameter("speed_limit", 500.0, "a speed beyond it is a divergence", unit="rad/s or m/s"),
-    Parameter(
-        "command_delay_ticks", 0, "a command is applied this many ticks late", maximum=100_000
-    ),
+    COMMAND_DELAY,
     Parameter(
         "mode",
         "lockstep",

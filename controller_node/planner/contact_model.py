@@ -73,6 +73,12 @@ class ContactModel:
         mujoco.mj_integratePos(self._model, found, position, 1.0)
         return found
 
+    def message_position(self, position: FloatArray) -> FloatArray:
+        """A position (n,), message form, of what MuJoCo has (q,)."""
+        found = np.zeros(self._model.nv)
+        mujoco.mj_differentiatePos(self._model, found, 1.0, self._identity, position)
+        return found
+
     def body(self, gains: GainArrays) -> Body:
         """What rollouts need of the character and its gains; the root's do not count."""
         layout = self._character.layout

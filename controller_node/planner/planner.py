@@ -21,6 +21,7 @@ from controller_node.planner.comparison import Comparison
 from controller_node.planner.compiled.draws import normal_draws
 from controller_node.planner.compiled.rollout import Body, Desired, knot_before
 from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.late_commands import LateCommands
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.rollouts import Rollouts
 from controller_node.planner.search import Found, Problem, improve
@@ -92,6 +93,7 @@ class PredictivePlanner:
             character, period_s=1.0 / rate_hz, gravity=gravity, friction=settings.friction
         )
         self._rollouts = Rollouts(self._model, settings.workers)
+        self.late_commands = LateCommands(character, self._model, settings.delay)
         self._comparison = Comparison(character, self._model, settings)
         self._rate_hz = rate_hz
         self._unit = settings.noise * settings.sigma  # (n - 6,) of what is looked for
@@ -116,6 +118,7 @@ class PredictivePlanner:
         self._plan = None
         self._anchor = Anchor()
         self._targets.clear()
+        self.late_commands.forget()
 
     def change_reference(self) -> None:
         """Say that the reference is another one from now on; the plan stays."""
@@ -128,7 +131,7 @@ class PredictivePlanner:
 
         Args:
             tick: Of the state, since the episode began.
-            state: What the controller was told.
+            state: In which the offset acts.
             gains: In force.
             desired_at: The reference.
         """

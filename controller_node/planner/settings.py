@@ -1,6 +1,7 @@
 """The parameters of the planner, checked."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.joint_layout import JointType
 from msgs_config.parameters import Parameter, Values
-from msgs_config.shared_parameters import PLANE
+from msgs_config.shared_parameters import COMMAND_DELAY, PLANE
 
 NO_PLANNER = "none"
 PREDICTIVE = "predictive"
@@ -68,6 +69,7 @@ class PlannerSettings:
     horizon: int
     period: int
     knots: int
+    delay: int  # until a command acts
     samples: int
     noise: float
     seed: int
@@ -107,10 +109,17 @@ def make_settings(character: Character, values: Values) -> PlannerSettings | Non
             f"parameter 'plan.horizon' is {values.number('plan.horizon'):g}; it must be "
             f"plan.period, {values.number('plan.period'):g} s, or more"
         )
+    delay = values.integer(COMMAND_DELAY.name)
+    if delay >= horizon:
+        raise ConfigurationError(
+            f"parameter '{COMMAND_DELAY.name}' is {delay}; with planner 'predictive' it must be "
+            f"less than plan.horizon, {horizon} ticks"
+        )
     return PlannerSettings(
         horizon=horizon - horizon % period,
         period=period,
         knots=knots,
+        delay=delay,
         samples=values.integer("plan.samples"),
         noise=values.number("plan.noise"),
         seed=values.integer("plan.seed"),
@@ -121,15 +130,22 @@ def make_settings(character: Character, values: Values) -> PlannerSettings | Non
     )
 
 
-def check_terrain(planner: str, terrain: object) -> None:
-    """Raise ConfigurationError if the model of the world lacks a simulator's ground.
-
-    `terrain` is the simulator's parameter, None if unknown.
-    """
-    if planner == PREDICTIVE and terrain not in (None, PLANE):
+def check_world(values: Values, simulator: Mapping[str, object]) -> None:
+    """Raise ConfigurationError if the model of the world is not of a simulator's parameters."""
+    if values.text("planner") != PREDICTIVE:
+        return
+    terrain = simulator.get("terrain", PLANE)
+    if terrain != PLANE:
         raise ConfigurationError(
             f"planner 'predictive' knows the ground at z = 0 alone, but sim_node's 'terrain' is "
             f"{terrain}; it must be {PLANE}"
+        )
+    own = values.integer(COMMAND_DELAY.name)
+    delay = simulator.get(COMMAND_DELAY.name, own)
+    if delay != own:
+        raise ConfigurationError(
+            f"planner 'predictive' counts with '{COMMAND_DELAY.name}' {own}, but sim_node's is "
+            f"{delay}; it must be the same"
         )
 
 

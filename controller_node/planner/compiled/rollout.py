@@ -89,20 +89,8 @@ def roll_out(
     """
     n = len(start_velocity)
     room = Room(np.empty(n), np.empty(n), np.empty(n), np.empty_like(engine.mass), np.empty(n))
-    bounds = PassedBounds(
-        np.empty((MOST_BOUNDS, n)),
-        np.empty(MOST_BOUNDS),
-        np.empty(MOST_BOUNDS),
-        np.empty((MOST_BOUNDS, MOST_BOUNDS)),
-        np.empty((MOST_BOUNDS, MOST_BOUNDS + 1)),
-        np.empty(MOST_BOUNDS),
-        np.empty(MOST_BOUNDS, np.bool_),
-        np.empty(MOST_BOUNDS, np.intp),
-        np.empty(n),
-    )
-    engine.position[:] = start_position
-    engine.velocity[:] = start_velocity
-    engine.warm_start[:] = 0.0
+    bounds = _room_for_bounds(n)
+    _begin(start_position, start_velocity, engine)
     ticks = len(desired.positions) - 1
     for tick in range(ticks + 1):
         step_before_forces(engine.model, engine.data)
@@ -117,6 +105,53 @@ def roll_out(
                 return False  # before MuJoCo writes a warning
             step_after_forces(engine.model, engine.data)
     return True
+
+
+@compiled
+def let_act(
+    start_position: FloatArray,
+    start_velocity: FloatArray,
+    efforts: FloatArray,
+    body: Body,
+    engine: Engine,
+) -> bool:
+    """Simulate ticks in which given efforts (ticks, n) act; whether that went well.
+
+    The engine's position and velocity are the result.
+    """
+    bounds = _room_for_bounds(len(start_velocity))
+    _begin(start_position, start_velocity, engine)
+    for tick in range(len(efforts)):
+        step_before_forces(engine.model, engine.data)
+        engine.applied[:] = efforts[tick]
+        _add_passive(body, engine, bounds)
+        if not _is_bounded(engine):
+            return False  # before MuJoCo writes a warning
+        step_after_forces(engine.model, engine.data)
+    return _is_bounded(engine)
+
+
+@compiled
+def _begin(position: FloatArray, velocity: FloatArray, engine: Engine) -> None:
+    """Put it into a state, with nothing left of what it did before."""
+    engine.position[:] = position
+    engine.velocity[:] = velocity
+    engine.warm_start[:] = 0.0
+
+
+@compiled
+def _room_for_bounds(n: int) -> PassedBounds:
+    return PassedBounds(
+        np.empty((MOST_BOUNDS, n)),
+        np.empty(MOST_BOUNDS),
+        np.empty(MOST_BOUNDS),
+        np.empty((MOST_BOUNDS, MOST_BOUNDS)),
+        np.empty((MOST_BOUNDS, MOST_BOUNDS + 1)),
+        np.empty(MOST_BOUNDS),
+        np.empty(MOST_BOUNDS, np.bool_),
+        np.empty(MOST_BOUNDS, np.intp),
+        np.empty(n),
+    )
 
 
 @compiled
@@ -152,17 +187,23 @@ def _apply(
     applied, velocity, tree = engine.applied, engine.velocity, body.tree
     add_errors(room.error, engine.position, target, body.joints)
     stable_pd(applied, velocity, target_velocity, engine.bias, engine.mass, tree, body.law, room)
-    for i in range(len(velocity)):
-        applied[i] -= body.law.passive_damping[i] * velocity[i]
+    _add_passive(body, engine, bounds)
+
+
+@compiled
+def _add_passive(body: Body, engine: Engine, bounds: PassedBounds) -> None:
+    """Add what the passive damping and the soft limits do to the applied forces."""
+    for i in range(len(engine.velocity)):
+        engine.applied[i] -= body.law.passive_damping[i] * engine.velocity[i]
     add_soft_limits(
-        applied,
+        engine.applied,
         engine.position,
-        velocity,
+        engine.velocity,
         body.law.period,
         body.limits,
         engine.factor,
         engine.inverse_diagonal,
-        tree,
+        body.tree,
         bounds,
     )
 

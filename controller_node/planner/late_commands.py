@@ -1,0 +1,55 @@
+"""Commands that act late: the state in which one that is given now will act.
+
+Between a state and the tick in which its answer acts, the commands of the ticks before act. They
+are known, so that the model of the world foresees that state, and plan and law work for it. (Smith
+1957, "Closer Control of Loops with Dead Time".)
+"""
+
+import numpy as np
+
+from controller_node.laws import GainArrays
+from controller_node.planner.compiled.rollout import let_act
+from controller_node.planner.contact_model import ContactModel
+from msgs_config.arrays import FloatArray
+from msgs_config.character import Character
+
+
+class LateCommands:
+    """The commands on their way, which take a number of ticks. It remembers them."""
+
+    def __init__(self, character: Character, model: ContactModel, delay_ticks: int) -> None:
+        """Build the model of the world once more; the first time it is compiled."""
+        size = character.layout.size
+        nothing = np.zeros(size)
+        gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
+        self.delay_ticks = delay_ticks
+        self._model, self._engine, self._body = model, model.engine(), model.body(gains)
+        self._sent: dict[int, FloatArray] = {}  # (n,) by the tick of the state that it answers
+        self._nothing = nothing  # what acts before the first command
+        self.state_then(0, np.array(character.rest_position), nothing)
+
+    def forget(self) -> None:
+        """Begin with no command on its way."""
+        self._sent.clear()
+
+    def send(self, tick: int, effort: FloatArray) -> None:
+        """Remember the effort (n,) that answers the state of a tick."""
+        self._sent[tick] = effort
+        for old in [sent for sent in self._sent if sent <= tick - self.delay_ticks]:
+            del self._sent[old]
+
+    def state_then(
+        self, tick: int, position: FloatArray, velocity: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Position and velocity (n,) in which the answer to a tick's state will act.
+
+        Where the model diverges it is the state itself.
+        """
+        if not self.delay_ticks:
+            return position, velocity
+        due = range(tick - self.delay_ticks, tick)
+        efforts = np.array([self._sent.get(each, self._nothing) for each in due])
+        start = self._model.position_of(position)
+        if not let_act(start, velocity.copy(), efforts, self._body, self._engine):
+            return position, velocity
+        return self._model.message_position(self._engine.position), self._engine.velocity.copy()
