@@ -13,6 +13,7 @@ from rich.console import Console  # noqa: E402 - after the limit on threads
 from benchmarks.control_law import measure_control_laws  # noqa: E402
 from benchmarks.cost import measure_cost  # noqa: E402
 from benchmarks.lockstep import measure_lockstep  # noqa: E402
+from benchmarks.planning import measure_planning  # noqa: E402
 from benchmarks.ratios import compare, comparison_table, read_ratios, store_ratios  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
 from benchmarks.recorder import measure_recorder  # noqa: E402
@@ -27,6 +28,7 @@ _MEASUREMENTS = {
     "laws": measure_control_laws,
     "search": measure_search,
     "cost": measure_cost,
+    "planning": measure_planning,
     "realtime": measure_realtime,
     "samcon": measure_samcon,
     "recorder": measure_recorder,

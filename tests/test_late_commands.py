@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from physics import character, simulation
 
+from controller_node.parameters import make_controller
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.late_commands import LateCommands
 from experiment.loop import ticks_in_process
@@ -57,6 +58,18 @@ def test_in_the_air_the_state_is_foreseen_in_which_a_command_acts() -> None:
             run.advance(effort)
 
     assert max(abs(state.velocity)) > 1.0
+
+
+def test_a_state_that_comes_again_is_answered_alike() -> None:
+    plan = walk(0.1, command_delay_ticks=2)
+    controller = make_controller(HUMANOID, plan.reference, plan.controller)
+    states = [tick.state for tick in ticks_in_process(plan)][:8]
+
+    for state in states:
+        once, reference = controller.answer(state, states[0].stamp_ns)
+        again, _ = controller.answer(state, states[0].stamp_ns)
+        assert again.tobytes() == once.tobytes()
+        assert reference.stamp_ns == state.stamp_ns
 
 
 def test_what_diverges_is_not_foreseen() -> None:

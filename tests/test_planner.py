@@ -4,14 +4,16 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from physics import character
+from rclpy.serialization import serialize_message
 from ros import stamp_ns
+from sensor_msgs.msg import PointCloud2
 
 from controller_node.controller import Controller
 from controller_node.motion import make_motion
@@ -19,12 +21,15 @@ from controller_node.parameters import PARAMETERS, character_parameters, make_co
 from controller_node.plan_message import plan_message
 from controller_node.planner import gauss_newton
 from controller_node.planner.search import Problem, improve
+from experiment.bags.plans import decode_plan
+from experiment.bags.recording import Recording, read_recording
 from experiment.loop import ticks_in_process
 from experiment.metrics import StateHash
 from experiment.plan import make_plan
+from experiment.report.sections import CharacterReport
 from msgs_config.arrays import FloatArray
 from msgs_config.dynamics import DynamicsModel
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.parameters import resolve
 from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import TickClock
@@ -343,3 +348,57 @@ def test_over_topics_it_has_the_states_that_it_has_in_one_process(tmp_path: Path
     assert not done.returncode, done.stderr
     summary = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))
     assert summary["state_hash"] == states_of(0.2)
+    check_plans(read_recording(tmp_path / "run"))
+
+
+def check_plans(recording: Recording) -> None:
+    """What its plans said is in the recording, and beside what came of it in the report."""
+    plans = recording.plans
+    assert [plan.stamp_ns for plan in plans] == recording.stamps_ns[::12].tolist()
+    model, nothing = DynamicsModel(recording.character), np.zeros(recording.layout.size)
+    errors = []
+    for plan in plans[:-1]:  # the last one is of the last state
+        np.testing.assert_allclose(plan.times, 0.05 * np.arange(1, 7))
+        row = recording.stamps_ns.tolist().index(plan.stamp_ns) + 12
+        model.update(recording.position[row], nothing)
+        errors.append(np.linalg.norm(plan.centres[0] - model.centre_of_mass()))
+    assert max(errors) < 0.02
+
+    (section,) = (each for each in CharacterReport(recording).sections() if each.title == "plans")
+
+    (table,), (picture,) = section.tables, section.illustrations
+    after, mean, _, largest = table.rows[0]
+    assert after == "0.05"
+    assert float(mean) == pytest.approx(np.mean(errors), rel=1e-3)
+    assert float(largest) == pytest.approx(max(errors), rel=1e-3)
+    assert picture.png.startswith(b"\x89PNG")
+
+
+BROKEN: dict[str, Callable[[PointCloud2], None]] = {
+    "a field is missing": lambda message: message.fields.pop(),
+    "a field is a float": lambda message: setattr(message.fields[0], "datatype", 7),
+    "its data are short": lambda message: setattr(message, "data", message.data[:-8]),
+    "its points are short": lambda message: setattr(message, "point_step", 8),
+    "it has no points": lambda message: (
+        setattr(message, "width", 0),
+        setattr(message, "data", b""),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_what_is_no_plan_is_not_read_as_one(case: str) -> None:
+    controller = a_controller()
+    (state,) = states(controller, 1)
+    controller.answer(state, state.stamp_ns)
+    assert controller.outlook is not None
+    message = plan_message(controller.outlook, state.stamp_ns)
+    whole = decode_plan(serialize_message(message))
+    BROKEN[case](message)
+
+    with pytest.raises(MessageError, match="a plan"):
+        decode_plan(serialize_message(message))
+
+    assert whole.stamp_ns == state.stamp_ns
+    np.testing.assert_array_equal(whole.centres, controller.outlook.centres)
+    np.testing.assert_array_equal(whole.costs, controller.outlook.costs)

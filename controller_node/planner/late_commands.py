@@ -33,9 +33,9 @@ class LateCommands:
         self._sent.clear()
 
     def send(self, tick: int, effort: FloatArray) -> None:
-        """Remember the effort (n,) that answers the state of a tick."""
+        """Remember the effort (n,) that answers the state of a tick, which may come once more."""
         self._sent[tick] = effort
-        for old in [sent for sent in self._sent if sent <= tick - self.delay_ticks]:
+        for old in [sent for sent in self._sent if sent < tick - self.delay_ticks]:
             del self._sent[old]
 
     def state_then(

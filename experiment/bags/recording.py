@@ -8,11 +8,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from experiment.bags.plans import PlanArrays
 from experiment.bags.reader import read_messages
 from experiment.bags.rebuilding import RecordedWorld
 from experiment.bags.tracks import (
     CONFIGURATION,
     MODE,
+    PLAN,
     CommandArrays,
     ControllerSettings,
     ModeChange,
@@ -47,6 +49,7 @@ _READ = (
     topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name,
     topics.REFERENCE.of(topics.CONTROLLER_NODE).name,
     MODE,
+    PLAN,
     topics.JOINT_STATES.name,
     topics.JOINT_TORQUES.name,
     topics.CONTACTS.name,
@@ -82,6 +85,7 @@ class Recording:
     commands: tuple[tuple[CommandArrays, ...], ...]  # (t + 1,): that answer each state, in order
     controller: tuple[ControllerSettings, ...] = ()  # one after another
     modes: tuple[ModeChange, ...] = ()  # what it did, one after another
+    plans: tuple[PlanArrays, ...] = ()  # what a planner expected, one after another
     unstamped_commands: tuple[CommandArrays, ...] = ()  # that answer no state, in real time
     pushes_sent: int = 0  # messages on `external_wrench`
     throws: tuple[tuple[Throw, ...], ...] = ()  # (t,): what each tick began with; () if nothing
@@ -249,7 +253,7 @@ def _recording(track: Track, worlds: Mapping[str, WorldTrack]) -> Recording:
     stamps = integers(states.stamps_ns)
     count = len(stamps)
     reference_position, reference_velocity = _references(stamps, track)
-    world = worlds.get(rebuilt.world.namespace, WorldTrack())
+    world, known = worlds.get(rebuilt.world.namespace, WorldTrack()), set(stamps.tolist())
     return Recording(
         character=rebuilt.character,
         name=track.namespace,
@@ -267,6 +271,7 @@ def _recording(track: Track, worlds: Mapping[str, WorldTrack]) -> Recording:
         commands=tuple(tuple(track.commands.get(stamp, ())) for stamp in stamps.tolist()),
         controller=tuple(track.controller),
         modes=tuple(track.modes),
+        plans=tuple(plan for stamp, plan in sorted(track.plans.items()) if stamp in known),
         unstamped_commands=tuple(track.commands.get(0, ())),
         pushes_sent=track.pushes_sent,
         throws=_throws(stamps, world),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from std_msgs.msg import String
 
+from experiment.bags.plans import PlanArrays, decode_plan
 from experiment.bags.rebuilding import Rebuilt, rebuild
 from msgs_config import topics
 from msgs_config.arrays import FloatArray, IntArray
@@ -23,6 +24,7 @@ from msgs_config.wrench_messages import WrenchArrays, decode_wrenches
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 _CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name
 MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
+PLAN = topics.PLAN.of(topics.CONTROLLER_NODE).name
 _REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
 _MOST_EARLY = 50_000  # messages before the configuration, which is latched and comes first
 _MOST_NAMED = 3  # gaps
@@ -93,6 +95,7 @@ class Track:
         self.commands: dict[int, list[CommandArrays]] = {}
         self.controller: list[ControllerSettings] = []
         self.modes: list[ModeChange] = []
+        self.plans: dict[int, PlanArrays] = {}
         self.pushes_sent = 0
         self._controller_text = self._configuration_text = ""
         self._early: list[tuple[str, bytes, int]] = []
@@ -110,6 +113,7 @@ class Track:
             _REFERENCE: self._take_reference,
             _CONTROLLER: self._take_controller,
             MODE: self._take_mode,
+            PLAN: self._take_plan,
         }
 
     @property
@@ -240,6 +244,11 @@ class Track:
                 dict(content["parameters"]), content.get("parameters_after_stamp_ns")
             )
             self.controller.append(settings)
+
+    def _take_plan(self, raw: bytes, published_ns: int) -> None:
+        with suppress(MessageError):  # of another controller
+            plan = decode_plan(raw)
+            self.plans[plan.stamp_ns] = plan
 
     def _take_mode(self, raw: bytes, published_ns: int) -> None:
         with suppress(ValueError, KeyError, TypeError, RecursionError):  # of another controller

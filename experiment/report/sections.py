@@ -27,6 +27,7 @@ from experiment.report.measures import (
     weight,
 )
 from experiment.report.page import Illustration, Section, Table
+from experiment.report.planning import foresight, plan_chart
 from experiment.report.reactions import (
     TRACK,
     mode_line,
@@ -41,7 +42,7 @@ from msgs_config.errors import ActuatedCharactersError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NAMES = ("strip", "errors", "efforts", "root", "contacts", "ticks")
+NAMES = ("strip", "errors", "efforts", "root", "contacts", "plans", "ticks")
 """Of the pictures, in their order."""
 
 STILLS = 8
@@ -86,6 +87,7 @@ class CharacterReport:
             self._efforts(),
             self._root(),
             self._contacts(),
+            *([self._plans()] if self._recording.plans else []),
             self._ticks(),
             self._events(),
         ]
@@ -217,6 +219,18 @@ class CharacterReport:
         ]
         table = Table(rows, ("link", "of all ticks"), "links that touched something")
         return Section(title, [self._drawn(figure, "contacts", text)], [table])
+
+    def _plans(self) -> Section:
+        seen = foresight(self._recording)
+        rows = [
+            (f"{ahead:.2f}", *_statistics(errors))
+            for ahead, errors in zip(seen.ahead, seen.errors.T, strict=True)
+        ]
+        columns = ("after (s)", "mean", f"{_PERCENTILE} %", "largest")
+        table = Table(rows, columns, "centre of mass, off where a plan had foreseen it (m)")
+        figure = plan_chart(self._recording, self._marks)
+        text = "where each plan was to lead, where it led, and what plans cost"
+        return Section("plans", [self._drawn(figure, "plans", text)], [table])
 
     def _ticks(self) -> Section:
         title, recording = "tick times", self._recording

@@ -9,6 +9,8 @@ from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 
 _PAUSE_FACTOR = 10.0  # of the usual time between two states ...
 _LEAST_PAUSE = 0.1  # s ... and at least so long
+_MANY = 100  # states; of so many the longest are usual that come more often than ...
+_USUAL = 95  # ... in all but this percentage: at every twelfth state a planner takes its time
 _LONGEST_BACKLOG = 0.1  # s that the simulator catches up with; beyond it its schedule begins anew
 
 
@@ -56,7 +58,8 @@ def pauses(published_ns: IntArray) -> IntArray:
     steps = wall_steps(published_ns)
     if not len(steps):
         return np.zeros(0, dtype=np.intp)
-    longest = max(_LEAST_PAUSE, _PAUSE_FACTOR * float(np.median(steps)))
+    usual = float(np.percentile(steps, _USUAL if len(steps) >= _MANY else 50))
+    longest = max(_LEAST_PAUSE, _PAUSE_FACTOR * usual)
     return np.flatnonzero(steps > longest)
 
 
