@@ -82,7 +82,7 @@ def test_an_ensemble_that_spans_all_takes_the_step_of_gauss_and_newton() -> None
     whole = np.concatenate((jacobian, np.sqrt(0.3) * np.eye(4)))
     here = np.concatenate((residuals, np.sqrt(0.3) * place))
 
-    step = gauss_newton.ensemble_step(distances, distances @ whole.T, here, 0.7)
+    (step,) = gauss_newton.ensemble_steps(distances, distances @ whole.T, here, (0.7,))
 
     expected = np.linalg.solve(
         jacobian.T @ jacobian + (0.3 + 0.7) * np.eye(4), -(jacobian.T @ residuals + 0.3 * place)

@@ -252,6 +252,7 @@ def test_products_and_systems_are_those_of_linear_algebra() -> None:
     right: Any = draw.normal(size=(7, 3))
 
     np.testing.assert_allclose(linear.product(a, b), a @ b, rtol=1e-12)
+    np.testing.assert_allclose(linear.times(a, b[:, 0].copy()), a @ b[:, 0], rtol=1e-12)
     np.testing.assert_allclose(linear.gram(a), a @ a.T, rtol=1e-12)
     expected = np.linalg.solve(a @ a.T + 0.1 * np.eye(7), right)
     np.testing.assert_allclose(linear.solve(linear.gram(a), 0.1, right), expected, rtol=1e-10)

@@ -21,7 +21,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character import Character, Shape, ShapeType
 from msgs_config.dynamics import add_links, compile_exactly, quaternion_starts
 
-_SOLVER_ITERATIONS = 10
+_SOLVER_ITERATIONS = 6
 _CONTACT = (0.01, 1.0)  # time constant in s and damping ratio of contacts and of hinges' limits
 
 _GEOMETRIES = {

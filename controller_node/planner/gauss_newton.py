@@ -24,23 +24,28 @@ _RIDGE = 20.0  # of a correction, in the samples' variance
 _FIRST_RIDGE = 1e-6  # of the first sensitivities, for each of what is looked for
 
 
-def ensemble_step(
-    distances: FloatArray, changes: FloatArray, residuals: FloatArray, damping: float
-) -> FloatArray:
-    """The step (d,) of an ensemble.
+def ensemble_steps(
+    distances: FloatArray,
+    changes: FloatArray,
+    residuals: FloatArray,
+    dampings: tuple[float, ...],
+) -> list[FloatArray]:
+    """The steps (d,) of an ensemble, one for each lambda.
 
     Args:
-        distances: Of the samples (s, d) from where the step begins.
+        distances: Of the samples (s, d) from where the steps begin.
         changes: Of the samples' residuals (s, m), with those of large x among them.
-        residuals: Where the step begins (m,), likewise.
-        damping: lambda.
+        residuals: Where the steps begin (m,), likewise.
+        dampings: lambda.
     """
-    count = len(distances)
-    scaled = changes / math.sqrt(count)
-    slopes = linear.product(scaled, residuals[:, np.newaxis])
-    shares = linear.solve(linear.gram(scaled), damping, slopes)
-    step: FloatArray = linear.product(_transposed(distances), shares)[:, 0]
-    return -step / math.sqrt(count)
+    root = math.sqrt(len(distances))
+    scaled, across = changes / root, _transposed(distances) / root
+    slopes = linear.times(scaled, residuals)[:, np.newaxis]
+    products = linear.gram(scaled)
+    return [
+        -linear.times(across, linear.solve(products, damping, slopes)[:, 0].copy())
+        for damping in dampings
+    ]
 
 
 def corrected_sensitivities(
@@ -77,7 +82,7 @@ def sensitivity_steps(
         penalty: p, what large x cost.
         dampings: lambda.
     """
-    slopes = linear.product(sensitivities, residuals[:, np.newaxis]) + penalty * place[:, None]
+    slopes = (linear.times(sensitivities, residuals) + penalty * place)[:, np.newaxis]
     products = linear.gram(sensitivities)
     return [-linear.solve(products, penalty + damping, slopes)[:, 0] for damping in dampings]
 

@@ -84,7 +84,7 @@ def _ensemble_steps(
     root = math.sqrt(problem.penalty)
     whole = np.concatenate((changes, root * distances), axis=1)
     here = np.concatenate((residuals, root * place))
-    return [gauss_newton.ensemble_step(distances, whole, here, each) for each in _DAMPINGS]
+    return gauss_newton.ensemble_steps(distances, whole, here, _DAMPINGS)
 
 
 def _within(problem: Problem, places: FloatArray) -> FloatArray:

@@ -30,23 +30,61 @@ def dot(a: FloatArray, b: FloatArray) -> float:
 @compiled
 def gram(rows: FloatArray) -> FloatArray:
     """The scalar products (r, r) of rows (r, m) with each other."""
-    count = len(rows)
-    products = np.empty((count, count))
+    count, length = rows.shape
+    columns, products = rows.T.copy(), np.zeros((count, count))
+    whole = length - length % 4
+    for k in range(0, whole, 4):
+        one, two, three, four = columns[k], columns[k + 1], columns[k + 2], columns[k + 3]
+        for i in range(count):
+            _add_four(
+                products[i, : i + 1], one[i], one, two[i], two, three[i], three, four[i], four
+            )
+    for k in range(whole, length):
+        for i in range(count):
+            _subtract(products[i, : i + 1], -columns[k, i], columns[k])
     for i in range(count):
-        for j in range(i + 1):
-            products[i, j] = products[j, i] = dot(rows[i], rows[j])
+        products[:i, i] = products[i, :i]
     return products
+
+
+@compiled
+def _add_four(
+    row: FloatArray,
+    a: float,
+    one: FloatArray,
+    b: float,
+    two: FloatArray,
+    c: float,
+    three: FloatArray,
+    d: float,
+    four: FloatArray,
+) -> None:
+    """Add `a one + b two + c three + d four`, entry by entry; they may be longer than the row."""
+    for k in range(len(row)):
+        row[k] += (a * one[k] + b * two[k]) + (c * three[k] + d * four[k])
+
+
+@compiled
+def times(a: FloatArray, b: FloatArray) -> FloatArray:
+    """The product (i,) of a matrix (i, j) and a vector (j,)."""
+    result = np.empty(len(a))
+    for i in range(len(a)):
+        result[i] = dot(a[i], b)
+    return result
 
 
 @compiled
 def product(a: FloatArray, b: FloatArray) -> FloatArray:
     """The matrix product (i, k) of matrices (i, j) and (j, k)."""
-    result = np.zeros((a.shape[0], b.shape[1]))
+    result, length = np.zeros((a.shape[0], b.shape[1])), a.shape[1]
+    whole = length - length % 4
     for i in range(a.shape[0]):
-        for j in range(a.shape[1]):
-            factor = a[i, j]
-            for k in range(b.shape[1]):
-                result[i, k] += factor * b[j, k]
+        row, factors = result[i], a[i]
+        for j in range(0, whole, 4):
+            f, g, h, s = factors[j], factors[j + 1], factors[j + 2], factors[j + 3]
+            _add_four(row, f, b[j], g, b[j + 1], h, b[j + 2], s, b[j + 3])
+        for j in range(whole, length):
+            _subtract(row, -factors[j], b[j])
     return result
 
 
