@@ -52,7 +52,7 @@ other-numpy: .venv/.installed-test ## Compare the golden runs with the oldest an
 	    PYTHONPATH=build/numpy $(BIN)/python -m pytest -q -n auto tests/test_golden_hashes.py || exit 1; \
 	done
 
-bench: .venv/.installed ## Measure speed; ratios that got worse are red
+bench: .venv/.installed-test ## Measure speed; ratios that got worse are red
 	$(BIN)/python -m benchmarks
 
 soak: .venv/.installed ## Run 500,000 ticks with disturbances; no tick lost, no memory grown

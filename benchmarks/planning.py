@@ -80,7 +80,7 @@ class _World:
         character = plan.character
         settings = planner_settings.make_settings(character, plan.controller)
         assert settings is not None
-        self._plan, self._friction = plan, settings.friction
+        self._plan = plan
         self._control = make_control(character, plan.controller)
         self._model = ContactModel(
             character, period_s=1.0 / _RATE, gravity=9.81, friction=settings.friction

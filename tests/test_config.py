@@ -44,7 +44,13 @@ NODES = {  # full names of the nodes that each file is for
     "pendulum.yaml": [SIMULATOR, CONTROLLER],
     "two_humanoids.yaml": [SIMULATOR, *(f"/{side}{CONTROLLER}" for side in SIDES)],
 }
-SHARED = ("character", "rate", "gravity", "placement")  # must be the same on both sides
+SHARED = (
+    "character",
+    "rate",
+    "gravity",
+    "placement",
+    "command_delay_ticks",
+)  # must be the same on both sides
 A_FEW_TICKS = 20
 LONG = 120.0  # s that a run may take: a node that was killed before stays in the graph for 20 s
 TICKS = 240  # within which two humanoids have met

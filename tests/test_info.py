@@ -338,6 +338,16 @@ def test_after_a_long_delay_the_schedule_begins_anew() -> None:
     np.testing.assert_allclose(late, [0.0, 0.0, 0.0, 0.2, 0.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("every", [12, 24, 48])
+def test_what_takes_long_again_and_again_is_no_pause(every: int) -> None:
+    steps = np.full(960, 0.003)
+    steps[::every] = 0.4  # a planner
+    steps[500] = 9.0
+    published = START_NS + np.round(1e9 * np.cumsum(np.append(0.0, steps))).astype(np.intp)
+
+    assert pauses(published).tolist() == [500]
+
+
 def test_a_pause_makes_no_tick_late() -> None:
     times = np.concatenate((np.arange(10) * 0.01, 5.0 + np.arange(10) * 0.01))
     published = START_NS + np.round(1e9 * times).astype(np.intp)

@@ -1,17 +1,25 @@
 """Commands that act late: what is foreseen, and a motion that a planner keeps all the same."""
 
-from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from physics import character, simulation
 
-from controller_node.parameters import make_controller
+from controller_node.parameters import (
+    PARAMETERS,
+    character_parameters,
+    check_world,
+    make_controller,
+)
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.late_commands import LateCommands
 from experiment.loop import ticks_in_process
 from experiment.plan import Plan, make_plan
+from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
+from msgs_config.parameters import Values, resolve
 
 HUMANOID = character("humanoid")
 LAYOUT = HUMANOID.layout
@@ -72,15 +80,47 @@ def test_a_state_that_comes_again_is_answered_alike() -> None:
         assert reference.stamp_ns == state.stamp_ns
 
 
-def test_what_diverges_is_not_foreseen() -> None:
-    late = LateCommands(HUMANOID, MODEL, 1)
-    position, nothing = np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size)
-    late.send(1, np.full(LAYOUT.size, 1e5))
+def test_a_plan_counts_from_the_state_that_was_told() -> None:
+    plan = walk(0.1, command_delay_ticks=2)
+    controller = make_controller(HUMANOID, plan.reference, plan.controller)
+    (first, *_) = (tick.state for tick in ticks_in_process(plan))
 
-    there, velocity = late.state_then(2, position, nothing)
+    controller.answer(first, first.stamp_ns)
+
+    assert controller.outlook is not None
+    np.testing.assert_allclose(controller.outlook.times, 0.05 * np.arange(1, 7) + 2 / 240)
+
+
+def test_what_diverges_is_not_foreseen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    late = LateCommands(HUMANOID, MODEL, 2)
+    position, velocity = np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size)
+    velocity[20] = 2e3
+
+    there, then = late.state_then(2, position, velocity)
 
     assert there.tobytes() == position.tobytes()
-    assert velocity.tobytes() == nothing.tobytes()
+    assert then.tobytes() == velocity.tobytes()
+    assert not list(tmp_path.iterdir())  # no log of MuJoCo's
+
+
+def test_a_command_acts_within_the_limits_and_until_the_next_one() -> None:
+    position, still = np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size)
+    position[2] += 3.0
+    effort = np.concatenate((still[:6], np.full(LAYOUT.size - 6, 4.0)))
+
+    def foreseen(*sent: tuple[int, FloatArray]) -> bytes:
+        late = LateCommands(HUMANOID, MODEL, 3)
+        for tick, each in sent:
+            late.send(tick, each)
+        return late.state_then(10, position, still)[1].tobytes()
+
+    held = foreseen((7, effort), (8, effort), (9, effort))
+    assert foreseen((7, effort)) == held
+    assert foreseen((5, 0.0 * effort), (6, effort)) == held
+    assert foreseen((8, effort)) != held
+    most = LAYOUT.clipped(1e6 * effort, HUMANOID.effort_limits())
+    assert foreseen((7, 1e6 * effort)) == foreseen((7, most))
 
 
 def test_a_planner_that_is_told_of_a_delay_keeps_the_motion_with_it() -> None:
@@ -99,19 +139,18 @@ def test_a_planner_that_is_told_of_a_delay_keeps_the_motion_with_it() -> None:
     assert np.mean(turns) < 0.25
 
 
-REFUSED: dict[str, tuple[Mapping[str, object], Mapping[str, object], str]] = {
-    "another delay": ({"command_delay_ticks": 2}, {"command_delay_ticks": 1}, "must be the same"),
-    "all the horizon": ({"command_delay_ticks": 72}, {}, "it must be less than plan.horizon, 72"),
-}
+def test_a_simulator_with_another_delay_is_one_clear_line() -> None:
+    named: dict[str, Any] = {**QUICK, "command_delay_ticks": 1}
+    values = resolve(PARAMETERS + character_parameters(HUMANOID, named), named)
+
+    with pytest.raises(ConfigurationError, match=r"counts with 'command_delay_ticks' 1, but .* 2;"):
+        check_world(values, {"command_delay_ticks": 2})
+
+    check_world(values, {"command_delay_ticks": 1})
+    check_world(values, {})  # it does not say
+    check_world(Values({**values, "planner": "none"}), {"command_delay_ticks": 2})
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_it_cannot_do_is_one_clear_line(case: str) -> None:
-    simulator, controller, said = REFUSED[case]
-
-    with pytest.raises(ConfigurationError, match="command_delay_ticks") as caught:
-        plan = make_plan("humanoid", 0.1, {"reference": "hold"}, simulator, {**QUICK, **controller})
-        list(ticks_in_process(plan))
-
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
+def test_a_delay_of_all_the_horizon_is_one_clear_line() -> None:
+    with pytest.raises(ConfigurationError, match=r"^[^\n]* less than plan.horizon, 72 ticks$"):
+        list(ticks_in_process(walk(0.1, command_delay_ticks=72)))

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ from experiment.bags.recording import Recording, read_recording
 from experiment.loop import ticks_in_process
 from experiment.metrics import StateHash
 from experiment.plan import make_plan
+from experiment.report.charts import Marks
+from experiment.report.planning import foresight, plan_chart
 from experiment.report.sections import CharacterReport
 from msgs_config.arrays import FloatArray
 from msgs_config.dynamics import DynamicsModel
@@ -36,6 +39,8 @@ from msgs_config.tick_clock import TickClock
 
 HUMANOID = character("humanoid")
 CLOCK = TickClock(240)
+OF_STATES = ("stamps_ns", "published_ns", "position", "velocity", "reference_position")
+OF_TICKS = ("effort", "contacts", "applied_wrench")
 QUICK = {"planner": "predictive", "plan.samples": 12, "plan.horizon": 0.3}
 
 
@@ -348,7 +353,9 @@ def test_over_topics_it_has_the_states_that_it_has_in_one_process(tmp_path: Path
     assert not done.returncode, done.stderr
     summary = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))
     assert summary["state_hash"] == states_of(0.2)
-    check_plans(read_recording(tmp_path / "run"))
+    recording = read_recording(tmp_path / "run")
+    check_plans(recording)
+    check_a_run_that_ended_at_once(recording)
 
 
 def check_plans(recording: Recording) -> None:
@@ -374,11 +381,26 @@ def check_plans(recording: Recording) -> None:
     assert picture.png.startswith(b"\x89PNG")
 
 
+def check_a_run_that_ended_at_once(recording: Recording) -> None:
+    """Its one plan has nothing to be compared with."""
+    short = replace(
+        recording,
+        **{name: getattr(recording, name)[:1] for name in OF_STATES},
+        **{name: getattr(recording, name)[:0] for name in OF_TICKS},
+        plans=recording.plans[:1],
+    )
+
+    assert foresight(short) == {}
+    assert len(plan_chart(short, Marks()).axes) == 4
+
+
 BROKEN: dict[str, Callable[[PointCloud2], None]] = {
     "a field is missing": lambda message: message.fields.pop(),
     "a field is a float": lambda message: setattr(message.fields[0], "datatype", 7),
     "its data are short": lambda message: setattr(message, "data", message.data[:-8]),
     "its points are short": lambda message: setattr(message, "point_step", 8),
+    "its times go back": lambda message: setattr(message, "data", 2 * message.data[:216]),
+    "its times are no numbers": lambda message: setattr(message, "data", b"\xff" * 432),
     "it has no points": lambda message: (
         setattr(message, "width", 0),
         setattr(message, "data", b""),

@@ -5,6 +5,8 @@ are known, so that the model of the world foresees that state, and plan and law 
 1957, "Closer Control of Loops with Dead Time".)
 """
 
+from functools import partial
+
 import numpy as np
 
 from controller_node.laws import GainArrays
@@ -24,6 +26,7 @@ class LateCommands:
         gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
         self.delay_ticks = delay_ticks
         self._model, self._engine, self._body = model, model.engine(), model.body(gains)
+        self._clipped = partial(character.layout.clipped, limits=character.effort_limits())
         self._sent: dict[int, FloatArray] = {}  # (n,) by the tick of the state that it answers
         self._nothing = nothing  # what acts before the first command
         self.state_then(0, np.array(character.rest_position), nothing)
@@ -34,8 +37,9 @@ class LateCommands:
 
     def send(self, tick: int, effort: FloatArray) -> None:
         """Remember the effort (n,) that answers the state of a tick, which may come once more."""
-        self._sent[tick] = effort
-        for old in [sent for sent in self._sent if sent < tick - self.delay_ticks]:
+        self._sent[tick] = self._clipped(effort)
+        before = sorted(sent for sent in self._sent if sent < tick - self.delay_ticks)
+        for old in before[:-1]:
             del self._sent[old]
 
     def state_then(
@@ -43,12 +47,17 @@ class LateCommands:
     ) -> tuple[FloatArray, FloatArray]:
         """Position and velocity (n,) in which the answer to a tick's state will act.
 
-        Where the model diverges it is the state itself.
+        A state that had no answer, as in real time, goes on with the command before. Where the
+        model diverges it is the state itself.
         """
         if not self.delay_ticks:
             return position, velocity
-        due = range(tick - self.delay_ticks, tick)
-        efforts = np.array([self._sent.get(each, self._nothing) for each in due])
+        first = tick - self.delay_ticks
+        before = max((sent for sent in self._sent if sent < first), default=None)
+        acting = self._nothing if before is None else self._sent[before]
+        efforts = np.empty((self.delay_ticks, len(position)))
+        for row, each in enumerate(range(first, tick)):
+            efforts[row] = acting = self._sent.get(each, acting)
         start = self._model.position_of(position)
         if not let_act(start, velocity.copy(), efforts, self._body, self._engine):
             return position, velocity

@@ -188,12 +188,12 @@ class PredictivePlanner:
 
     def _outlook(self, found: Found, problem: Problem, desired: _Course) -> Outlook:
         """What is expected of a plan."""
-        checks = self._settings.checks
+        settings, checks = self._settings, self._settings.checks
         residuals = problem.residuals(found.deviations).reshape(2, checks, -1)
         best = found.deviations[0].reshape(checks, -1)
         centres, _ = self._comparison.balance(desired.features + best)
         numbers: FloatArray = np.arange(1.0, checks + 1.0)
-        times = numbers * (self._settings.period / self._rate_hz)
+        times = (settings.delay + settings.period * numbers) / self._rate_hz
         costs, others = fixed_order.dot(residuals, residuals)
         return Outlook(times, self._anchor.out_of(centres), costs, others, self._anchor)
 

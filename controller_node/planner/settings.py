@@ -41,7 +41,7 @@ PLANNER_PARAMETERS = [
     Parameter(
         "plan.knots", 0.15, "from one knot of a plan to the next", unit="s", minimum=0.01, maximum=5
     ),
-    Parameter("plan.samples", 40, "rollouts that a plan is found from", minimum=8, maximum=10_000),
+    Parameter("plan.samples", 48, "rollouts that a plan is found from", minimum=8, maximum=10_000),
     Parameter(
         "plan.noise",
         0.2,

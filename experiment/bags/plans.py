@@ -51,10 +51,13 @@ def decode_plan(raw: bytes) -> PlanArrays:
         }
     )
     rows = np.frombuffer(bytes(message.data), kind)
+    times = rows["time"].astype(float)
+    if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) > 0.0).all()):
+        raise MessageError("a plan whose times do not increase from 0 on")
     stamp = message.header.stamp
     return PlanArrays(
         stamp_ns=stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec,
-        times=rows["time"].astype(float),
+        times=times,
         centres=np.stack([rows[axis].astype(float) for axis in "xyz"], axis=1),
         costs=rows["cost"].astype(float),
         alternatives=rows["alternative"].astype(float),

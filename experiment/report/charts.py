@@ -110,7 +110,7 @@ def error_chart(
     rows = -(-len(names) // columns)
     figure, panels = make_panels(rows, columns, (_WIDTH, 1.45 * rows + 0.7), same_x=True)
     tops = {unit: _top(errors[:, [u == unit for u in units]]) for unit in set(units)}
-    at, drawn = decimated(*_broken(times, errors, breaks))
+    at, drawn = decimated(*broken(times, errors, breaks))
     for number, (panel, name, unit) in enumerate(zip(panels, names, units, strict=False)):
         marks.draw(panel)
         panel.plot(at, drawn[:, number], linewidth=_THIN)
@@ -121,7 +121,7 @@ def error_chart(
         panel.tick_params(labelbottom=last)
     for panel in panels[len(names) :]:
         panel.set_axis_off()
-    _span_time(panels, times)
+    span_time(panels, times)
     marks.legend(figure)
     return figure
 
@@ -165,23 +165,23 @@ def root_chart(
     figure = Figure(figsize=(_WIDTH, 5.4), layout="constrained")
     grid = figure.add_gridspec(2, 3, height_ratios=(1.3, 1.0))
     above = figure.add_subplot(grid[0, :])
-    rows = _strided(len(times), breaks)
+    rows = strided(len(times), breaks)
     styles: dict[str, dict[str, Any]] = {"simulated": {"linewidth": 1.2}, "reference": _REFERENCE}
     for (name, style), path in zip(styles.items(), (position, reference), strict=True):
-        _, drawn = _broken(times[rows], path[rows], np.searchsorted(rows, breaks))
+        _, drawn = broken(times[rows], path[rows], np.searchsorted(rows, breaks))
         if not np.isnan(drawn).all():
             above.plot(drawn[:, 0], drawn[:, 1], label=name, **style)
     above.plot(*position[0, :2], marker="o", markersize=5, color="black", linestyle="none")
     above.set_aspect("equal", adjustable="datalim")
     label(above, "x (m)", "y (m)", "from above; the dot is the begin")
     height = figure.add_subplot(grid[1, 0])
-    at, drawn = decimated(*_broken(times, np.stack((position[:, 2], reference[:, 2]), 1), breaks))
+    at, drawn = decimated(*broken(times, np.stack((position[:, 2], reference[:, 2]), 1), breaks))
     height.plot(at, drawn[:, 0], linewidth=_THIN, label="simulated")
     if not np.isnan(drawn[:, 1]).all():
         height.plot(at, drawn[:, 1], label="reference", **_REFERENCE)
     label(height, _TIME, "height (m)", legend=None)
     panels = [height]
-    at, drawn = decimated(*_broken(times, errors, breaks))
+    at, drawn = decimated(*broken(times, errors, breaks))
     for column, name in enumerate(("position error (m)", "rotation error (rad)")):
         if np.isnan(drawn[:, column]).all():
             continue
@@ -192,7 +192,7 @@ def root_chart(
         panels.append(panel)
     for panel in panels:
         marks.draw(panel)
-    _span_time(panels, times)
+    span_time(panels, times)
     marks.legend(figure)
     return figure
 
@@ -226,7 +226,7 @@ def contact_chart(
     label(below, _TIME, "vertical force / weight", legend=None)
     marks.draw(above, filled=False)
     marks.draw(below)
-    _span_time([above], times)
+    span_time([above], times)
     marks.legend(figure)
     return figure
 
@@ -271,12 +271,12 @@ def tick_chart(
         panels.append(panel)
     for panel in panels:
         marks.draw(panel)
-    _span_time(panels, times)
+    span_time(panels, times)
     marks.legend(figure)
     return figure
 
 
-def _broken(
+def broken(
     times: FloatArray, values: FloatArray, breaks: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """The series with NaN before each row of `breaks`, so that no line is drawn over a reset."""
@@ -288,7 +288,7 @@ def _broken(
     )
 
 
-def _strided(length: int, breaks: IntArray) -> IntArray:
+def strided(length: int, breaks: IntArray) -> IntArray:
     """Rows of a path that are enough to draw it; those at which an episode begins among them."""
     rows = np.concatenate((span_starts(length, _POINTS), breaks, [length - 1]))
     return np.unique(rows.astype(np.intp))
@@ -304,7 +304,8 @@ def _name_rows(axes: Axes, names: Sequence[str]) -> None:
     axes.invert_yaxis()
 
 
-def _span_time(panels: Sequence[Axes], times: FloatArray) -> None:
+def span_time(panels: Sequence[Axes], times: FloatArray) -> None:
+    """Let panels have the times (t,) of a recording as their width."""
     if times[-1] > times[0]:
         for panel in panels:
             panel.set_xlim(float(times[0]), float(times[-1]))

@@ -221,13 +221,12 @@ class CharacterReport:
         return Section(title, [self._drawn(figure, "contacts", text)], [table])
 
     def _plans(self) -> Section:
-        seen = foresight(self._recording)
-        rows = [
-            (f"{ahead:.2f}", *_statistics(errors))
-            for ahead, errors in zip(seen.ahead, seen.errors.T, strict=True)
-        ]
+        foreseen = foresight(self._recording)
+        rows = [(f"{ahead:.4g}", *_statistics(errors)) for ahead, errors in foreseen.items()]
         columns = ("after (s)", "mean", f"{_PERCENTILE} %", "largest")
-        table = Table(rows, columns, "centre of mass, off where a plan had foreseen it (m)")
+        table = Table(
+            rows[:_MOST_LISTED], columns, "centre of mass, off where a plan had foreseen it (m)"
+        )
         figure = plan_chart(self._recording, self._marks)
         text = "where each plan was to lead, where it led, and what plans cost"
         return Section("plans", [self._drawn(figure, "plans", text)], [table])

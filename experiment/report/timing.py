@@ -9,8 +9,8 @@ from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
 
 _PAUSE_FACTOR = 10.0  # of the usual time between two states ...
 _LEAST_PAUSE = 0.1  # s ... and at least so long
-_MANY = 100  # states; of so many the longest are usual that come more often than ...
-_USUAL = 95  # ... in all but this percentage: at every twelfth state a planner takes its time
+_OFTEN = 8  # times that a state takes long, and ...
+_SHARE = 0.01  # ... this share of all: that is usual then, as with a planner every few states
 _LONGEST_BACKLOG = 0.1  # s that the simulator catches up with; beyond it its schedule begins anew
 
 
@@ -58,8 +58,10 @@ def pauses(published_ns: IntArray) -> IntArray:
     steps = wall_steps(published_ns)
     if not len(steps):
         return np.zeros(0, dtype=np.intp)
-    usual = float(np.percentile(steps, _USUAL if len(steps) >= _MANY else 50))
-    longest = max(_LEAST_PAUSE, _PAUSE_FACTOR * usual)
+    longest = max(_LEAST_PAUSE, _PAUSE_FACTOR * float(np.median(steps)))
+    long = steps[steps > longest]
+    if len(long) >= max(_OFTEN, _SHARE * len(steps)):
+        longest = _PAUSE_FACTOR * float(np.median(long))
     return np.flatnonzero(steps > longest)
 
 

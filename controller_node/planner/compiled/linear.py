@@ -1,7 +1,8 @@
 """Products of matrices and small linear systems, their sums in one order on every processor.
 
 Inner loops run along rows whose entries do not meet, which a compiler may do several at a time
-without another result; a sum along a row has four parts, added up at the end.
+without another result; four rows are added at once. A scalar product has four parts, added up at
+the end.
 """
 
 import math
