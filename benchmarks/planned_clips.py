@@ -1,0 +1,145 @@
+"""Which clips are kept by planning ahead, and how well: `python -m benchmarks.planned_clips`.
+
+A row a clip, one cycle of it with each seed in one process, as over topics: how many came to the
+end, and medians over the seeds. It takes half an hour on two cores.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+
+from msgs_config.process import limit_threads
+
+limit_threads()
+
+import numpy as np  # noqa: E402 - after the limit on threads
+from rich.console import Console  # noqa: E402
+from rich.progress import track  # noqa: E402
+from rich.table import Table  # noqa: E402
+
+from controller_node.references.clip_file import available_clips, read_clip  # noqa: E402
+from experiment.commands.settings import node_settings  # noqa: E402
+from experiment.loop import ticks_in_process  # noqa: E402
+from experiment.plan import Plan, make_plan  # noqa: E402
+from experiment.planned_push import pushes_within  # noqa: E402
+from msgs_config.arrays import FloatArray  # noqa: E402
+from msgs_config.character_loading import load_character  # noqa: E402
+from msgs_config.dynamics import DynamicsModel  # noqa: E402
+from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa: E402
+
+CHARACTER = "humanoid"
+FARTHEST, LOWEST = 0.6, 0.5  # m off the clip's centre of mass, and share of its height
+NODES = ("sim_node", "controller_node")
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What has become of a clip with one seed."""
+
+    centre_error: float  # m, mean over ticks
+    joint_error: float  # rad, mean over ticks and actuated joints
+    lost_at: float | None  # s
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is tried."""
+
+    clip: str
+    seed: int
+    duration: float | None  # s; None: a cycle
+    settings: tuple[str, ...]
+    pushes: tuple[str, ...]
+
+
+def main() -> int:
+    """Plan clips with some seeds, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    clips = available_clips(load_character(CHARACTER))
+    parser.add_argument("clips", nargs="*", default=clips, help=f"({' '.join(clips)})")
+    parser.add_argument("--seeds", type=int, default=5, help="(%(default)s)")
+    parser.add_argument("--duration", type=float, help="s of each; else a cycle")
+    parser.add_argument("--set", action="append", default=[], help="NODE.NAME:=VALUE, as of run")
+    parser.add_argument("--push", action="append", default=[], help="LINK:FX,FY,FZ@S, as of run")
+    parser.add_argument("--processes", type=int, default=2, help="(%(default)s)")
+    options = parser.parse_args()
+    tasks = [
+        Task(clip, seed, options.duration, tuple(options.set), tuple(options.push))
+        for clip in options.clips
+        for seed in range(1, options.seeds + 1)
+    ]
+    console = Console(width=100)
+    try:
+        for task in tasks[:: options.seeds]:
+            _plan(task)  # what is wrong is said at once
+        with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool:
+            done = list(track(pool.map(attempt, tasks), total=len(tasks), console=console))
+    except ActuatedCharactersError as error:
+        raise SystemExit(f"error: {error}") from error
+    table = Table(title=f"seeds 1 to {options.seeds}", title_justify="left")
+    for column in ("clip", "to the end", "centre of mass, m", "joints, rad", "lost at, s"):
+        table.add_column(column, justify="right" if column != "clip" else "left")
+    for number, clip in enumerate(options.clips):
+        table.add_row(clip, *_row(done[number * options.seeds :][: options.seeds]))
+    console.print(table)
+    return 0
+
+
+def attempt(task: Task) -> Attempt:
+    """Track a clip until it is lost or ends."""
+    plan = _plan(task)
+    layout, model, rate = plan.character.layout, DynamicsModel(plan.character), _rate(plan)
+    centre = partial(_centre, model)
+    off, turns = [], []
+    try:
+        for number, tick in enumerate(ticks_in_process(plan, pushes_within(task.pushes, plan)), 1):
+            wanted, got = plan.reference.sample(number / rate), tick.following.position
+            here, there = centre(got), centre(wanted.configuration.position)
+            difference = layout.difference(wanted.configuration, layout.configuration(got))
+            off.append(float(np.linalg.norm(here - there)))
+            turns.append(float(layout.norms(difference)[2:].mean()))
+            if off[-1] > FARTHEST or here[2] < LOWEST * there[2]:
+                return Attempt(float(np.mean(off)), float(np.mean(turns)), number / rate)
+    except SimulationError:
+        return Attempt(float(np.mean(off)), float(np.mean(turns)), len(off) / rate)
+    return Attempt(float(np.mean(off)), float(np.mean(turns)), None)
+
+
+def _plan(task: Task) -> Plan:
+    settings = node_settings(task.settings, NODES)
+    cycle = float(read_clip(load_character(CHARACTER), task.clip).times[-1])
+    return make_plan(
+        CHARACTER,
+        task.duration or cycle,
+        {"reference": "clip", "clip": task.clip},
+        settings["sim_node"],
+        {"planner": "predictive", "plan.workers": 1, "plan.seed": task.seed}
+        | settings["controller_node"],
+    )
+
+
+def _rate(plan: Plan) -> int:
+    return plan.simulator.integer("rate")
+
+
+def _centre(model: DynamicsModel, position: FloatArray) -> FloatArray:
+    model.update(position, np.zeros(len(position)))
+    return model.centre_of_mass()
+
+
+def _row(attempts: Sequence[Attempt]) -> list[str]:
+    lost = [f"{each.lost_at:.2f}" for each in attempts if each.lost_at is not None]
+    return [
+        f"{len(attempts) - len(lost)} of {len(attempts)}",
+        f"{np.median([each.centre_error for each in attempts]):.3f}",
+        f"{np.median([each.joint_error for each in attempts]):.3f}",
+        " ".join(lost),
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
