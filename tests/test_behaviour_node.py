@@ -108,7 +108,7 @@ def test_a_hit_counts_with_the_state_whose_contacts_hold_it(ticks: Ticks) -> Non
     ticks.next(force=1200.0, state_first=True)  # 5 N s: the state waits for its contacts
     ticks.next()
 
-    assert ticks.told() == [("TRACK", 1), ("REACT", 4)]
+    ticks.wait_told([("TRACK", 1), ("REACT", 4)])
     content = json.loads(ticks.modes.last.data)
     assert content["link"] == "chest"
     assert content["impulse"] == pytest.approx(5.0)
@@ -198,7 +198,7 @@ def test_without_a_behaviour_no_contacts_are_waited_for(
     for _ in range(3):
         plain.next()
 
-    assert plain.told() == [("TRACK", 1)]
+    plain.wait_told([("TRACK", 1)])
     count = simulator.node.count_subscribers(topics.CONTACTS.name)
     assert count == 0
 
