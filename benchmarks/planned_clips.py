@@ -67,6 +67,8 @@ def main() -> int:
     parser.add_argument("--push", action="append", default=[], help="LINK:FX,FY,FZ@S, as of run")
     parser.add_argument("--processes", type=int, default=2, help="(%(default)s)")
     options = parser.parse_args()
+    if min(options.seeds, options.processes) < 1:
+        parser.error("--seeds and --processes must be 1 or more")
     tasks = [
         Task(clip, seed, options.duration, tuple(options.set), tuple(options.push))
         for clip in options.clips

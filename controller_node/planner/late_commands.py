@@ -37,6 +37,8 @@ class LateCommands:
 
     def send(self, tick: int, effort: FloatArray) -> None:
         """Remember the effort (n,) that answers the state of a tick, which may come once more."""
+        if not self.delay_ticks:
+            return
         self._sent[tick] = self._clipped(effort)
         before = sorted(sent for sent in self._sent if sent < tick - self.delay_ticks)
         for old in before[:-1]:
