@@ -17,7 +17,7 @@ setup(
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),
     package_data={
-        "msgs_config": ["fastdds.xml", "characters/*.yaml", "characters/*.urdf"],
+        "msgs_config": ["fastdds*.xml", "characters/*.yaml", "characters/*.urdf"],
         "controller_node": ["keyframes/*.yaml"],
         "experiment": ["samcon/*.yaml", "samcon/*.json"],
     },

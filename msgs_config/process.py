@@ -6,7 +6,7 @@ Imports neither numpy nor rclpy at the top: the limit on threads must come befor
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -18,7 +18,11 @@ from msgs_config.shared_memory import remove_orphans
 
 EXIT_ERROR = 1
 _LEAVE_TIME = 2  # s that leaving the ROS graph may take
-_DDS_PROFILES = Path(__file__).with_name("fastdds.xml")
+_FAST_DDS = "rmw_fastrtps"
+_ANYWHERE, _LOCALHOST = (
+    Path(__file__).with_name(f"{name}.xml") for name in ("fastdds", "fastdds_localhost")
+)
+_PROFILES, _RANGE = "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _PARAMETERS_ARE_SET = (
     "parameters are set by --ros-args -p NAME:=VALUE or --params-file FILE, and listed by "
     "'actuated_characters parameters'"
@@ -124,9 +128,24 @@ def _leave(node: RunnableNode | None, code: int) -> None:
     rclpy.try_shutdown()
 
 
+def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
+    """The variables with which Fast DDS 2.14, Jazzy's, takes up settings of ours.
+
+    There are none if the user has some. Under LOCALHOST, what that range means is in the file.
+    """
+    given = environment.get(_PROFILES)
+    if given not in (None, str(_ANYWHERE), str(_LOCALHOST)):
+        return {}
+    is_fast_dds = environment.get("RMW_IMPLEMENTATION", _FAST_DDS).startswith(_FAST_DDS)
+    is_plain = not environment.get("ROS_STATIC_PEERS")
+    is_plain &= environment.get("ROS_LOCALHOST_ONLY", "0") != "1"
+    if environment.get(_RANGE) == "LOCALHOST" and is_fast_dds and is_plain:
+        return {_RANGE: "SYSTEM_DEFAULT", _PROFILES: str(_LOCALHOST)}
+    return {} if given is not None else {_PROFILES: str(_ANYWHERE)}
+
+
 def _start_ros() -> None:
-    # the name that Fast DDS 2.14, Jazzy's, knows; other vendors ignore it
-    os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(_DDS_PROFILES))
+    os.environ.update(middleware_settings(os.environ))
     remove_orphans()
     import rclpy
     from rclpy.signals import SignalHandlerOptions

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 import rclpy
 from rclpy.context import Context
-from ros import DDS_PROFILES, ControllerClient, Processes, SimulatorClient
+from ros import DDS_PROFILES, RANGE, ControllerClient, Processes, SimulatorClient
 
 from experiment.domain import own_domain
 
 # It is read once, when a process makes its first node, which may be in any test.
-os.environ[DDS_PROFILES] = str(Path(__file__).parents[1] / "msgs_config" / "fastdds.xml")
+os.environ[DDS_PROFILES] = str(Path(__file__).parents[1] / "msgs_config/fastdds_localhost.xml")
 
 
 def pytest_xdist_auto_num_workers() -> int:
@@ -35,7 +35,7 @@ def domain() -> Iterator[int]:
     """A ROS domain that nobody else on this machine uses; the tests' processes inherit it."""
     with own_domain() as number, pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_DOMAIN_ID", str(number))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        patch.setenv(RANGE, "SYSTEM_DEFAULT")  # what LOCALHOST means is in that file
         yield number
 
 

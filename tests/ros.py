@@ -43,8 +43,9 @@ PATIENCE = 30.0
 RETRY_PERIOD = 0.1
 """s after which a volatile message, whose reader may not have been there, is sent again."""
 
-DDS_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
-"""What sets the middleware of the test's own process; the processes under test do not get it."""
+DDS_PROFILES, RANGE = "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE"
+"""What sets the middleware of the test's own process; the processes under test set it themselves,
+by the range LOCALHOST, as a user's do."""
 
 MODULES = {
     topics.SIM_NODE: "sim_node.main",
@@ -98,7 +99,8 @@ class Process:
         self._output = log.with_suffix(".stdout")
         own = dict(os.environ if environment is None else environment)
         own |= {"PYTHONUNBUFFERED": "1"}
-        own.pop(DDS_PROFILES, None)
+        if own.pop(DDS_PROFILES, None) and own.get(RANGE) == "SYSTEM_DEFAULT":
+            own[RANGE] = "LOCALHOST"
         self._process: Fork | subprocess.Popen[bytes]
         if forked_module is not None:
             folder = cwd or Path.cwd()

@@ -14,7 +14,7 @@ import pytest
 from ros import Process, Processes, SimulatorClient, wait_until
 
 from experiment.domain import own_domain
-from msgs_config import shared_memory, topics
+from msgs_config import shared_memory
 from msgs_config.shared_memory import DIRECTORY, LEAST_AGE, remove_orphans
 
 OLD = 1000.0  # s
@@ -153,18 +153,6 @@ def test_the_next_node_frees_what_a_killed_one_has_left_and_living_ones_work_on(
         assert all(file.exists() for file in kept)
         assert list(client.answer(state, {"hinge": 0.5}).effort) == [0.5]
         assert other.exit_code is None
-
-
-def test_nodes_have_no_port_in_shared_memory_which_one_that_stood_still_would_lose(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    simulator = processes.simulator(wait_for_subscribers=2)
-    controller = processes.controller(wait_for_subscribers=1)
-    recorder = processes.node(topics.RECORDER_NODE, directory="run")
-    client.first_state()
-
-    for node in (simulator, controller, recorder):
-        assert "fastrtps_port" not in Path(f"/proc/{node.pid}/maps").read_text()
 
 
 def test_it_costs_a_start_next_to_nothing(tmp_path: Path) -> None:
