@@ -19,7 +19,6 @@ setup(
     package_data={
         "msgs_config": ["fastdds*.xml", "characters/*.yaml", "characters/*.urdf"],
         "controller_node": ["keyframes/*.yaml"],
-        "experiment": ["samcon/*.yaml", "samcon/*.json"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
@@ -34,7 +33,6 @@ setup(
     # the messages are there already (under other names), pip would put a second, different copy
     # beside them, and a requirement that is not met stops a program that imports pkg_resources.
     install_requires=[
-        "joblib>=1.4,<2",
         "lz4>=4.0,<5",  # which rosbags needs as well
         "matplotlib>=3.6,<4",
         "mujoco-core==4.0.1",  # exactly: another engine may have other last bits
@@ -51,19 +49,14 @@ setup(
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-rclpy[fastrtps]>=7.1.6,<7.2",
         ],
-        # `planner: predictive`, whose rollouts numba compiles (210 MB together, BSD-2).
+        # `planner: predictive` and `reconstruct`: numba compiles their rollouts (210 MB, BSD-2).
         "plan": ["llvmlite>=0.44", "numba>=0.61,<0.70"],
-        # `actuated_characters reconstruct --fit N`: CMA-ES, in Python alone (0.3 MB, BSD-3).
-        "fit": ["cma>=4.0,<5"],
-        # `actuated_characters reconstruct --cluster ADDRESS`, on several machines.
-        "cluster": ["dask[distributed]>=2024.8"],
         # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
         "video": ["av>=14,<19"],
         # `colcon test` chooses pytest because this extra, of this name, lists it.
         # The linters are held to one minor version: a new one may have new rules.
         "test": [
             "av>=14,<19",
-            "cma>=4.0,<5",
             "hypothesis>=6.98,<7",
             "mcap>=1.2,<2",
             "mcap-ros2-support>=0.5.5,<0.7",

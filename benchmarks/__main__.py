@@ -16,9 +16,9 @@ from benchmarks.lockstep import measure_lockstep  # noqa: E402
 from benchmarks.planning import measure_planning  # noqa: E402
 from benchmarks.ratios import compare, comparison_table, read_ratios, store_ratios  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
+from benchmarks.reconstruction import measure_reconstruction  # noqa: E402
 from benchmarks.recorder import measure_recorder  # noqa: E402
 from benchmarks.replay import measure_replay  # noqa: E402
-from benchmarks.samcon import measure_samcon  # noqa: E402
 from benchmarks.search import measure_search  # noqa: E402
 from experiment.domain import own_domain  # noqa: E402
 
@@ -30,7 +30,7 @@ _MEASUREMENTS = {
     "cost": measure_cost,
     "planning": measure_planning,
     "realtime": measure_realtime,
-    "samcon": measure_samcon,
+    "reconstruction": measure_reconstruction,
     "recorder": measure_recorder,
     "replay": measure_replay,
 }

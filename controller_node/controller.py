@@ -11,7 +11,6 @@ from controller_node.balance import Balance, BalanceGains
 from controller_node.behaviours.base import ModeReport, Observation, Phase
 from controller_node.behaviours.make import BehaviourChoice
 from controller_node.effort_series import EffortSeries
-from controller_node.feedback import RespondingReference
 from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
 from controller_node.planner.outlook import Outlook
 from controller_node.references.base import Reference, ReferenceState
@@ -24,7 +23,7 @@ from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import CharacterError, ConfigurationError
 from msgs_config.probe import Probe
 from msgs_config.stamped import StampedReference, StampedState
-from msgs_config.tick_clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
+from msgs_config.tick_clock import TickClock
 
 if TYPE_CHECKING:
     from controller_node.planner.late_commands import LateCommands  # needs numba
@@ -45,8 +44,8 @@ class Planner(Protocol):
     """What keeps a motion by offsets to the tracking errors. It remembers the ticks before."""
 
     @property
-    def late_commands(self) -> "LateCommands":
-        """The commands that have not acted yet."""
+    def late_commands(self) -> "LateCommands | None":
+        """The commands that have not acted yet; None where they act at once."""
 
     def between_rollouts(self, act: Callable[[], None]) -> None:
         """Have something done again and again while it plans."""
@@ -81,22 +80,12 @@ class _Drive:
     assisted: bool  # whether the gains drive a floating base
 
 
-def check_reference(reference: Reference, behaviour: BehaviourChoice) -> None:
-    """Raise ConfigurationError if a behaviour cannot follow a reference."""
-    if behaviour.needs_contacts and isinstance(reference, RespondingReference):
-        raise ConfigurationError(
-            "the clip has corrections with feedback, which holds it to where the clip is; "
-            "'behaviour' must be tracking or ragdoll with it, as the others leave the clip"
-        )
-
-
 class Controller:
     """Inverse dynamics in ticks: `(q, v, desired state) -> effort`.
 
     A function of what the state's message holds and of the tick, so that the same state always
-    gets the same answer; only the law `pid`, a behaviour that reacts, a planner and a clip's window
-    feedback remember the ticks before, and a trajectory or strengths that were taken hold until the
-    episode ends.
+    gets the same answer; only the law `pid`, a behaviour that reacts and a planner remember the
+    ticks before, and a trajectory or strengths that were taken hold until the episode ends.
     """
 
     def __init__(
@@ -118,11 +107,9 @@ class Controller:
 
         Raises:
             CharacterError: a joint moves neither mass nor inertia, or a foot is none.
-            ConfigurationError: the law needs a series, or the balance feet, and there are none; or
-                the behaviour cannot follow the reference.
+            ConfigurationError: the law needs a series, or the balance feet, and there are none.
         """
         self._choice = behaviour or BehaviourChoice()
-        check_reference(reference, self._choice)
         self.layout = character.layout
         self._character = character
         self.clock = TickClock(rate_hz)
@@ -142,6 +129,11 @@ class Controller:
         self._strengths = StrengthSchedule(self.layout)
         self._no_contacts = np.zeros((len(character.links), 6))
         self.mode: ModeReport | None = None  # since which state what is done; None before the first
+
+    @property
+    def planner(self) -> Planner | None:
+        """What keeps the motion by offsets; None without."""
+        return self._planner
 
     def while_planning(self, act: Callable[[], None]) -> None:
         """Have something done again and again while a planner plans; not to change this one."""
@@ -246,8 +238,6 @@ class Controller:
         self.mode = None
         self._episode_ns = episode_ns
         self._reference = self._own_reference
-        if isinstance(self._reference, RespondingReference):
-            self._reference.begin_episode()
         if self._planner is not None:
             self._planner.begin_episode(self.clock.first_tick_from(episode_ns))
         self._law = make_law(self._settings.law, self._plant)
@@ -263,16 +253,12 @@ class Controller:
 
         Not the stamps' difference: rounded to whole ns, it is another one in another episode.
         """
-        return self._time_of(self.clock.first_tick_from(stamp_ns) - self._episode_tick)
+        ticks = self.clock.first_tick_from(stamp_ns) - self._episode_tick
+        return self.clock.time_after(ticks)
 
     @property
     def _episode_tick(self) -> int:
         return self.clock.first_tick_from(self._episode_ns or 0)
-
-    def _time_of(self, ticks: int) -> float:
-        """Time in s of a number of ticks since the episode's first state."""
-        since_ns = self.clock.stamp_ns(FIRST_TICK + ticks) - self.clock.stamp_ns(FIRST_TICK)
-        return since_ns / NANOSECONDS_PER_SECOND
 
     def answer(
         self, state: StampedState, episode_ns: int, contacts: FloatArray | None = None
@@ -319,10 +305,10 @@ class Controller:
             velocity=state.velocity,
             now=self._desired(directive.now),
             upcoming=self._desired(directive.upcoming),
-            response=self._response(time, state, directive.gains),
+            response=self._response(state, directive.gains),
         )
         effort = self._effort(instant, directive.gains)
-        if self._planner is not None:
+        if self._planner is not None and self._planner.late_commands is not None:
             self._planner.late_commands.send(tick, effort)
         desired = instant.now if state is told else self._desired_at(tick - self._episode_tick)
         return effort, StampedReference(
@@ -332,7 +318,7 @@ class Controller:
     def _state_then(self, tick: int, state: StampedState) -> StampedState:
         """The state in which the answer to a tick's state acts, as far as it can be foreseen."""
         late = None if self._planner is None else self._planner.late_commands
-        if late is None or not late.delay_ticks:
+        if late is None:
             return state
         position, velocity = late.state_then(tick, state.position, state.velocity)
         stamp_ns = self.clock.stamp_ns(tick + late.delay_ticks)
@@ -368,14 +354,12 @@ class Controller:
             )
         return self.layout.clipped(effort, gains.effort_limits)
 
-    def _response(self, time: float, state: StampedState, gains: GainArrays) -> FloatArray | None:
-        """What planner or feedback add to the tracking errors (n,); None without."""
-        if self._planner is not None:
-            tick = self.clock.tick(state.stamp_ns) - self._episode_tick
-            return self._planner.offset(tick, state, gains, self._desired_at)
-        if isinstance(self._reference, RespondingReference):
-            return self._reference.response(time, state.position, state.velocity)
-        return None
+    def _response(self, state: StampedState, gains: GainArrays) -> FloatArray | None:
+        """What a planner adds to the tracking errors (n,); None without."""
+        if self._planner is None:
+            return None
+        tick = self.clock.tick(state.stamp_ns) - self._episode_tick
+        return self._planner.offset(tick, state, gains, self._desired_at)
 
     def _reference_at(self, time: float) -> ReferenceState:
         """The reference; the one of the next tick is this tick's when the tick has come."""
@@ -385,7 +369,7 @@ class Controller:
 
     def _desired_at(self, tick: int) -> ReferenceState:
         """What is to be tracked at a tick, counted from the episode's first state."""
-        return self._desired(self._reference.sample(self._time_of(tick)))
+        return self._desired(self._reference.sample(self.clock.time_after(tick)))
 
     def _desired(self, reference: ReferenceState) -> ReferenceState:
         """The reference as the settings have it tracked."""

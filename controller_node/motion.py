@@ -6,22 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from controller_node.feedback import Feedback, Responding, responding
-from controller_node.feedback_gains import FeedbackGains
 from controller_node.references.base import Reference
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
-from controller_node.references.corrected import CorrectedReference
-from controller_node.references.corrected_file import (
-    read_corrections,
-    read_feedback,
-    read_window_feedback,
-)
 from controller_node.references.hold import HoldReference
 from controller_node.references.keyframe_file import read_keyframes
 from controller_node.references.keyframes import KeyframesReference
 from controller_node.references.signals import SineReference, StepReference
-from controller_node.window_feedback import Deviations, WindowFeedback
 from msgs_config.character import Character
 from msgs_config.errors import MotionError, one_of
 from msgs_config.parameters import Parameter, Values
@@ -76,13 +67,7 @@ def make_motion(character: Character, values: Values) -> Motion:
         frames = read_clip(character, values.text("clip"))
         names = ", ".join(frames.clamped)
         kept = (f"kept within joint limits: {names}",) if names else ()
-        clip = ClipReference(character.layout, frames)
-        corrections = read_corrections(character, values.text("clip"))
-        if corrections is None:
-            return Motion(clip, kept)
-        corrected = CorrectedReference(character.layout, clip, corrections)
-        feedbacks = _feedbacks(character, clip, values.text("clip"), corrections.ends)
-        return Motion(responding(corrected, feedbacks), kept)
+        return Motion(ClipReference(character.layout, frames), kept)
     if kind == "keyframes":
         keyframes = read_keyframes(character, str(_keyframes_path(values.text("keyframes"))))
         return Motion(KeyframesReference(character.layout, keyframes), keyframes.notes)
@@ -95,20 +80,6 @@ def make_motion(character: Character, values: Values) -> Motion:
         dofs, notes = _signal_dofs(character, values, [amplitude, -amplitude])
         return Motion(SineReference(character, dofs, amplitude, frequency), notes)
     return Motion(HoldReference(character))
-
-
-def _feedbacks(
-    character: Character, clip: Reference, file: str, ends: Sequence[float]
-) -> list[Responding]:
-    """The feedbacks that a corrected clip's file has."""
-    feedbacks: list[Responding] = []
-    gains, by_window = read_feedback(character, file), read_window_feedback(character, file)
-    if any(gains.values()):
-        feedbacks.append(Feedback(character, clip, FeedbackGains.of(gains)))
-    if by_window is not None:
-        deviations = Deviations(character, clip, by_window.dofs)
-        feedbacks.append(WindowFeedback(deviations, by_window, ends))
-    return feedbacks
 
 
 def _signal_dofs(

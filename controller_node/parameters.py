@@ -8,16 +8,16 @@ import numpy as np
 from controller_node.balance import BalanceGains
 from controller_node.behaviours import settings as behaviour_settings
 from controller_node.behaviours.make import choose_behaviour
-from controller_node.controller import Controller, Planner, Settings
+from controller_node.controller import Controller, Settings
 from controller_node.effort_series import read_effort_series
 from controller_node.laws import LAWS, GainArrays
 from controller_node.motion import MOTION_PARAMETERS
 from controller_node.planner import settings as planner_settings
-from controller_node.planner.settings import NO_PLANNER, PREDICTIVE
+from controller_node.planner.make import make_planner
+from controller_node.planner.settings import NO_PLANNER
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
 from msgs_config.character import ROOT_TORQUE, Character
-from msgs_config.errors import ConfigurationError
 from msgs_config.joint_layout import ROOT
 from msgs_config.parameters import Parameter, Values
 from msgs_config.session import SESSION
@@ -95,7 +95,7 @@ def character_parameters(
     With a planner, which the parameters given may name, some gains are others.
     """
     parameters = []
-    planned = character.planning.gains if given.get("planner") == PREDICTIVE else {}
+    planned = character.planning.gains if given.get("planner", NO_PLANNER) != NO_PLANNER else {}
     for name, limit in zip(character.vector_names, character.effort_limits(), strict=True):
         gains = planned.get(name, character.gains[name])
         parameters += [
@@ -218,26 +218,6 @@ def check_world(values: Values, simulator: Mapping[str, object]) -> None:
     """
     behaviour_settings.check_terrain(values.text("behaviour"), simulator.get("terrain"))
     planner_settings.check_world(values, simulator)
-
-
-def make_planner(character: Character, values: Values) -> Planner | None:
-    """The planner that the parameters' values say; None without one.
-
-    Raises:
-        ConfigurationError: it cannot be had for the character, or beside the other values.
-    """
-    settings = planner_settings.make_settings(character, values)
-    if settings is None:
-        return None
-    try:
-        from controller_node.planner.planner import PredictivePlanner
-    except ImportError as error:
-        raise ConfigurationError(
-            f"planner 'predictive' needs numba ({error}): pip install 'actuated_characters[plan]'"
-        ) from error
-    return PredictivePlanner(
-        character, settings, rate_hz=values.integer("rate"), gravity=values.number("gravity")
-    )
 
 
 def commanded_joints(character: Character, values: Values) -> list[str]:

@@ -12,7 +12,6 @@ from rich.table import Table
 
 from experiment.commands.compare import add_compare
 from experiment.commands.export import add_export
-from experiment.commands.fit_feedback import add_fit_feedback
 from experiment.commands.info import add_info
 from experiment.commands.reconstruct import add_reconstruct
 from experiment.commands.recover import add_recover
@@ -70,7 +69,6 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_run(commands)
     add_reconstruct(commands)
-    add_fit_feedback(commands)
     add_render(commands)
     add_replay(commands)
     add_info(commands)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from controller_node import parameters as controller_parameters
 from controller_node.agreement import check_agreement
 from controller_node.behaviours.make import choose_behaviour
-from controller_node.controller import check_reference
 from controller_node.motion import make_motion
+from controller_node.planner.make import check_planning
 from controller_node.references.base import Reference
 from msgs_config.character import Character
 from msgs_config.character_loading import load_character
@@ -84,7 +84,8 @@ def make_plan(
         controller_given,
     )
     motion = make_motion(character, controller)
-    check_reference(motion.reference, choose_behaviour(character, controller))
+    choose_behaviour(character, controller)
+    check_planning(character, controller)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {
         "commanded_joints": commanded,

@@ -44,6 +44,11 @@ class TickClock:
             )
         return tick
 
+    def time_after(self, ticks: int) -> float:
+        """Time in s of a number of ticks after the first one, as its stamps count it."""
+        since_ns = self.stamp_ns(FIRST_TICK + ticks) - self.stamp_ns(FIRST_TICK)
+        return since_ns / NANOSECONDS_PER_SECOND
+
     def first_tick_from(self, stamp_ns: int) -> int:
         """The first tick whose stamp is a time in ns or later."""
         return -(-stamp_ns * self.rate_hz // NANOSECONDS_PER_SECOND)

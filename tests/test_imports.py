@@ -110,12 +110,9 @@ KNOW_NO_ROS = [
     "controller_node.control_laws",
     "controller_node.controller",
     "controller_node.effort_series",
-    "controller_node.feedback",
-    "controller_node.feedback_gains",
     "controller_node.laws",
     "controller_node.parameters",
-    "controller_node.references.corrected",
-    "controller_node.references.corrected_file",
+    "controller_node.references.reconstructed_file",
     "controller_node.references.curve",
     "controller_node.references.inertialised",
     "controller_node.references.keyframe_file",
@@ -139,8 +136,6 @@ KNOW_NO_ROS = [
     "experiment.report.decimation",
     "experiment.report.page",
     "experiment.report.timing",
-    "experiment.samcon.cost",
-    "experiment.samcon.settings",
     "experiment.studies.euler",
     "experiment.studies.tracking",
     "experiment.studies.second_order",
@@ -167,9 +162,7 @@ KNOW_NO_ENGINE = [
     "controller_node.behaviours.posture",
     "controller_node.control_laws",
     "controller_node.effort_series",
-    "controller_node.feedback_gains",
-    "controller_node.references.corrected",
-    "controller_node.references.corrected_file",
+    "controller_node.references.reconstructed_file",
     "controller_node.references.curve",
     "controller_node.references.inertialised",
     "controller_node.references.keyframe_file",
@@ -189,8 +182,6 @@ KNOW_NO_ENGINE = [
     "experiment.report.decimation",
     "experiment.report.page",
     "experiment.report.timing",
-    "experiment.samcon.cost",
-    "experiment.samcon.settings",
     "experiment.studies.tracking",
     "experiment.studies.second_order",
     "experiment.studies.euler",
@@ -394,7 +385,7 @@ def test_every_python_package_that_is_imported_is_required() -> None:
     arguments = setup_arguments()
     requirements = ast.literal_eval(arguments["install_requires"])
     extras = ast.literal_eval(arguments["extras_require"])
-    requirements += extras["video"] + extras["cluster"] + extras["fit"] + extras["plan"]
+    requirements += extras["video"] + extras["plan"]
     names = {re.split(r"[<>=[]", requirement)[0] for requirement in requirements}
     required = {distributions.get(name, name) for name in names}
     imported = {

@@ -8,12 +8,9 @@ import pytest
 from physics import controller
 from struck import HUMANOID, LINKS, RATE_HZ, Run, Throw, driver, run
 
-from controller_node import parameters as for_controller
 from controller_node.behaviours.base import Mode, ModeReport
 from controller_node.behaviours.give_way import GiveWay, softened
 from controller_node.controller import Controller
-from controller_node.feedback import Feedback, responding
-from controller_node.feedback_gains import FEATURES, OUTPUTS, FeedbackGains
 from controller_node.laws import GainArrays, Instant
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
@@ -25,7 +22,6 @@ from experiment.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
-from msgs_config.parameters import resolve
 from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import TickClock
 
@@ -398,24 +394,6 @@ def test_a_joint_without_gains_does_not_count_in_their_mean() -> None:
     heads = [joint.start for joint in LAYOUT.joints[1:] if joint.name != "left_knee"]
     assert scaled.stiffness[LAYOUT.joint("left_knee").start] == 0.0
     assert scaled.stiffness[heads].mean() == pytest.approx(gains.stiffness[heads].mean())
-
-
-def test_a_reference_with_feedback_is_refused_in_a_line() -> None:
-    gains = {f"{leg}.{OUTPUTS[0]}.{FEATURES[0]}": 0.5 for leg in ("stance", "swing")}
-    clip = ClipReference(LAYOUT, read_clip(HUMANOID, "walk"))
-    reference = responding(clip, [Feedback(HUMANOID, clip, FeedbackGains.of(gains))])
-    parameters = for_controller.PARAMETERS + for_controller.character_parameters(HUMANOID)
-
-    def made(behaviour: str) -> Controller:
-        values = resolve(parameters, {"reference": "clip", "behaviour": behaviour})
-        return for_controller.make_controller(HUMANOID, reference, values)
-
-    made("tracking")
-    made("ragdoll")
-    for behaviour in ("reactive", "active_ragdoll"):
-        with pytest.raises(ConfigurationError, match="feedback") as refused:
-            made(behaviour)
-        assert "\n" not in str(refused.value)
 
 
 def test_gains_by_inertia_keep_their_mean_and_make_all_joints_swing_alike() -> None:

@@ -147,7 +147,7 @@ def test_the_state_path_has_both_sides() -> None:
         "controller_node/balance.py",
         "controller_node/behaviours/library.py",
         "controller_node/references/clip.py",
-        "controller_node/window_gains.py",
+        "controller_node/planner/offsets.py",
         "msgs_config/dynamics.py",
         "msgs_config/rotations.py",
         "sim_node/aim.py",

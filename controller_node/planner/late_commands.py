@@ -5,6 +5,7 @@ are known, so that the model of the world foresees that state, and plan and law 
 1957, "Closer Control of Loops with Dead Time".)
 """
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -17,7 +18,7 @@ from msgs_config.character import Character
 
 
 class LateCommands:
-    """The commands on their way, which take a number of ticks. It remembers them."""
+    """The commands on their way, which take one tick or more. It remembers them."""
 
     def __init__(self, character: Character, model: ContactModel, delay_ticks: int) -> None:
         """Build the model of the world once more; the first time it is compiled."""
@@ -35,10 +36,16 @@ class LateCommands:
         """Begin with no command on its way."""
         self._sent.clear()
 
+    def sent(self) -> dict[int, FloatArray]:
+        """The commands on their way, by the tick of the state that each answers."""
+        return dict(self._sent)
+
+    def recall(self, sent: Mapping[int, FloatArray]) -> None:
+        """Go on with commands on their way."""
+        self._sent = dict(sent)
+
     def send(self, tick: int, effort: FloatArray) -> None:
         """Remember the effort (n,) that answers the state of a tick, which may come once more."""
-        if not self.delay_ticks:
-            return
         self._sent[tick] = self._clipped(effort)
         before = sorted(sent for sent in self._sent if sent < tick - self.delay_ticks)
         for old in before[:-1]:
@@ -52,8 +59,6 @@ class LateCommands:
         A state that had no answer, as in real time, goes on with the command before. Where the
         model diverges it is the state itself.
         """
-        if not self.delay_ticks:
-            return position, velocity
         first = tick - self.delay_ticks
         before = max((sent for sent in self._sent if sent < first), default=None)
         acting = self._nothing if before is None else self._sent[before]

@@ -10,7 +10,8 @@ by samples); Howell et al. 2022, "Predictive Sampling: Real-time Behaviour Synth
 (planning online in a model).
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +20,10 @@ from controller_node.laws import GainArrays
 from controller_node.planner.anchor import Anchor, Balance, balance_of
 from controller_node.planner.comparison import Comparison
 from controller_node.planner.compiled.draws import normal_draws
-from controller_node.planner.compiled.rollout import Body, Desired, knot_before
+from controller_node.planner.compiled.rollout import Body, Desired
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.late_commands import LateCommands
+from controller_node.planner.offsets import Offsets
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.rollouts import Rollouts
 from controller_node.planner.search import Found, Problem, improve
@@ -47,18 +49,19 @@ class Plan:
     """Offsets over a horizon, and what was learned while they were found."""
 
     tick: int  # at which it was made, since the episode began
-    first_knot: int
-    offsets: FloatArray  # (k, n - 6) at the knots, rad or m
+    offsets: Offsets
     sensitivities: FloatArray | None  # (k (n - 6), checks f) of features to offsets
     areas: FloatArray  # (k,) ticks of the horizon that each knot counts for
     outlook: Outlook
 
-    def offset(self, tick: int, knot_ticks: int) -> FloatArray:
-        """The offset (n - 6,) of a tick, linear between the knots."""
-        knot, share = knot_before(tick, knot_ticks)
-        before, after = self.offsets[knot - self.first_knot : knot - self.first_knot + 2]
-        offset: FloatArray = before + share * (after - before)
-        return offset
+
+@dataclass(frozen=True)
+class PlannerMemory:
+    """All that a planner goes on from."""
+
+    plan: Plan | None
+    anchor: Anchor
+    sent: Mapping[int, FloatArray]  # commands that have not acted yet
 
 
 @dataclass(frozen=True)
@@ -88,15 +91,18 @@ class PredictivePlanner:
 
         The first time on a machine the rollouts are compiled, which takes half a minute.
         """
-        self._settings = settings
+        self.settings = settings
         self._model = ContactModel(
             character, period_s=1.0 / rate_hz, gravity=gravity, friction=settings.friction
         )
         self._rollouts = Rollouts(self._model, settings.workers)
-        self.late_commands = LateCommands(character, self._model, settings.delay)
+        self.late_commands = (
+            LateCommands(character, self._model, settings.delay) if settings.delay else None
+        )
         self._comparison = Comparison(character, self._model, settings)
         self._rate_hz = rate_hz
         self._unit = settings.noise * settings.sigma  # (n - 6,) of what is looked for
+        self._seed = settings.seed
         self._episode = 0
         self._plan: Plan | None = None
         self._anchor = Anchor()
@@ -118,7 +124,25 @@ class PredictivePlanner:
         self._plan = None
         self._anchor = Anchor()
         self._targets.clear()
-        self.late_commands.forget()
+        if self.late_commands is not None:
+            self.late_commands.forget()
+
+    @property
+    def plan(self) -> Plan | None:
+        """The plan in force."""
+        return self._plan
+
+    def memory(self) -> PlannerMemory:
+        """What it goes on from, to be recalled by this planner or an equal one."""
+        late = self.late_commands
+        return PlannerMemory(self._plan, self._anchor, {} if late is None else late.sent())
+
+    def recall(self, memory: PlannerMemory, seed: int) -> None:
+        """Go on from a memory, with samples of a seed."""
+        self._seed, self._plan, self._anchor = seed, memory.plan, memory.anchor
+        self._targets.clear()
+        if self.late_commands is not None:
+            self.late_commands.recall(memory.sent)
 
     def change_reference(self) -> None:
         """Say that the reference is another one from now on; the plan stays."""
@@ -137,9 +161,9 @@ class PredictivePlanner:
         """
         if self._plan is not None and tick < self._plan.tick:
             self._plan = None  # a state of before comes once more: what was planned since is over
-        if self._plan is None or tick >= self._plan.tick + self._settings.period:
+        if self._plan is None or tick >= self._plan.tick + self.settings.period:
             self._plan = self._planned(tick, state, gains, desired_at)
-        return np.concatenate((np.zeros(6), self._plan.offset(tick, self._settings.knots)))
+        return np.concatenate((np.zeros(6), self._plan.offsets.at(tick)))
 
     def _compile(self, character: Character) -> None:
         """Have all compiled before the first state waits for an answer: one rollout at rest."""
@@ -148,47 +172,75 @@ class PredictivePlanner:
         still = ReferenceState(layout.configuration(rest), nothing, nothing)
         gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
         position, body = self._model.position_of(rest), self._model.body(gains)
-        desired = self._desired(0, 0, lambda _: still, body)
-        problem = self._problem(position, nothing, desired, body)
+        desired = self._desired(0, lambda _: still, body)
+        problem = self._problem(position, nothing, desired, body, gives_way=False)
         place = np.zeros(self._knot_count(0) * len(self._unit))
         draws = normal_draws((0, 0), (0, 0), _FEWEST_DRAWS * place.size).reshape(-1, place.size)
         found = improve(problem, place, draws, None)
         improve(problem, found.place, draws, found.sensitivities)
         self._targets.clear()
 
+    def costs(
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+    ) -> tuple[float, float]:
+        """What a state costs, and what it costs on average to go on with the plan in force.
+
+        Both against the reference where it is, without giving way; infinite where the plan leads to
+        nothing. The arguments are those of `offset`.
+        """
+        body, checks = self._model.body(gains), self.settings.checks
+        desired = self._desired(tick, desired_at, body)
+        position, velocity = self._model.position_of(state.position), state.velocity.copy()
+        features = self._rollouts.features_of(position, velocity, body)
+        now = self._comparison.residuals(features - self._targets[tick].features, gives_way=False)
+        problem = self._problem(position, velocity, desired, body, gives_way=False)
+        deviations = problem.deviations(self._left(tick).ravel()[np.newaxis])[0]
+        ahead = problem.residuals(deviations)
+        cost = float(fixed_order.dot(ahead, ahead))
+        cost_now = checks * float(fixed_order.dot(now, now))
+        return cost_now, cost if math.isfinite(cost) else math.inf
+
     def _planned(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
     ) -> Plan:
         """A plan from a state."""
-        settings, old = self._settings, self._plan
-        first_knot = tick // settings.knots
-        count = self._knot_count(tick)
-        areas = _areas(tick - first_knot * settings.knots, settings, count)
+        settings, old = self.settings, self._plan
         body = self._model.body(gains)
-        desired = self._desired(tick, first_knot, desired_at, body)
+        desired = self._desired(tick, desired_at, body)
         position, velocity = self._look(tick, state, body)
-        problem = self._problem(position, velocity, desired, body)
-        place = np.zeros((count, len(self._unit)))
+        gives_way = self._anchor.gives_way(tick / self._rate_hz)
+        problem = self._problem(position, velocity, desired, body, gives_way=gives_way)
+        place = self._left(tick)
+        first_knot = desired.rollout.first_knot
+        areas = _areas(tick - first_knot * settings.knots, settings, len(place))
         sensitivities, rounds = None, _FIRST_ROUNDS
         if old is not None:
-            left = old.offsets[first_knot - old.first_knot :]
-            place[: len(left)] = left / self._unit
             sensitivities, rounds = self._faded(old, tick, first_knot, areas), 1
         best = place.ravel()
         for number in range(rounds):
             draws = normal_draws(
-                (settings.seed, self._episode), (number, tick), settings.samples * place.size
+                (self._seed, self._episode), (number, tick), settings.samples * place.size
             )
             samples = draws.reshape(settings.samples, place.size)
             found = improve(problem, best, samples, sensitivities)
             best, sensitivities = found.place, found.sensitivities
-        offsets = best.reshape(place.shape) * self._unit
+        offsets = Offsets(settings.knots, first_knot, best.reshape(place.shape) * self._unit)
         outlook = self._outlook(found, problem, desired)
-        return Plan(tick, first_knot, offsets, sensitivities, areas, outlook)
+        return Plan(tick, offsets, sensitivities, areas, outlook)
+
+    def _left(self, tick: int) -> FloatArray:
+        """What is left of the plan in force at a tick, in units (k, n - 6); zero beyond its end."""
+        place = np.zeros((self._knot_count(tick), len(self._unit)))
+        if self._plan is not None:
+            known = self._plan.offsets
+            begins = max(tick // known.knot_ticks - known.first_knot, 0)
+            left = known.rows[begins:] / self._unit
+            place[: len(left)] = left
+        return place
 
     def _outlook(self, found: Found, problem: Problem, desired: _Course) -> Outlook:
         """What is expected of a plan."""
-        settings, checks = self._settings, self._settings.checks
+        settings, checks = self.settings, self.settings.checks
         residuals = problem.residuals(found.deviations).reshape(2, checks, -1)
         best = found.deviations[0].reshape(checks, -1)
         centres, _ = self._comparison.balance(desired.features + best)
@@ -217,12 +269,16 @@ class PredictivePlanner:
         return balance_of(position, velocity, centre)
 
     def _problem(
-        self, position: FloatArray, velocity: FloatArray, desired: _Course, body: Body
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        desired: _Course,
+        body: Body,
+        *,
+        gives_way: bool,
     ) -> Problem:
         """What a plan from a state is to make small."""
-        settings, checks = self._settings, self._settings.checks
-        tick = desired.rollout.first_tick
-        gives_way = self._anchor.gives_way(tick / self._rate_hz)
+        settings, checks = self.settings, self.settings.checks
 
         def deviations(places: FloatArray) -> FloatArray:
             plans = places.reshape(len(places), -1, len(self._unit)) * self._unit
@@ -235,19 +291,19 @@ class PredictivePlanner:
             by_check = rows.reshape(*rows.shape[:-1], checks, -1)
             return self._comparison.residuals(by_check, gives_way=gives_way).reshape(rows.shape)
 
-        knots = self._knot_count(tick)
+        knots = self._knot_count(desired.rollout.first_tick)
         penalty = _PENALTY * settings.noise
         largest = _LARGEST / settings.noise
         return Problem(deviations, residuals, penalty * penalty / knots, largest)
 
     def _knot_count(self, tick: int) -> int:
         """How many knots a plan has that is made at a tick."""
-        settings = self._settings
+        settings = self.settings
         return (tick + settings.horizon - 1) // settings.knots + 2 - tick // settings.knots
 
-    def _desired(self, tick: int, first_knot: int, desired_at: DesiredAt, body: Body) -> _Course:
+    def _desired(self, tick: int, desired_at: DesiredAt, body: Body) -> _Course:
         """The reference from a tick on."""
-        settings = self._settings
+        settings = self.settings
         for known in [known for known in self._targets if known < tick]:
             del self._targets[known]
         ticks = range(tick, tick + settings.horizon + 1)
@@ -255,7 +311,7 @@ class PredictivePlanner:
         desired = Desired(
             tick,
             settings.knots,
-            first_knot,
+            tick // settings.knots,
             settings.period,
             np.array([target.position for target in targets]),
             np.array([target.velocity for target in targets]),
@@ -279,13 +335,13 @@ class PredictivePlanner:
         """
         if old.sensitivities is None:
             return None
-        settings = self._settings
+        settings = self.settings
         known = old.sensitivities.reshape(len(old.areas), len(self._unit), settings.checks, -1)
         passed = (tick - old.tick) // settings.period
         checks = np.minimum(np.arange(settings.checks) + passed, settings.checks - 1)
         faded = np.zeros((len(areas), *known.shape[1:]))
         for knot, area in enumerate(areas):
-            before = knot + first_knot - old.first_knot
+            before = knot + first_knot - old.offsets.first_knot
             if before < len(known) and old.areas[before] > 0.0:
                 share = _FADING * min(1.0, area / old.areas[before])
                 faded[knot] = share * known[before][:, checks]

@@ -14,10 +14,10 @@ from controller_node.planner.compiled.rollout import (
     Desired,
     Engine,
     features_of,
-    knot_before,
     roll_out,
 )
 from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.offsets import knot_before
 from msgs_config.arrays import BoolArray, FloatArray
 
 _LARGEST = 1e4  # of a feature; beyond, a rollout has come to nothing

@@ -15,6 +15,7 @@ from msgs_config.shared_parameters import COMMAND_DELAY, PLANE
 
 NO_PLANNER = "none"
 PREDICTIVE = "predictive"
+RECORDED = "recorded"
 
 _WEIGHTS = {  # by name: the default, the unit, and of what
     "root_rotation": (5.0, "1/rad", "the root's rotation"),
@@ -32,9 +33,9 @@ PLANNER_PARAMETERS = [
     Parameter(
         "planner",
         NO_PLANNER,
-        "what keeps a floating base's motion by joint torques alone: nothing, or planning ahead "
-        "in a model of the world",
-        choices=(NO_PLANNER, PREDICTIVE),
+        "what keeps a floating base's motion by joint torques alone: nothing, planning ahead in a "
+        "model of the world, or the plan that is in the clip's file (of `reconstruct`)",
+        choices=(NO_PLANNER, PREDICTIVE, RECORDED),
     ),
     Parameter("plan.horizon", 0.8, "how far it looks", unit="s", minimum=0.05, maximum=5.0),
     Parameter("plan.period", 0.05, "from one plan to the next", unit="s", minimum=1e-3, maximum=1),
@@ -84,23 +85,21 @@ class PlannerSettings:
         return self.horizon // self.period
 
 
-def make_settings(character: Character, values: Values) -> PlannerSettings | None:
-    """The planner's settings; None without one.
-
-    Raises:
-        ConfigurationError: it has no floating base, or is not alone with the law `stable_pd`.
-    """
-    if values.text("planner") == NO_PLANNER:
-        return None
+def check_planner(character: Character, values: Values) -> None:
+    """Raise ConfigurationError if a planner cannot be had for a character, or with a behaviour."""
+    planner, behaviour = values.text("planner"), values.text("behaviour")
     if not character.layout.has_floating_base or character.layout.size == 6:
         raise ConfigurationError(
-            f"planner 'predictive' is for a floating base with joints; '{character.name}' is none"
+            f"planner '{planner}' is for a floating base with joints; '{character.name}' is none"
         )
-    behaviour = values.text("behaviour")
     if behaviour != "tracking":
         raise ConfigurationError(
-            f"planner 'predictive' is for the behaviour tracking; 'behaviour' is {behaviour}"
+            f"planner '{planner}' is for the behaviour tracking; 'behaviour' is {behaviour}"
         )
+
+
+def make_settings(character: Character, values: Values) -> PlannerSettings:
+    """The settings of planning ahead. Raises ConfigurationError if times contradict each other."""
     rate = values.integer("rate")
     period, knots = (_ticks(values, name, rate) for name in ("plan.period", "plan.knots"))
     horizon = _ticks(values, "plan.horizon", rate)
@@ -132,19 +131,20 @@ def make_settings(character: Character, values: Values) -> PlannerSettings | Non
 
 def check_world(values: Values, simulator: Mapping[str, object]) -> None:
     """Raise ConfigurationError if the model of the world is not of a simulator's parameters."""
-    if values.text("planner") != PREDICTIVE:
+    planner = values.text("planner")
+    if planner == NO_PLANNER:
         return
     terrain = simulator.get("terrain", PLANE)
     if terrain != PLANE:
         raise ConfigurationError(
-            f"planner 'predictive' knows the ground at z = 0 alone, but sim_node's 'terrain' is "
+            f"planner '{planner}' knows the ground at z = 0 alone, but sim_node's 'terrain' is "
             f"{terrain}; it must be {PLANE}"
         )
     own = values.integer(COMMAND_DELAY.name)
     delay = simulator.get(COMMAND_DELAY.name, own)
     if delay != own:
         raise ConfigurationError(
-            f"planner 'predictive' counts with '{COMMAND_DELAY.name}' {own}, but sim_node's is "
+            f"planner '{planner}' counts with '{COMMAND_DELAY.name}' {own}, but sim_node's is "
             f"{delay}; it must be the same"
         )
 

@@ -18,6 +18,7 @@ from msgs_config.files import read_text
 from msgs_config.geometry import fixed_order
 from msgs_config.joint_layout import JointType
 
+_OF_BEFORE = "Corrections"
 _ROOT_COLUMNS = 8  # duration, position, quaternion
 _SHORTEST_QUATERNION = 0.1
 _LARGEST_NUMBER = 1e6  # m or s
@@ -77,6 +78,11 @@ def _parse(path: Path, text: str) -> tuple[str, FloatArray]:
             f"{path}: not a motion clip; it must be JSON with 'Loop' and with 'Frames' of equal "
             "length"
         ) from error
+    if _OF_BEFORE in content:
+        raise ClipError(
+            f"{path}: found by `reconstruct` of version 0.2, whose corrections are not played any "
+            "more; reconstruct the clip again"
+        )
     if loop not in ("wrap", "none"):
         raise ClipError(f"{path}: Loop is {loop!r}; it must be 'wrap' or 'none'")
     if frames.ndim != 2 or len(frames) < 2:

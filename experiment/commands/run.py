@@ -16,7 +16,7 @@ from experiment.commands.settings import bring_parameters, node_settings
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a second to import
-    from controller_node.references.corrected_file import FoundWith
+    from controller_node.references.reconstructed_file import FoundWith
     from experiment.plan import Plan
     from experiment.planned_push import PlannedPush
     from experiment.planned_throw import PlannedThrow

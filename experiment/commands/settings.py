@@ -7,7 +7,7 @@ from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a while to import
-    from controller_node.references.corrected_file import FoundWith
+    from controller_node.references.reconstructed_file import FoundWith
 
 
 def node_settings(texts: Sequence[str], nodes: Sequence[str]) -> dict[str, dict[str, object]]:
@@ -43,7 +43,7 @@ def bring_parameters(
     Raises:
         ActuatedCharactersError: there is no such character or clip, or its file is malformed.
     """
-    from controller_node.references.corrected_file import read_found_with
+    from controller_node.references.reconstructed_file import read_found_with
     from experiment.plan import SHARED
     from msgs_config.character_loading import load_character
 
@@ -53,8 +53,6 @@ def bring_parameters(
     if found is None:
         return None
     taken = {name for name in SHARED if name in simulator or name in controller}
-    if "commanded_joints" in simulator:  # they decide on it
-        taken.add("root_assistance")
     for settings, brought in ((simulator, found.simulator), (controller, found.controller)):
         settings.update(
             {name: brought[name] for name in brought if name not in (*settings, *taken)}

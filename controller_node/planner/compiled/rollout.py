@@ -16,7 +16,10 @@ from controller_node.planner.compiled.soft_limits import (
     SoftLimits,
     add_soft_limits,
 )
+from controller_node.planner.offsets import knot_before
 from msgs_config.arrays import FloatArray
+
+_knot_before = compiled(knot_before)
 
 _FASTEST = 1e3  # rad/s or m/s; what is faster has diverged
 
@@ -57,13 +60,6 @@ class Desired(NamedTuple):
     check_ticks: int  # from one check to the next
     positions: FloatArray  # (ticks + 1, q) as MuJoCo has them
     velocities: FloatArray  # (ticks + 1, n)
-
-
-@compiled
-def knot_before(tick: int, knot_ticks: int) -> tuple[int, float]:
-    """The number of the knot before a tick, and how far the tick is to the next one, 0 to 1."""
-    knot = tick // knot_ticks
-    return knot, (tick - knot * knot_ticks) / knot_ticks
 
 
 @compiled
@@ -166,7 +162,7 @@ def _is_bounded(engine: Engine) -> bool:
 @compiled
 def _set_offset(error: FloatArray, knots: FloatArray, tick: int, desired: Desired) -> None:
     """Write the offset (n,) of a tick."""
-    number, share = knot_before(tick, desired.knot_ticks)
+    number, share = _knot_before(tick, desired.knot_ticks)
     knot = number - desired.first_knot
     error[:6] = 0.0
     for i in range(knots.shape[1]):

@@ -1,4 +1,4 @@
-"""Simulates a corrected motion again, from a fresh world, as a run of its file does."""
+"""Simulates a reconstruction again, from a fresh world, as a run of its file does."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,19 +9,20 @@ import numpy as np
 from experiment.loop import ticks_in_process
 from experiment.metrics import Measurement
 from experiment.plan import Plan
-from experiment.samcon.problem import Problem
-from experiment.samcon.tree import Node
+from experiment.reconstruction.problem import Problem
+from experiment.reconstruction.tree import Node
 from msgs_config import configuration
 from msgs_config.arrays import FloatArray
 from msgs_config.dynamics import DynamicsModel
 from msgs_config.errors import SimulationError
 from msgs_config.joint_layout import JointLayout, JointType
 from msgs_config.stamped import StampedState
+from msgs_config.tick_clock import TickClock
 
 
 @dataclass(frozen=True)
 class Figures:
-    """How well a corrected motion follows its motion."""
+    """How well a reconstruction follows its motion."""
 
     ticks: int
     fell: bool
@@ -35,27 +36,30 @@ class Figures:
 
 
 def verified(problem: Problem, file: Path, best: Node) -> Figures:
-    """Run a corrected motion's file from a fresh world, and measure it.
+    """Run a reconstruction's file from a fresh world, and measure it.
 
     Raises:
         SimulationError: the states are not those of the search, to the bit.
     """
-    plan, motion = problem.plan(str(file)), problem.plan().reference
-    windows = problem.windows(plan)
-    ends = dict(zip(windows.bounds[1:].tolist(), best.path, strict=False))
+    plan, motion = problem.plan_of(file), problem.plan().reference
+    clock = TickClock(plan.simulator.integer("rate"))
+    ends = {node.tick: node for node in best.path}
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     measurement = Measurement(known)
     positions: list[FloatArray] = []
+    motions: list[FloatArray] = []
     for count, tick in enumerate(ticks_in_process(plan, problem.planned_pushes(plan)), start=1):
         if count == 1:
             measurement.add_state(tick.state)
         measurement.add_state(tick.following)
         measurement.add_tick(tick)
+        time = clock.time_after(count)
         positions.append(tick.following.position)
+        motions.append(motion.sample(time).configuration.position)
         if count in ends:
-            _check_equal(tick.following, ends[count], windows.time(count))
-    times = [windows.time(count) for count in range(1, len(positions) + 1)]
-    motions = [motion.sample(time).configuration.position for time in times]
+            _check_equal(tick.following, ends[count], time)
+        if count == best.tick:
+            break
     summary = measurement.summary(wall_time=0.0)
     return Figures(
         ticks=len(positions),
@@ -72,11 +76,10 @@ def verified(problem: Problem, file: Path, best: Node) -> Figures:
 
 def _check_equal(state: StampedState, node: Node, time: float) -> None:
     found = np.concatenate((state.position, state.velocity))
-    wanted = node.end[: len(found)]
-    if found.tobytes() != wanted.tobytes():
+    if found.tobytes() != node.end.tobytes():
         raise SimulationError(
             f"the search's states are not repeated: at {time:g} s "
-            f"{np.abs(found - wanted).max():.3g} away"
+            f"{np.abs(found - node.end).max():.3g} away"
         )
 
 

@@ -1,0 +1,49 @@
+"""A plan that was made beforehand, a reconstruction's, and is played without looking ahead."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from controller_node.laws import GainArrays
+from controller_node.planner.offsets import RecordedPlan
+from controller_node.planner.outlook import Outlook
+from controller_node.references.base import ReferenceState
+from msgs_config.arrays import FloatArray
+from msgs_config.stamped import StampedState
+
+if TYPE_CHECKING:
+    from controller_node.planner.late_commands import LateCommands  # needs numba
+
+
+class RecordedPlanner:
+    """Plays a recorded plan where a planner would plan; it looks at no state."""
+
+    outlook: Outlook | None = None
+
+    def __init__(self, plan: RecordedPlan, late_commands: "LateCommands | None" = None) -> None:
+        self._plan = plan
+        self.late_commands = late_commands
+
+    def between_rollouts(self, act: Callable[[], None]) -> None:
+        """There are none."""
+
+    def begin_episode(self, episode: int) -> None:
+        """Begin anew."""
+        del episode
+        if self.late_commands is not None:
+            self.late_commands.forget()
+
+    def change_reference(self) -> None:
+        """The offsets are added to whatever is tracked."""
+
+    def offset(
+        self,
+        tick: int,
+        state: StampedState,
+        gains: GainArrays,
+        desired_at: Callable[[int], ReferenceState],
+    ) -> FloatArray:
+        """What is added to the tracking errors (n,) at a tick; zero for the root."""
+        del state, gains, desired_at
+        return np.concatenate((np.zeros(6), self._plan.at(tick)))

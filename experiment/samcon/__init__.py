@@ -1,1 +1,0 @@
-"""Sampling-based motion control: corrections with which a clip needs no root assistance."""
