@@ -45,7 +45,7 @@ class Instant:
     velocity: FloatArray  # (n,)
     now: ReferenceState
     upcoming: ReferenceState  # one tick later
-    response: FloatArray | None = None  # (n,) of feedback, added to the errors; None: nothing
+    response: FloatArray | None = None  # (n,) a planner's offset to the errors; None: without
 
     def error(self, model: DynamicsModel, desired: ReferenceState) -> FloatArray:
         """The error (n,) of the configuration against a desired state, with the response."""

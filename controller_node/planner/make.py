@@ -91,6 +91,8 @@ def saying_what_it_needs(planner: str) -> Iterator[None]:
     try:
         yield
     except ImportError as error:
+        if (error.name or "").partition(".")[0] not in ("numba", "llvmlite"):
+            raise
         raise ConfigurationError(
             f"planner '{planner}' needs numba ({error}): pip install 'actuated_characters[plan]'"
         ) from error

@@ -233,9 +233,9 @@ class PredictivePlanner:
         place = np.zeros((self._knot_count(tick), len(self._unit)))
         if self._plan is not None:
             known = self._plan.offsets
-            begins = max(tick // known.knot_ticks - known.first_knot, 0)
-            left = known.rows[begins:] / self._unit
-            place[: len(left)] = left
+            rows = np.arange(len(place)) + (tick // known.knot_ticks - known.first_knot)
+            there = rows < len(known.rows)
+            place[there] = known.rows[np.maximum(rows[there], 0)] / self._unit
         return place
 
     def _outlook(self, found: Found, problem: Problem, desired: _Course) -> Outlook:

@@ -46,12 +46,12 @@ def read_plan(character: Character, name_or_path: str) -> RecordedPlan | None:
 
 @dataclass(frozen=True)
 class FoundWith:
-    """The run in which a corrected motion was found; in any other one it is another motion."""
+    """The run in which a motion was found; in any other one it is another motion."""
 
     duration: float  # s, as far as it was found
     simulator: Mapping[str, object]  # parameters of `sim_node`, by name
     controller: Mapping[str, object]  # of `controller_node`
-    pushes: tuple[str, ...]  # LINK:FX,FY,FZ@S, which the search knew beforehand
+    pushes: tuple[str, ...]  # LINK:FX,FY,FZ@S, which came in the search, too
 
 
 def read_found_with(character: Character, name_or_path: str) -> FoundWith | None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:  # it takes a second to import
     from experiment.reconstruction.search import Progress as SearchProgress
 
 _NODES = ("sim_node", "controller_node")
+_OWN = ("planner", "reference", "clip", "plan.seed", "plan.workers")
 _CHARACTER = "humanoid"
 
 
@@ -110,10 +111,14 @@ def _job(options: argparse.Namespace) -> "Job":
     from experiment.reconstruction.problem import Problem, duration_of
     from experiment.reconstruction.reconstruction import Job
     from experiment.reconstruction.search import Settings
+    from sim_node.parameters import tick_period
 
     workers = worker_count(options.workers)
     _check_output(options)
     given = node_settings(options.set, _NODES)
+    for name in _OWN:
+        if name in given["controller_node"]:
+            raise ConfigurationError(f"--set controller_node.{name}: reconstruct sets it itself")
     simulator = {"rate": options.rate, "command_delay_ticks": options.delay_ticks}
     problem = Problem(
         options.character,
@@ -125,7 +130,13 @@ def _job(options: argparse.Namespace) -> "Job":
     )
     settings = Settings(options.worlds, options.kept, options.window, options.seed)
     settings.check()
-    problem.planned_pushes(problem.plan())  # what is wrong is said before anything begins
+    plan = problem.plan()  # what is wrong is said before anything begins
+    problem.planned_pushes(plan)
+    if tick_period(plan.simulator):
+        raise ConfigurationError(
+            "reconstruct simulates as fast as it can; it takes neither 'mode' realtime nor a "
+            "'real_time_factor'"
+        )
     return Job(problem, settings, options.output, workers, options.resume)
 
 

@@ -70,16 +70,16 @@ def reconstruct(
 
     report(progress, windows)
     with Workers(job.problem, window, job.workers) as workers:
-        done = search(workers, windows, job.settings, progress, after_window)
+        stuck_at = search(workers, windows, job.settings, progress, after_window)
     best = result(progress)
     if best is None:
         raise RunError("all worlds were lost in the first window; nothing was written")
     _write(job, plan, best, None)
-    if not done:
+    if stuck_at is not None:
         raise RunError(
             f"{job.settings.tries} failures without getting any further, at last at window "
-            f"{progress.window + 1} of {windows}; {job.output} has the best attempt, "
-            f"{best.tick / plan.simulator.integer('rate'):.2f} s long"
+            f"{stuck_at + 1} of {windows}; {job.output} has the best attempt, "
+            f"{best.tick / plan.simulator.integer('rate'):.2f} s long; --resume tries again"
         )
     figures = verified(job.problem, job.output, best)
     _write(job, plan, best, figures)

@@ -16,11 +16,11 @@ import numpy as np
 
 from experiment.reconstruction.tree import Node
 from experiment.reconstruction.world import Branch, Grown
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, SimulationError
 
 _RECENT = 4  # windows whose costs count beside what is ahead
 _FURTHEST_BACK = 16  # windows
-_PLACES = 4  # windows back of which places are kept; from further back it is simulated again
+_PLACES = _FURTHEST_BACK + 1  # windows of which places are kept
 _MOST_WORLDS, _MOST_FAILURES = 2**10, 2**10  # each has seeds of its own
 _LARGEST_SEED = 2**32
 
@@ -79,13 +79,14 @@ def search(
     settings: Settings,
     progress: Progress,
     report: Callable[[Progress], None],
-) -> bool:
-    """Go on to the last window; False where it is stuck before.
+) -> int | None:
+    """Go on to the last window; returns None, or the number of a window where it is stuck.
 
     Where all worlds are lost it goes back, twice as far each time (at most 16 windows) until it
     gets further than ever: who is going to fall has long been beyond help when it does.
 
     Raises:
+        SimulationError: what was found before is not repeated.
         ActuatedCharactersError: a process failed.
     """
     while progress.window < windows:
@@ -100,14 +101,16 @@ def search(
             for node in [node for level in progress.levels[:-_PLACES] for node in level]:
                 node.place = None
         else:
+            failed = progress.window
             progress.failures += 1
             progress.stuck += 1
+            del progress.levels[max(failed - min(2**progress.stuck, _FURTHEST_BACK), 0) :]
             if progress.stuck >= settings.tries:
-                return False
-            back = min(2**progress.stuck, _FURTHEST_BACK, progress.window)
-            del progress.levels[progress.window - back :]
+                progress.stuck = 0  # who resumes it wants it to try again
+                report(progress)
+                return failed
         report(progress)
-    return True
+    return None
 
 
 def result(progress: Progress) -> Node | None:
@@ -123,11 +126,12 @@ def result(progress: Progress) -> Node | None:
 def _next_level(worlds: Worlds, settings: Settings, progress: Progress) -> list[Node]:
     """The nodes that are kept of the next window, the best first; none if all are lost."""
     parents: list[Node | None] = list(progress.levels[-1]) if progress.levels else [None]
+    _come_again(worlds, [node for node in parents if node is not None and node.place is None])
     count = settings.worlds
     owners = [parents[index * len(parents) // count] for index in range(count)]
     seeds = [_seed(settings, progress, index) for index in range(count)]
     branches = [
-        Branch(None, (seed,)) if parent is None else parent.branch(seed)
+        Branch(None if parent is None else parent.place, (seed,))
         for parent, seed in zip(owners, seeds, strict=True)
     ]
     nodes = [
@@ -136,6 +140,16 @@ def _next_level(worlds: Worlds, settings: Settings, progress: Progress) -> list[
         if grown is not None
     ]
     return sorted(nodes, key=_value)[: settings.kept]  # equal ones stay in their order
+
+
+def _come_again(worlds: Worlds, nodes: Sequence[Node]) -> None:
+    """Have places of nodes, after a search was resumed."""
+    for node, grown in zip(nodes, worlds.grow([node.again() for node in nodes]), strict=True):
+        if grown is None or grown.end.tobytes() != node.end.tobytes():
+            raise SimulationError(
+                "what the checkpoint says is not repeated; it is of another version or machine"
+            )
+        node.place = grown.place
 
 
 def _value(node: Node) -> float:

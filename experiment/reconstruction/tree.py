@@ -28,12 +28,10 @@ class Node:
             nodes.append(nodes[-1].parent)
         return nodes[::-1]
 
-    def branch(self, seed: int) -> Branch:
-        """What a world needs to go on from here; where no place is kept, from one before."""
-        seeds, node = [seed], self
-        while node.place is None:
+    def again(self) -> Branch:
+        """What a world needs to come here once more, from the last place before that is kept."""
+        seeds, node = [self.seed], self.parent
+        while node is not None and node.place is None:
             seeds.append(node.seed)
-            if node.parent is None:
-                return Branch(None, tuple(seeds[::-1]))
             node = node.parent
-        return Branch(node.place, tuple(seeds[::-1]))
+        return Branch(None if node is None else node.place, tuple(seeds[::-1]))

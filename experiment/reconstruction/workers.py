@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from types import TracebackType
 
 from experiment.reconstruction.problem import Problem
@@ -15,6 +16,7 @@ from msgs_config.errors import RunError
 
 _MOST_DEATHS = 5  # of processes in one window, one after another; then something else is wrong
 
+_engine: tuple[Problem, int] | None = None  # what a process makes its world of
 _world: TrialWorld | None = None
 
 
@@ -41,6 +43,9 @@ class Workers:
         trace: TracebackType | None,
     ) -> None:
         if self._pool is not None:
+            if error is not None:  # nobody waits for what they are doing
+                for process in multiprocessing.active_children():
+                    process.terminate()
             self._pool.shutdown(cancel_futures=True)
         if self._own is not None:
             self._own.close()
@@ -60,7 +65,9 @@ class Workers:
         for _ in range(_MOST_DEATHS):
             self._pool = self._pool or self._fresh_pool()
             try:
-                for grown in self._pool.map(_grow, branches[done:]):
+                with _interrupts_blocked():  # here, where processes begin, and in these for ever
+                    results = self._pool.map(_grow, branches[done:])
+                for grown in results:
                     done += 1
                     yield grown
             except BrokenProcessPool:
@@ -75,12 +82,21 @@ class Workers:
         return ProcessPoolExecutor(self._count, spawn, _begin, self._engine)
 
 
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Ctrl-C waits; a process that is begun meanwhile leaves it to the one that began it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin(problem: Problem, window_ticks: int) -> None:
-    """What a worker's process does first: Ctrl-C is for the process that started it."""
-    global _world
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """What a worker's process does first."""
+    global _engine
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    _world = TrialWorld(problem, window_ticks)
+    _engine = problem, window_ticks
 
 
 def _end_with_parent() -> None:
@@ -91,5 +107,8 @@ def _end_with_parent() -> None:
 
 
 def _grow(branch: Branch) -> Grown | None:
-    assert _world is not None
+    global _world
+    if _world is None:
+        assert _engine is not None
+        _world = TrialWorld(*_engine)  # what is wrong with it is the task's error
     return _world.grow(branch)

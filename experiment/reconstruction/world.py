@@ -81,11 +81,10 @@ class TrialWorld:
         if place is None:
             self._simulation.close()  # only a new world returns to a state without a step
             self._simulation = self._fresh()
-            self._controller.begin_episode(self._episode_ns)
-            tick = 0
         else:
             self._simulation.take_over(place.snapshot)
-            tick = place.tick
+        self._controller.begin_episode(self._episode_ns)  # it forgets what it planned before
+        tick = 0 if place is None else place.tick
         memory = self._planner.memory() if place is None else place.memory
         grown = None
         for seed in branch.seeds:
