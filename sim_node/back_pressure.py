@@ -15,19 +15,16 @@ class BackPressure:
     """
 
     acknowledged: Callable[[float], bool]  # whether all have all, or get it within so many s
-    every_ticks: int = 2000  # between questions; a publisher keeps the last 5000 messages
-    every: float = 5.0  # s of wall time between them at most, on a machine that is slow
+    every_ticks: int = 1000  # between questions; a publisher keeps the last 5000 messages
     longest: float = 30.0  # s of wall time
     turn: float = 0.02  # s of it between looks at everything else
     _last_tick: int = 0  # at which they were asked
-    _last_time: float = math.inf
     _gives_up_at: float = math.inf
     _has_given_up: bool = False
 
     def holds(self, tick: int, now: float) -> bool:
         """Whether the tick may not begin yet; `now` in s of wall time."""
-        self._last_time = min(self._last_time, now)
-        if tick - self._last_tick < self.every_ticks and now - self._last_time < self.every:
+        if tick - self._last_tick < self.every_ticks:
             return False
         if self.acknowledged(0.0 if self._has_given_up else self.turn):
             self._has_given_up = False
@@ -36,7 +33,7 @@ class BackPressure:
             if now < self._gives_up_at:
                 return True
             self._has_given_up = True
-        self._last_tick, self._last_time, self._gives_up_at = tick, now, math.inf
+        self._last_tick, self._gives_up_at = tick, math.inf
         return False
 
     @property

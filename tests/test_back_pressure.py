@@ -16,7 +16,7 @@ class Subscribers:
 
 
 def pressure_of(subscribers: Subscribers) -> BackPressure:
-    return BackPressure(subscribers, every_ticks=100, every=3.0, longest=1.0, turn=0.5)
+    return BackPressure(subscribers, every_ticks=100, longest=1.0, turn=0.5)
 
 
 def test_subscribers_that_follow_are_asked_only_now_and_then() -> None:
@@ -27,16 +27,6 @@ def test_subscribers_that_follow_are_asked_only_now_and_then() -> None:
 
     assert not any(held)
     assert len(subscribers.waits) == 3
-
-
-def test_on_a_slow_machine_they_are_asked_more_often() -> None:
-    subscribers = Subscribers()
-    pressure = pressure_of(subscribers)
-    subscribers.have_all = False
-
-    held = [pressure.holds(tick, now=8.0 + tick) for tick in range(1, 5)]
-
-    assert held == [False, False, False, True]
 
 
 def test_it_holds_until_they_have_all() -> None:

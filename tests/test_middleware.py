@@ -40,7 +40,7 @@ def test_on_one_machine_shared_memory_is_patient_unless_the_user_has_other_wishe
 def test_both_files_have_the_same_timers() -> None:
     def timers(file: Path) -> dict[str, str]:
         tree = ElementTree.parse(file)
-        names = ("leaseDuration", "leaseAnnouncement", "data_writer", "data_reader")
+        names = ("leaseAnnouncement", "data_writer", "data_reader")
         found = {
             name: "".join(each.itertext()).split()
             for name in names

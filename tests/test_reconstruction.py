@@ -448,7 +448,7 @@ def test_ctrl_c_leaves_no_process_and_what_was_found(tmp_path: Path, *, early: b
         wait_until(
             lambda: len(marked(mark)) > 2 and (early or checkpoint_path(output).exists()),
             "processes, and a checkpoint",
-            90.0,
+            240.0,  # compiled for the first time on a slow machine
         )
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
         _, said = process.communicate(timeout=60.0)

@@ -37,7 +37,7 @@ LIMITED = (
     "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
     "from experiment.cli import main; sys.exit(main(sys.argv[1:]))"
 )
-MOST_UNACKNOWLEDGED = 2200  # ticks: the simulator looks each 2000
+MOST_UNACKNOWLEDGED = 1200  # ticks: the simulator looks each 1000
 STILL = 1.0  # s without a tick, that say that the simulator waits
 SLOW = 120.0  # s that thousands of ticks may take on a machine that is busy with other things
 BEGIN, END = "before_the_flood", "after_the_flood"  # in no message definition

@@ -85,11 +85,19 @@ class Workers:
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
     """Ctrl-C waits; a process that is begun meanwhile leaves it to the one that began it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+        if came:  # another thread had not blocked it
+            signal.raise_signal(signal.SIGINT)
 
 
 def _begin(problem: Problem, window_ticks: int) -> None:
