@@ -9,7 +9,6 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from multiprocessing import get_context
 
 from msgs_config.process import limit_threads
@@ -26,13 +25,12 @@ from experiment.commands.settings import node_settings  # noqa: E402
 from experiment.loop import ticks_in_process  # noqa: E402
 from experiment.plan import Plan, make_plan  # noqa: E402
 from experiment.planned_push import pushes_within  # noqa: E402
-from msgs_config.arrays import FloatArray  # noqa: E402
+from experiment.reconstruction.world import is_lost  # noqa: E402
 from msgs_config.character_loading import load_character  # noqa: E402
 from msgs_config.dynamics import DynamicsModel  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa: E402
 
 CHARACTER = "humanoid"
-FARTHEST, LOWEST = 0.6, 0.5  # m off the clip's centre of mass, and share of its height
 NODES = ("sim_node", "controller_node")
 
 
@@ -94,8 +92,8 @@ def main() -> int:
 def attempt(task: Task) -> Attempt:
     """Track a clip until it is lost or ends."""
     plan = _plan(task)
-    layout, model, rate = plan.character.layout, DynamicsModel(plan.character), _rate(plan)
-    centre = partial(_centre, model)
+    layout, rate = plan.character.layout, _rate(plan)
+    centre = DynamicsModel(plan.character).centre_of_mass_at
     off, turns = [], []
     try:
         for number, tick in enumerate(ticks_in_process(plan, pushes_within(task.pushes, plan)), 1):
@@ -104,7 +102,7 @@ def attempt(task: Task) -> Attempt:
             difference = layout.difference(wanted.configuration, layout.configuration(got))
             off.append(float(np.linalg.norm(here - there)))
             turns.append(float(layout.norms(difference)[2:].mean()))
-            if off[-1] > FARTHEST or here[2] < LOWEST * there[2]:
+            if is_lost(here, there):
                 return Attempt(float(np.mean(off)), float(np.mean(turns)), number / rate)
     except SimulationError:
         return Attempt(float(np.mean(off)), float(np.mean(turns)), len(off) / rate)
@@ -126,11 +124,6 @@ def _plan(task: Task) -> Plan:
 
 def _rate(plan: Plan) -> int:
     return plan.simulator.integer("rate")
-
-
-def _centre(model: DynamicsModel, position: FloatArray) -> FloatArray:
-    model.update(position, np.zeros(len(position)))
-    return model.centre_of_mass()
 
 
 def _row(attempts: Sequence[Attempt]) -> list[str]:

@@ -159,6 +159,11 @@ class DynamicsModel:
         centre: FloatArray = self._data.subtree_com[1].copy()
         return centre
 
+    def centre_of_mass_at(self, position: FloatArray) -> FloatArray:
+        """Centre of mass (3,) in the world, m, of a position (n,), in which the model then is."""
+        self.update(position, np.zeros(self._layout.size))
+        return self.centre_of_mass()
+
     def centre_of_mass_jacobian(self) -> FloatArray:
         """The Jacobian J (3, n) of the centre of mass: its velocity in the world is `J v`, m/s."""
         jacobian = np.empty((3, self._layout.size))

@@ -131,7 +131,7 @@ def _leave(node: RunnableNode | None, code: int) -> None:
 def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
     """The variables with which Fast DDS 2.14, Jazzy's, takes up settings of ours.
 
-    There are none if the user has some. Under LOCALHOST, what that range means is in the file.
+    Empty where the user has settings. Under LOCALHOST, what that range means is in the file.
     """
     given = environment.get(_PROFILES)
     if given not in (None, str(_ANYWHERE), str(_LOCALHOST)):

@@ -20,8 +20,9 @@ from controller_node.laws import GainArrays
 from controller_node.planner.anchor import Anchor, Balance, balance_of
 from controller_node.planner.comparison import Comparison
 from controller_node.planner.compiled.draws import normal_draws
-from controller_node.planner.compiled.rollout import Body, Desired
+from controller_node.planner.compiled.rollout import Body
 from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.course import Course, DesiredAt, Foreseen, Target
 from controller_node.planner.late_commands import LateCommands
 from controller_node.planner.offsets import Offsets
 from controller_node.planner.outlook import Outlook
@@ -39,9 +40,6 @@ _LARGEST = 0.9  # sigma, of an offset
 _PENALTY = 0.2  # of an offset, for each sigma
 _FADING = 0.7  # of sensitivities, from plan to plan
 _FEWEST_DRAWS = 6
-
-DesiredAt = Callable[[int], ReferenceState]
-"""The desired state of a tick, counted from the episode's first state."""
 
 
 @dataclass(frozen=True)
@@ -62,23 +60,6 @@ class PlannerMemory:
     plan: Plan | None
     anchor: Anchor
     sent: Mapping[int, FloatArray]  # commands that have not acted yet
-
-
-@dataclass(frozen=True)
-class _Target:
-    """The reference at one tick, as rollouts need it."""
-
-    position: FloatArray  # (q,)
-    velocity: FloatArray  # (n,)
-    features: FloatArray  # (f,)
-
-
-@dataclass(frozen=True)
-class _Course:
-    """The reference over a horizon, and its features (checks, f)."""
-
-    rollout: Desired
-    features: FloatArray
 
 
 class PredictivePlanner:
@@ -106,7 +87,7 @@ class PredictivePlanner:
         self._episode = 0
         self._plan: Plan | None = None
         self._anchor = Anchor()
-        self._targets: dict[int, _Target] = {}
+        self._course = Course(self._model, self._rollouts, settings)
         self._compile(character)
 
     @property
@@ -123,7 +104,7 @@ class PredictivePlanner:
         self._episode = episode
         self._plan = None
         self._anchor = Anchor()
-        self._targets.clear()
+        self._course.forget()
         if self.late_commands is not None:
             self.late_commands.forget()
 
@@ -140,13 +121,12 @@ class PredictivePlanner:
     def recall(self, memory: PlannerMemory, seed: int) -> None:
         """Go on from a memory, with samples of a seed."""
         self._seed, self._plan, self._anchor = seed, memory.plan, memory.anchor
-        self._targets.clear()
         if self.late_commands is not None:
             self.late_commands.recall(memory.sent)
 
     def change_reference(self) -> None:
         """Say that the reference is another one from now on; the plan stays."""
-        self._targets.clear()
+        self._course.forget()
 
     def offset(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -172,33 +152,40 @@ class PredictivePlanner:
         still = ReferenceState(layout.configuration(rest), nothing, nothing)
         gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
         position, body = self._model.position_of(rest), self._model.body(gains)
-        desired = self._desired(0, lambda _: still, body)
+        desired = self._course.ahead(0, lambda _: still, body)
         problem = self._problem(position, nothing, desired, body, gives_way=False)
         place = np.zeros(self._knot_count(0) * len(self._unit))
         draws = normal_draws((0, 0), (0, 0), _FEWEST_DRAWS * place.size).reshape(-1, place.size)
         found = improve(problem, place, draws, None)
         improve(problem, found.place, draws, found.sensitivities)
-        self._targets.clear()
+        self._course.forget()
 
-    def costs(
+    def cost(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
-    ) -> tuple[float, float]:
-        """What a state costs, and what it costs on average to go on with the plan in force.
+    ) -> float:
+        """What a state costs against the reference where it is, without giving way.
 
-        Both against the reference where it is, without giving way; infinite where the plan leads to
-        nothing. The arguments are those of `offset`.
+        The arguments are those of `offset`.
         """
-        body, checks = self._model.body(gains), self.settings.checks
-        desired = self._desired(tick, desired_at, body)
-        position, velocity = self._model.position_of(state.position), state.velocity.copy()
-        features = self._rollouts.features_of(position, velocity, body)
-        now = self._comparison.residuals(features - self._targets[tick].features, gives_way=False)
-        problem = self._problem(position, velocity, desired, body, gives_way=False)
-        deviations = problem.deviations(self._left(tick).ravel()[np.newaxis])[0]
-        ahead = problem.residuals(deviations)
-        cost = float(fixed_order.dot(ahead, ahead))
-        cost_now = checks * float(fixed_order.dot(now, now))
-        return cost_now, cost if math.isfinite(cost) else math.inf
+        body, position = self._model.body(gains), self._model.position_of(state.position)
+        features = self._rollouts.features_of(position, state.velocity.copy(), body)
+        wanted = self._course.target(tick, desired_at, body).features
+        residuals = self._comparison.residuals(features - wanted, gives_way=False)
+        return self.settings.checks * float(fixed_order.dot(residuals, residuals))
+
+    def cost_ahead(
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+    ) -> float:
+        """What a state will cost, on average, in going on with the plan in force.
+
+        As `cost`; infinite where that leads to nothing.
+        """
+        body, position = self._model.body(gains), self._model.position_of(state.position)
+        desired = self._course.ahead(tick, desired_at, body)
+        problem = self._problem(position, state.velocity.copy(), desired, body, gives_way=False)
+        residuals = problem.residuals(problem.deviations(self._left(tick).ravel()[np.newaxis])[0])
+        cost = float(fixed_order.dot(residuals, residuals))
+        return cost if math.isfinite(cost) else math.inf
 
     def _planned(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -206,8 +193,10 @@ class PredictivePlanner:
         """A plan from a state."""
         settings, old = self.settings, self._plan
         body = self._model.body(gains)
-        desired = self._desired(tick, desired_at, body)
-        position, velocity = self._look(tick, state, body)
+        desired = self._course.ahead(tick, desired_at, body)
+        position, velocity = self._look(
+            tick, state, body, self._course.target(tick, desired_at, body)
+        )
         gives_way = self._anchor.gives_way(tick / self._rate_hz)
         problem = self._problem(position, velocity, desired, body, gives_way=gives_way)
         place = self._left(tick)
@@ -238,7 +227,7 @@ class PredictivePlanner:
             place[there] = known.rows[np.maximum(rows[there], 0)] / self._unit
         return place
 
-    def _outlook(self, found: Found, problem: Problem, desired: _Course) -> Outlook:
+    def _outlook(self, found: Found, problem: Problem, desired: Foreseen) -> Outlook:
         """What is expected of a plan."""
         settings, checks = self.settings, self.settings.checks
         residuals = problem.residuals(found.deviations).reshape(2, checks, -1)
@@ -249,9 +238,11 @@ class PredictivePlanner:
         costs, others = fixed_order.dot(residuals, residuals)
         return Outlook(times, self._anchor.out_of(centres), costs, others, self._anchor)
 
-    def _look(self, tick: int, state: StampedState, body: Body) -> tuple[FloatArray, FloatArray]:
+    def _look(
+        self, tick: int, state: StampedState, body: Body, target: Target
+    ) -> tuple[FloatArray, FloatArray]:
         """A state in the reference's world, (q,) and (n,), which may have given way to it."""
-        position, target = self._model.position_of(state.position), self._targets[tick]
+        position = self._model.position_of(state.position)
         velocity = state.velocity.copy()  # a message's cannot be written to: another type
         seen = self._anchor.into(position, velocity)
         features = self._rollouts.features_of(*seen, body)
@@ -272,7 +263,7 @@ class PredictivePlanner:
         self,
         position: FloatArray,
         velocity: FloatArray,
-        desired: _Course,
+        desired: Foreseen,
         body: Body,
         *,
         gives_way: bool,
@@ -300,32 +291,6 @@ class PredictivePlanner:
         """How many knots a plan has that is made at a tick."""
         settings = self.settings
         return (tick + settings.horizon - 1) // settings.knots + 2 - tick // settings.knots
-
-    def _desired(self, tick: int, desired_at: DesiredAt, body: Body) -> _Course:
-        """The reference from a tick on."""
-        settings = self.settings
-        for known in [known for known in self._targets if known < tick]:
-            del self._targets[known]
-        ticks = range(tick, tick + settings.horizon + 1)
-        targets = [self._target(each, desired_at, body) for each in ticks]
-        desired = Desired(
-            tick,
-            settings.knots,
-            tick // settings.knots,
-            settings.period,
-            np.array([target.position for target in targets]),
-            np.array([target.velocity for target in targets]),
-        )
-        checked = targets[settings.period :: settings.period]
-        return _Course(desired, np.array([target.features for target in checked]))
-
-    def _target(self, tick: int, desired_at: DesiredAt, body: Body) -> _Target:
-        if tick not in self._targets:
-            state = desired_at(tick)
-            position = self._model.position_of(state.configuration.position)
-            features = self._rollouts.features_of(position, state.velocity, body)
-            self._targets[tick] = _Target(position, state.velocity, features)
-        return self._targets[tick]
 
     def _faded(self, old: Plan, tick: int, first_knot: int, areas: FloatArray) -> FloatArray | None:
         """The sensitivities (d, m) of the plan before, at this one's knots and checks.

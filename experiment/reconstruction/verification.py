@@ -87,13 +87,7 @@ def centre_error(
     plan: Plan, positions: Sequence[FloatArray], motions: Sequence[FloatArray]
 ) -> float:
     """Mean distance in m of the centre of mass from the motion's, over states (n,) each."""
-    model = DynamicsModel(plan.character)
-    still = np.zeros(plan.character.layout.size)
-
-    def centre(position: FloatArray) -> FloatArray:
-        model.update(position, still)
-        return model.centre_of_mass()
-
+    centre = DynamicsModel(plan.character).centre_of_mass_at
     pairs = zip(positions, motions, strict=True)
     return float(np.mean([np.linalg.norm(centre(here) - centre(there)) for here, there in pairs]))
 

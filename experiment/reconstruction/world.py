@@ -1,6 +1,5 @@
 """A world in which a motion is tried: the simulation and the planning controller of a run."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +16,8 @@ from msgs_config.errors import SimulationError
 from sim_node.parameters import make_role, make_settings
 from sim_node.simulation import Simulation, Snapshot
 
-FARTHEST = 0.6  # m, of the centre of mass from the motion's; beyond it a world is lost
-LOWEST = 0.5  # of the height of the motion's centre of mass, likewise
+_FARTHEST = 0.6  # m, of the centre of mass from the motion's
+_LOWEST = 0.5  # of the height of the motion's centre of mass
 
 
 @dataclass(frozen=True)
@@ -49,6 +48,11 @@ class Grown:
     ahead: float  # of going on as planned
 
 
+def is_lost(centre: FloatArray, wanted: FloatArray) -> bool:
+    """Whether a centre of mass (3,) is so far from the motion's that the motion is lost."""
+    return bool(np.linalg.norm(centre - wanted) > _FARTHEST or centre[2] < _LOWEST * wanted[2])
+
+
 class TrialWorld:
     """One process's engine for a problem."""
 
@@ -67,7 +71,7 @@ class TrialWorld:
         assert isinstance(planner, PredictivePlanner)
         self._planner = planner
         self._period = planner.settings.period
-        self._model = DynamicsModel(self.plan.character)
+        self._centre_at = DynamicsModel(self.plan.character).centre_of_mass_at
         self._simulation = self._fresh()
         self._episode_ns = self._simulation.actors[0].state.stamp_ns
 
@@ -99,7 +103,7 @@ class TrialWorld:
         """Simulate the ticks of a window."""
         plans: list[tuple[int, Offsets]] = []
         costs: list[float] = []
-        ahead, before = math.inf, self._planner.plan
+        before, gains = self._planner.plan, self._controller.settings.gains
         (actor,) = self._simulation.actors
         pushes = push_schedule(self.plan, self._pushes)
         for tick in range(first, last):
@@ -115,9 +119,7 @@ class TrialWorld:
             except SimulationError:
                 return None
             if (tick + 1) % self._period == 0 or tick + 1 == last:
-                gains = self._controller.settings.gains
-                now, ahead = self._planner.costs(tick + 1, actor.state, gains, self._desired)
-                costs.append(now)
+                costs.append(self._planner.cost(tick + 1, actor.state, gains, self._desired))
         if self._is_lost(last):
             return None
         state = actor.state
@@ -126,20 +128,15 @@ class TrialWorld:
             tuple(plans),
             np.concatenate((state.position, state.velocity)),
             float(np.mean(costs)),
-            ahead,
+            self._planner.cost_ahead(last, state, gains, self._desired),
         )
 
     def _desired(self, tick: int) -> ReferenceState:
         return self.plan.reference.sample(self._controller.clock.time_after(tick))
 
     def _is_lost(self, tick: int) -> bool:
-        here = self._centre(self._simulation.actors[0].state.position)
-        there = self._centre(self._desired(tick).configuration.position)
-        return bool(np.linalg.norm(here - there) > FARTHEST or here[2] < LOWEST * there[2])
-
-    def _centre(self, position: FloatArray) -> FloatArray:
-        self._model.update(position, np.zeros(len(position)))
-        return self._model.centre_of_mass()
+        here = self._centre_at(self._simulation.actors[0].state.position)
+        return is_lost(here, self._centre_at(self._desired(tick).configuration.position))
 
     def _fresh(self) -> Simulation:
         role = make_role(self.plan.character, self.plan.simulator)

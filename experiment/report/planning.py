@@ -88,9 +88,6 @@ def _rows(recording: Recording, plan: PlanArrays) -> IntArray:
 
 def _centres(recording: Recording, rows: IntArray) -> FloatArray:
     """The centre of mass (r, 3) in the states of some rows, m, world."""
-    model, nothing = DynamicsModel(recording.character), np.zeros(recording.layout.size)
-    found = np.empty((len(rows), 3))
-    for each, row in zip(found, rows, strict=True):
-        model.update(recording.position[row], nothing)
-        each[:] = model.centre_of_mass()
-    return found
+    model = DynamicsModel(recording.character)
+    centres = [model.centre_of_mass_at(recording.position[row]) for row in rows]
+    return np.array(centres).reshape(-1, 3)

@@ -1,0 +1,72 @@
+"""The reference over a horizon, as rollouts and comparisons need it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.planner.compiled.rollout import Body, Desired
+from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.rollouts import Rollouts
+from controller_node.planner.settings import PlannerSettings
+from controller_node.references.base import ReferenceState
+from msgs_config.arrays import FloatArray
+
+DesiredAt = Callable[[int], ReferenceState]
+"""The desired state of a tick, counted from the episode's first state."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """The reference at one tick."""
+
+    position: FloatArray  # (q,) as MuJoCo has it
+    velocity: FloatArray  # (n,)
+    features: FloatArray  # (f,)
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """The reference over a horizon, and its features (checks, f)."""
+
+    rollout: Desired
+    features: FloatArray
+
+
+class Course:
+    """Samples a reference, each tick of it once, until another one is said to have begun."""
+
+    def __init__(self, model: ContactModel, rollouts: Rollouts, settings: PlannerSettings) -> None:
+        self._model, self._rollouts, self._settings = model, rollouts, settings
+        self._targets: dict[int, Target] = {}
+
+    def forget(self) -> None:
+        """Say that the reference may be another one."""
+        self._targets.clear()
+
+    def target(self, tick: int, desired_at: DesiredAt, body: Body) -> Target:
+        """The reference at a tick."""
+        if tick not in self._targets:
+            state = desired_at(tick)
+            position = self._model.position_of(state.configuration.position)
+            features = self._rollouts.features_of(position, state.velocity, body)
+            self._targets[tick] = Target(position, state.velocity, features)
+        return self._targets[tick]
+
+    def ahead(self, tick: int, desired_at: DesiredAt, body: Body) -> Foreseen:
+        """The reference from a tick on, over the horizon."""
+        settings = self._settings
+        for known in [known for known in self._targets if known < tick]:
+            del self._targets[known]
+        ticks = range(tick, tick + settings.horizon + 1)
+        targets = [self.target(each, desired_at, body) for each in ticks]
+        desired = Desired(
+            tick,
+            settings.knots,
+            tick // settings.knots,
+            settings.period,
+            np.array([target.position for target in targets]),
+            np.array([target.velocity for target in targets]),
+        )
+        checked = targets[settings.period :: settings.period]
+        return Foreseen(desired, np.array([target.features for target in checked]))
