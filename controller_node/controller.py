@@ -10,6 +10,7 @@ from controller_node.agreement import check_agreement
 from controller_node.balance import Balance, BalanceGains
 from controller_node.behaviours.base import ModeReport, Observation, Phase
 from controller_node.behaviours.make import BehaviourChoice
+from controller_node.behaviours.ways import AS_IT_IS, Way
 from controller_node.effort_series import EffortSeries
 from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
 from controller_node.planner.outlook import Outlook
@@ -55,6 +56,9 @@ class Planner(Protocol):
 
     def change_reference(self) -> None:
         """Say that the reference is another one from now on."""
+
+    def rest(self) -> None:
+        """Say that nothing is tracked in this tick: what was planned is over."""
 
     @property
     def outlook(self) -> Outlook | None:
@@ -102,8 +106,8 @@ class Controller:
     ) -> None:
         """Build the model of the dynamics; `series` is what the law `feedforward` applies.
 
-        Without a behaviour it tracks the reference, whatever comes. A planner goes with the
-        behaviour tracking and the law `stable_pd`.
+        Without a behaviour it tracks the reference, whatever comes. A planner goes with the law
+        `stable_pd`.
 
         Raises:
             CharacterError: a joint moves neither mass nor inertia, or a foot is none.
@@ -126,6 +130,7 @@ class Controller:
         self._drive: _Drive | None = None
         self._next: tuple[float, ReferenceState] | None = None
         self._behaviour = self._choice.make()
+        self._way = AS_IT_IS
         self._strengths = StrengthSchedule(self.layout)
         self._no_contacts = np.zeros((len(character.links), 6))
         self.mode: ModeReport | None = None  # since which state what is done; None before the first
@@ -234,6 +239,7 @@ class Controller:
         A simulator that was started again begins with the same stamp as before.
         """
         self._behaviour = self._choice.make()
+        self._way = AS_IT_IS
         self._strengths.clear()
         self.mode = None
         self._episode_ns = episode_ns
@@ -299,12 +305,13 @@ class Controller:
             )
         )
         self._report(directive.phase, told.stamp_ns)
+        self._take(directive.way)
         instant = Instant(
             time=time,
             position=state.position,
             velocity=state.velocity,
-            now=self._desired(directive.now),
-            upcoming=self._desired(directive.upcoming),
+            now=self._desired(self._way.target(time, now)),
+            upcoming=self._desired(self._way.target(next_time, upcoming)),
             response=self._response(state, directive.gains),
         )
         effort = self._effort(instant, directive.gains)
@@ -343,6 +350,13 @@ class Controller:
         if self.mode is None or self.mode.phase is not phase:
             self.mode = ModeReport(phase, stamp_ns)
 
+    def _take(self, way: Way) -> None:
+        """Track another way from now on."""
+        if way is not self._way:
+            self._way = way
+            if self._planner is not None:
+                self._planner.change_reference()
+
     def _effort(self, instant: Instant, gains: GainArrays) -> FloatArray:
         """The effort (n,) of law and balance, within the limits."""
         effort = self._law(instant, gains)
@@ -358,6 +372,9 @@ class Controller:
         """What a planner adds to the tracking errors (n,); None without."""
         if self._planner is None:
             return None
+        if not gains.stiffness[6:].any():
+            self._planner.rest()
+            return None
         tick = self.clock.tick(state.stamp_ns) - self._episode_tick
         return self._planner.offset(tick, state, gains, self._desired_at)
 
@@ -369,7 +386,8 @@ class Controller:
 
     def _desired_at(self, tick: int) -> ReferenceState:
         """What is to be tracked at a tick, counted from the episode's first state."""
-        return self._desired(self._reference.sample(self.clock.time_after(tick)))
+        time = self.clock.time_after(tick)
+        return self._desired(self._way.target(time, self._reference.sample(time)))
 
     def _desired(self, reference: ReferenceState) -> ReferenceState:
         """The reference as the settings have it tracked."""

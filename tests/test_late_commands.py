@@ -25,7 +25,12 @@ HUMANOID = character("humanoid")
 LAYOUT = HUMANOID.layout
 MODEL = ContactModel(HUMANOID, period_s=1.0 / 240, gravity=9.81, friction=0.45)
 JOINTS = LAYOUT.actuated_joint_names
-QUICK = {"planner": "predictive", "plan.samples": 12, "plan.horizon": 0.3}
+QUICK = {
+    "planner": "predictive",
+    "plan.samples": 12,
+    "plan.rounds": 1,
+    "plan.horizon": 0.3,
+}
 
 
 def walk(duration: float, **simulator: object) -> Plan:

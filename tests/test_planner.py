@@ -21,6 +21,7 @@ from controller_node.motion import make_motion
 from controller_node.parameters import PARAMETERS, character_parameters, make_controller
 from controller_node.plan_message import plan_message
 from controller_node.planner import gauss_newton
+from controller_node.planner.outlook import Outlook
 from controller_node.planner.search import Problem, improve
 from experiment.bags.plans import decode_plan
 from experiment.bags.recording import Recording, read_recording
@@ -41,7 +42,12 @@ HUMANOID = character("humanoid")
 CLOCK = TickClock(240)
 OF_STATES = ("stamps_ns", "published_ns", "position", "velocity", "reference_position")
 OF_TICKS = ("effort", "contacts", "applied_wrench")
-QUICK = {"planner": "predictive", "plan.samples": 12, "plan.horizon": 0.3}
+QUICK = {
+    "planner": "predictive",
+    "plan.samples": 12,
+    "plan.rounds": 1,
+    "plan.horizon": 0.3,
+}
 
 
 def states_of(duration: float, clip: str = "walk", **given: object) -> str:
@@ -158,15 +164,33 @@ def test_nothing_is_found_where_all_comes_to_nothing() -> None:
     assert found.cost == np.inf
 
 
+def test_a_costly_plan_is_sought_for_longer() -> None:
+    def plan_with(rounds: int, tolerance: float) -> Outlook:
+        controller = a_controller(**{"plan.rounds": rounds, "plan.tolerance": tolerance})
+        sent = states(controller, 13)
+        for state in (sent[0], sent[12]):
+            controller.answer(state, sent[0].stamp_ns)
+        assert controller.outlook is not None
+        return controller.outlook
+
+    short, long, enough = plan_with(1, 0.0), plan_with(4, 0.0), plan_with(4, 1e9)
+
+    assert long.costs.sum() < 0.98 * short.costs.sum()
+    assert enough.centres.tobytes() == short.centres.tobytes()
+
+
 # Bits
 
 
 def test_neither_threads_nor_what_else_is_done_change_a_bit() -> None:
-    alone = states_of(0.2, plan__workers=1)
+    def walked(**given: object) -> str:
+        return states_of(0.2, plan__rounds=2, plan__tolerance=0.0, **given)
 
-    assert states_of(0.2, plan__workers=2) == alone
-    assert states_of(0.2, plan__workers=4) == alone
-    assert states_of(0.2, plan__seed=1) != alone
+    alone = walked(plan__workers=1)
+
+    assert walked(plan__workers=2) == alone
+    assert walked(plan__workers=4) == alone
+    assert walked(plan__seed=1) != alone
 
 
 def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all() -> None:
@@ -294,7 +318,12 @@ def test_it_says_where_each_plan_leads_and_what_that_costs() -> None:
 
 REFUSED: dict[str, tuple[str, Mapping[str, object], str]] = {
     "a fixed base": ("pendulum", {}, "floating base"),
-    "another behaviour": ("humanoid", {"behaviour": "ragdoll"}, "'behaviour' is ragdoll"),
+    "a limp one": ("humanoid", {"behaviour": "ragdoll"}, "'behaviour' is ragdoll"),
+    "a recorded one": (
+        "humanoid",
+        {"planner": "recorded", "behaviour": "reactive"},
+        "'recorded' is for tracking; 'behaviour' is reactive",
+    ),
     "another law": ("humanoid", {"law": "pd"}, "'law' is pd"),
     "virtual forces": ("humanoid", {"balance": True}, "'balance' must be false"),
     "a short horizon": ("humanoid", {"plan.horizon": 0.05, "plan.period": 0.1}, "plan.horizon"),

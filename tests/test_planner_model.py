@@ -238,9 +238,10 @@ def test_a_mass_matrix_is_factorised_along_its_tree(seed: int) -> None:
     force, momentum = draw.normal(size=N), np.zeros(6)
 
     mass_matrix.base_momentum(entries, tree, velocity, momentum)
-    inverse, solution = np.zeros(N), force.copy()
-    mass_matrix.factorise(entries, inverse, tree)
-    mass_matrix.solve(entries, inverse, tree, solution)
+    matrix, solution = MODEL.engine().law_mass, np.zeros(N)
+    matrix.entries[:] = entries
+    mass_matrix.factorise(matrix)
+    mass_matrix.solve(matrix, force, solution)
 
     np.testing.assert_allclose(momentum, (dense @ velocity)[:6], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(dense @ solution, force, rtol=1e-8, atol=1e-9)

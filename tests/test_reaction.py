@@ -309,6 +309,27 @@ def test_an_active_ragdoll_falls_lies_and_gets_up(recovery: str) -> None:
     assert_got_up(recovers(1, "active_ragdoll", recovery=recovery))
 
 
+def test_with_a_planner_it_falls_lies_and_begins_to_rise_by_its_joints_alone() -> None:
+    def rises(modes: Sequence[ModeReport], stamp_ns: int) -> bool:
+        return modes[-1].phase.mode is Mode.BLEND and stamp_ns - modes[-1].stamp_ns > 0.3e9
+
+    few = {"plan.samples": 12, "plan.horizon": 0.3, "plan.rounds": 1}
+    whole = run(
+        {"clip": "walk", "behaviour": "active_ragdoll", "planner": "predictive", **few},
+        8 * RATE_HZ,
+        (Throw(SPEED, 60, direction=FROM_FRONT),),
+        mass=6.0,
+        is_over=rises,
+    )
+
+    limp, search = tick_of(whole, Mode.LIMP), tick_of(whole, Mode.SEARCH)
+    assert [mode.phase.mode.value for mode in whole.modes[-3:]] == ["LIMP", "SEARCH", "BLEND"]
+    assert not whole.efforts[limp : search + 1].any()
+    assert not whole.efforts[:, :6].any()
+    assert whole.efforts[search + 1 :].any(axis=1).all()
+    assert {mode.phase.facts["assistance"] for mode in whole.modes} == {"none"}
+
+
 def test_an_active_ragdoll_rides_out_a_light_hit_with_a_bounded_torque_on_its_root() -> None:
     whole = walk(20.0, "active_ragdoll", 4.5)
 

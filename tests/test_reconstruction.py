@@ -30,7 +30,7 @@ from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunE
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 PROJECT = Path(__file__).parents[1]
-QUICK = {"plan.samples": 8, "plan.horizon": 0.2}
+QUICK = {"plan.samples": 8, "plan.rounds": 1, "plan.horizon": 0.2}
 SMALL = Settings(worlds=3, kept=2, window=0.1)
 DURATION = 0.3  # s
 PROBLEM = Problem("humanoid", "kick", DURATION, {}, QUICK)
@@ -355,7 +355,7 @@ def test_the_command_writes_a_file_and_a_table(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / "kick.json"
-    few = ("plan.samples:=12", "plan.horizon:=0.3")
+    few = ("plan.samples:=12", "plan.rounds:=1", "plan.horizon:=0.3")
 
     code = main(
         [

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol, TypeAlias
 
+from controller_node.behaviours.ways import AS_IT_IS, Way
 from controller_node.laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.moved import Carry
@@ -55,8 +56,7 @@ class Directive:
     """What to track in a tick, and how firmly."""
 
     phase: Phase  # the same object as long as it lasts
-    now: ReferenceState
-    upcoming: ReferenceState
+    way: Way  # the same object as long as it leads on
     gains: GainArrays
 
 
@@ -97,7 +97,7 @@ class Tracking:
         """The reference and the gains as they are."""
         if self._phase is None:
             self._phase = Phase(Mode.TRACK, {"assistance": seen.assistance()})
-        return Directive(self._phase, seen.now, seen.upcoming, seen.gains)
+        return Directive(self._phase, AS_IT_IS, seen.gains)
 
 
 class Ragdoll:
@@ -109,4 +109,4 @@ class Ragdoll:
 
     def advance(self, seen: Observation) -> Directive:
         """The reference as it is, which nobody follows."""
-        return Directive(self._phase, seen.now, seen.upcoming, seen.gains)
+        return Directive(self._phase, AS_IT_IS, seen.gains)

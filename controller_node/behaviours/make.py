@@ -9,6 +9,7 @@ from controller_node.behaviours.library import MotionLibrary
 from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.settings import reaction_settings
+from controller_node.planner.settings import NO_PLANNER
 from msgs_config.character import Character
 from msgs_config.dynamics import DynamicsModel
 from msgs_config.parameters import Values
@@ -53,6 +54,7 @@ def choose_behaviour(character: Character, values: Values) -> BehaviourChoice:
         period=1.0 / values.integer("rate"),
         library=library,
         get_ups=get_ups,
+        plans=values.text("planner") != NO_PLANNER,
     )
     for made in (library, get_ups):
         if made is not None:  # a first search takes longer than others

@@ -47,6 +47,7 @@ class ReactionKit:
     period: float  # s, of control
     library: MotionLibrary | None = None  # of a behaviour that searches
     get_ups: MotionLibrary | None = None  # of one that gets up by a clip
+    plans: bool = False  # a planner counts with the gains in force for as far as it looks
 
 
 _Step = Callable[[Observation, Hit | None], None]
@@ -79,12 +80,7 @@ class Reaction:
         self._kit.model.update(seen.position, seen.velocity)
         hit = self._detector.strongest(seen.contacts, *self._kit.model.link_poses())
         self._step(seen, hit)
-        return Directive(
-            self._phase,
-            self._way.target(seen.time, seen.now),
-            self._way.target(seen.next_time, seen.upcoming),
-            self._gains(seen),
-        )
+        return Directive(self._phase, self._way, self._gains(seen))
 
     def _begin(
         self,
@@ -309,6 +305,8 @@ class Reaction:
         return self._weak(seen, 0.0)
 
     def _rising(self, seen: Observation) -> GainArrays:
+        if self._kit.plans:
+            return self._firm(seen)
         return self._weak(seen, min(self._elapsed(seen) / self._settings.recovery_duration, 1.0))
 
     def _weak(self, seen: Observation, strength: float) -> GainArrays:

@@ -18,6 +18,17 @@ class Way(Protocol):
         ...
 
 
+class _AsItIs:
+    """The own reference."""
+
+    def target(self, time: float, own: ReferenceState) -> ReferenceState:
+        """The own reference's state."""
+        return own
+
+
+AS_IT_IS: Way = _AsItIs()
+
+
 class OwnWay:
     """The own reference, where the character has been carried to, and the way onto it."""
 

@@ -6,6 +6,7 @@ MuJoCo's, which is not the simulator's, and so what is foreseen is not quite wha
 """
 
 from collections.abc import Iterator
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -13,16 +14,19 @@ import numpy as np
 from controller_node.laws import GainArrays
 from controller_node.planner.compiled.features import Watched
 from controller_node.planner.compiled.law import Joints, Law
-from controller_node.planner.compiled.mass_matrix import Tree
+from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
 from controller_node.planner.compiled.rollout import Body, Engine
 from controller_node.planner.compiled.soft_limits import SoftLimits
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character, Shape, ShapeType
+from msgs_config.character import Character, Link, Shape, ShapeType
 from msgs_config.dynamics import add_links, compile_exactly, quaternion_starts
 
 _SOLVER_ITERATIONS = 6
 _CONTACT = (0.01, 1.0)  # time constant in s and damping ratio of contacts and of hinges' limits
+
+_GROUND = "ground"
+_BY_PAIRS = {"contype": 0, "conaffinity": 0}  # of a shape: what touches what is said in pairs
 
 _GEOMETRIES = {
     ShapeType.BOX: mujoco.mjtGeom.mjGEOM_BOX,
@@ -97,19 +101,19 @@ class ContactModel:
 
     def engine(self) -> Engine:
         """Something that simulates it, for one thread."""
-        data = mujoco.MjData(self._model)
-        self._data.append(data)  # it must outlive what points into it
+        data, law = mujoco.MjData(self._model), mujoco.MjData(self._model)
+        self._data += [data, law]  # they must outlive what points into them
+        model = self._model._address
         return Engine(
-            self._model._address,
+            model,
             data._address,
             data.qpos,
             data.qvel,
             data.qacc_warmstart,
             data.qfrc_applied,
             data.qfrc_bias,
-            data.M,
-            data.qLD,
-            data.qLDiagInv,
+            MassMatrix(model, data._address, data.M),
+            MassMatrix(model, law._address, law.M),
             data.xpos,
             data.subtree_com,
         )
@@ -132,11 +136,14 @@ class ContactModel:
             for joint in self._character.moving_joints
             if joint.soft_limit is not None
         ]
+        lower = np.array([limit.lower for _, limit in limited]).reshape(-1, 3)
+        upper = np.array([limit.upper for _, limit in limited]).reshape(-1, 3)
         return SoftLimits(
             np.array([joint.qposadr[0] for joint, _ in limited], dtype=np.intp),
             np.array([joint.dofadr[0] for joint, _ in limited], dtype=np.intp),
-            np.array([limit.lower for _, limit in limited]).reshape(-1, 3),
-            np.array([limit.upper for _, limit in limited]).reshape(-1, 3),
+            lower,
+            upper,
+            np.minimum(-lower, upper).min(axis=1, initial=np.inf),
             np.array([limit.stiffness for _, limit in limited]),
             np.array([limit.damping for _, limit in limited]),
         )
@@ -155,18 +162,20 @@ def _compile(
     option.tolerance = 0.0  # always as many
     option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    contact = {"friction": (friction, 0.0, 0.0), "solref": _CONTACT, "condim": 3}
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0.0, 0.0, 1.0), **contact)
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(type=plane, size=(0.0, 0.0, 1.0), name=_GROUND, **_BY_PAIRS)
     for link, body in zip(character.links, add_links(spec, character), strict=True):
         if np.isfinite(link.joint.lower):
             (joint,) = body.joints
             joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
             joint.range = (link.joint.lower, link.joint.upper)
             joint.solref_limit = _CONTACT
-        for shape in link.collision_shapes:
-            body.add_geom(**_geometry(spec, shape), **contact)
-    for one, other in _apart(character):
-        spec.add_exclude(bodyname1=one, bodyname2=other)
+        for name, shape in zip(_names(link), link.collision_shapes, strict=True):
+            body.add_geom(name=name, **_geometry(spec, shape), **_BY_PAIRS)
+    for one, other in _touching(character):
+        pair = spec.add_pair(geomname1=one, geomname2=other)
+        pair.condim, pair.solref = 3, _CONTACT
+        pair.friction = (friction, friction, 0.0, 0.0, 0.0)
     return compile_exactly(spec, character)
 
 
@@ -186,14 +195,20 @@ def _geometry(spec: mujoco.MjSpec, shape: Shape) -> dict[str, object]:
     return {**place, "size": (radius, half, 0.0)}
 
 
-def _apart(character: Character) -> Iterator[tuple[str, str]]:
-    """Pairs of links that do not touch each other: those above, or all without self-collision."""
+def _names(link: Link) -> list[str]:
+    """Names of a link's shapes."""
+    return [f"{link.name} {number}" for number in range(len(link.collision_shapes))]
+
+
+def _touching(character: Character) -> Iterator[tuple[str, str]]:
+    """Pairs of shapes that may touch: with the ground, and with those of links not above them."""
     links = character.links
     for index, link in enumerate(links):
-        above = _ancestors(character, index)
-        for other in range(index):
-            if other in above or not character.loading.self_collision:
-                yield link.name, links[other].name
+        yield from product(_names(link), [_GROUND])
+        if character.loading.self_collision:
+            above = _ancestors(character, index)
+            for other in (other for other in range(index) if other not in above):
+                yield from product(_names(link), _names(links[other]))
 
 
 def _ancestors(character: Character, index: int) -> set[int]:

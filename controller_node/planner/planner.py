@@ -128,6 +128,10 @@ class PredictivePlanner:
         """Say that the reference is another one from now on; the plan stays."""
         self._course.forget()
 
+    def rest(self) -> None:
+        """Forget the plan, and where the reference had given way to: nothing is tracked."""
+        self._plan, self._anchor = None, Anchor()
+
     def offset(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
@@ -202,9 +206,10 @@ class PredictivePlanner:
         place = self._left(tick)
         first_knot = desired.rollout.first_knot
         areas = _areas(tick - first_knot * settings.knots, settings, len(place))
-        sensitivities, rounds = None, _FIRST_ROUNDS
+        sensitivities, rounds, enough = None, _FIRST_ROUNDS, 0.0
         if old is not None:
-            sensitivities, rounds = self._faded(old, tick, first_knot, areas), 1
+            sensitivities = self._faded(old, tick, first_knot, areas)
+            rounds, enough = settings.rounds, settings.tolerance
         best = place.ravel()
         for number in range(rounds):
             draws = normal_draws(
@@ -213,6 +218,8 @@ class PredictivePlanner:
             samples = draws.reshape(settings.samples, place.size)
             found = improve(problem, best, samples, sensitivities)
             best, sensitivities = found.place, found.sensitivities
+            if found.cost < enough:
+                break
         offsets = Offsets(settings.knots, first_knot, best.reshape(place.shape) * self._unit)
         outlook = self._outlook(found, problem, desired)
         return Plan(tick, offsets, sensitivities, areas, outlook)

@@ -37,6 +37,9 @@ class RecordedPlanner:
     def change_reference(self) -> None:
         """The offsets are added to whatever is tracked."""
 
+    def rest(self) -> None:
+        """It goes on by the tick, whatever is tracked."""
+
     def offset(
         self,
         tick: int,

@@ -42,7 +42,15 @@ PLANNER_PARAMETERS = [
     Parameter(
         "plan.knots", 0.15, "from one knot of a plan to the next", unit="s", minimum=0.01, maximum=5
     ),
-    Parameter("plan.samples", 48, "rollouts that a plan is found from", minimum=8, maximum=10_000),
+    Parameter(
+        "plan.samples",
+        24,
+        "rollouts of a round in which a plan is sought",
+        minimum=8,
+        maximum=10_000,
+    ),
+    Parameter("plan.rounds", 4, "at most, for a plan", minimum=1, maximum=100),
+    Parameter("plan.tolerance", 15.0, "cost at which a plan needs no further round"),
     Parameter(
         "plan.noise",
         0.2,
@@ -72,6 +80,8 @@ class PlannerSettings:
     knots: int
     delay: int  # until a command acts
     samples: int
+    rounds: int
+    tolerance: float
     noise: float
     seed: int
     friction: float
@@ -92,10 +102,9 @@ def check_planner(character: Character, values: Values) -> None:
         raise ConfigurationError(
             f"planner '{planner}' is for a floating base with joints; '{character.name}' is none"
         )
-    if behaviour != "tracking":
-        raise ConfigurationError(
-            f"planner '{planner}' is for the behaviour tracking; 'behaviour' is {behaviour}"
-        )
+    if behaviour == "ragdoll" or (planner == RECORDED and behaviour != "tracking"):
+        wanted = "tracking" if planner == RECORDED else "a behaviour that follows a motion"
+        raise ConfigurationError(f"planner '{planner}' is for {wanted}; 'behaviour' is {behaviour}")
 
 
 def make_settings(character: Character, values: Values) -> PlannerSettings:
@@ -120,6 +129,8 @@ def make_settings(character: Character, values: Values) -> PlannerSettings:
         knots=knots,
         delay=delay,
         samples=values.integer("plan.samples"),
+        rounds=values.integer("plan.rounds"),
+        tolerance=values.number("plan.tolerance"),
         noise=values.number("plan.noise"),
         seed=values.integer("plan.seed"),
         friction=values.number("plan.friction"),

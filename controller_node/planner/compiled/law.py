@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from controller_node.planner.compiled import mass_matrix
 from controller_node.planner.compiled.decorator import compiled
-from controller_node.planner.compiled.mass_matrix import Tree
+from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
 from controller_node.planner.compiled.rotations import quaternion, turn_between
 from msgs_config.arrays import FloatArray, IntArray
 
@@ -39,9 +39,9 @@ class Room(NamedTuple):
 
     error: FloatArray  # (n,)
     known: FloatArray  # (n,)
+    force: FloatArray  # (n,)
     acceleration: FloatArray  # (n,)
-    factor: FloatArray  # (e,) of a mass matrix
-    inverse_diagonal: FloatArray  # (n,)
+    implicit: MassMatrix  # with the law's damping over a period
 
 
 @compiled
@@ -80,18 +80,18 @@ def stable_pd(
         law: Gains and limits.
         room: The errors (n,), and room for the rest.
     """
-    period = law.period
-    room.factor[:] = mass
+    period, matrix = law.period, room.implicit
+    matrix.entries[:] = mass
     for i in range(len(velocity)):
         stiffness, damping = law.stiffness[i], law.damping[i]
         room.known[i] = stiffness * (room.error[i] - period * velocity[i]) + damping * (
             target_velocity[i] - velocity[i]
         )
-        room.acceleration[i] = room.known[i] - (bias[i] + law.passive_damping[i] * velocity[i])
+        room.force[i] = room.known[i] - (bias[i] + law.passive_damping[i] * velocity[i])
         diagonal = tree.starts[i] + tree.lengths[i] - 1
-        room.factor[diagonal] += period * law.passive_damping[i] + damping * period
-    mass_matrix.factorise(room.factor, room.inverse_diagonal, tree)
-    mass_matrix.solve(room.factor, room.inverse_diagonal, tree, room.acceleration)
+        matrix.entries[diagonal] += period * (law.passive_damping[i] + damping)
+    mass_matrix.factorise(matrix)
+    mass_matrix.solve(matrix, room.force, room.acceleration)
     for i in range(len(velocity)):
         effort[i] = room.known[i] - law.damping[i] * period * room.acceleration[i]
     _clip(effort, law)

@@ -7,6 +7,7 @@ Source: Featherstone 2008, "Rigid Body Dynamics Algorithms", sections 6.4 and 6.
 from typing import NamedTuple
 
 from controller_node.planner.compiled.decorator import compiled
+from controller_node.planner.compiled.engine import factorise_mass, solve_mass
 from msgs_config.arrays import FloatArray, IntArray
 
 
@@ -18,35 +19,25 @@ class Tree(NamedTuple):
     columns: IntArray  # (e,) of each entry
 
 
-@compiled
-def factorise(entries: FloatArray, inverse_diagonal: FloatArray, tree: Tree) -> None:
-    """Replace the entries (e,) of M by those of L in `M = L' D L`; write 1 / D (n,)."""
-    for k in range(len(tree.starts) - 1, -1, -1):
-        start, last = tree.starts[k], tree.lengths[k] - 1
-        inverse = 1.0 / entries[start + last]
-        inverse_diagonal[k] = inverse
-        for i in range(last - 1, -1, -1):
-            above = tree.starts[tree.columns[start + i]]
-            factor = entries[start + i] * inverse
-            for j in range(i + 1):
-                entries[above + j] -= factor * entries[start + j]
-            entries[start + i] = factor
+class MassMatrix(NamedTuple):
+    """A mass matrix that MuJoCo factorises, and solves with, along the tree."""
+
+    model: int  # MuJoCo's model and data, by their addresses
+    data: int
+    entries: FloatArray  # (e,)
 
 
 @compiled
-def solve(entries: FloatArray, inverse_diagonal: FloatArray, tree: Tree, x: FloatArray) -> None:
-    """Replace x (n,) by the solution y of `L' D L y = x`."""
-    n = len(tree.starts)
-    for k in range(n - 1, -1, -1):
-        start = tree.starts[k]
-        for i in range(tree.lengths[k] - 1):
-            x[tree.columns[start + i]] -= entries[start + i] * x[k]
-    for k in range(n):
-        x[k] *= inverse_diagonal[k]
-    for k in range(n):
-        start = tree.starts[k]
-        for i in range(tree.lengths[k] - 1):
-            x[k] -= entries[start + i] * x[tree.columns[start + i]]
+def factorise(matrix: MassMatrix) -> None:
+    """Take the entries as they are, for `solve`."""
+    factorise_mass(matrix.model, matrix.data)
+
+
+@compiled
+def solve(matrix: MassMatrix, force: FloatArray, acceleration: FloatArray) -> None:
+    """Write the acceleration (n,) that a force (n,) leads to."""
+    out, right = acceleration.ctypes.data, force.ctypes.data
+    solve_mass(matrix.model, matrix.data, out, right, 1)
 
 
 @compiled

@@ -9,7 +9,7 @@ from controller_node.planner.compiled.decorator import compiled
 from controller_node.planner.compiled.engine import step_after_forces, step_before_forces
 from controller_node.planner.compiled.features import Watched, write_features
 from controller_node.planner.compiled.law import Joints, Law, Room, add_errors, stable_pd
-from controller_node.planner.compiled.mass_matrix import Tree
+from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
 from controller_node.planner.compiled.soft_limits import (
     MOST_BOUNDS,
     PassedBounds,
@@ -34,9 +34,8 @@ class Engine(NamedTuple):
     warm_start: FloatArray  # (n,)
     applied: FloatArray  # (n,) forces
     bias: FloatArray  # (n,)
-    mass: FloatArray  # (e,) entries of the mass matrix
-    factor: FloatArray  # (e,) of it
-    inverse_diagonal: FloatArray  # (n,)
+    mass: MassMatrix  # of the state
+    law_mass: MassMatrix  # what the law makes of it
     points: FloatArray  # (bodies, 3) m, origins of the links
     centres: FloatArray  # (bodies, 3) m, centres of mass of what each body carries
 
@@ -84,7 +83,7 @@ def roll_out(
         engine: What simulates it.
     """
     n = len(start_velocity)
-    room = Room(np.empty(n), np.empty(n), np.empty(n), np.empty_like(engine.mass), np.empty(n))
+    room = Room(np.empty(n), np.empty(n), np.empty(n), np.empty(n), engine.law_mass)
     bounds = _room_for_bounds(n)
     _begin(start_position, start_velocity, engine)
     ticks = len(desired.positions) - 1
@@ -180,9 +179,9 @@ def _apply(
     bounds: PassedBounds,
 ) -> None:
     """Apply what the law, the passive damping and the soft limits do; `room` has the offset."""
-    applied, velocity, tree = engine.applied, engine.velocity, body.tree
+    applied, velocity, mass = engine.applied, engine.velocity, engine.mass.entries
     add_errors(room.error, engine.position, target, body.joints)
-    stable_pd(applied, velocity, target_velocity, engine.bias, engine.mass, tree, body.law, room)
+    stable_pd(applied, velocity, target_velocity, engine.bias, mass, body.tree, body.law, room)
     _add_passive(body, engine, bounds)
 
 
@@ -197,9 +196,7 @@ def _add_passive(body: Body, engine: Engine, bounds: PassedBounds) -> None:
         engine.velocity,
         body.law.period,
         body.limits,
-        engine.factor,
-        engine.inverse_diagonal,
-        body.tree,
+        engine.mass,
         bounds,
     )
 
@@ -211,7 +208,7 @@ def _write_check(row: FloatArray, target: FloatArray, body: Body, engine: Engine
         target,
         engine.position,
         engine.velocity,
-        engine.mass,
+        engine.mass.entries,
         engine.points,
         engine.centres[1],
         body.tree,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from controller_node.planner.compiled import mass_matrix
 from controller_node.planner.compiled.decorator import compiled
-from controller_node.planner.compiled.mass_matrix import Tree
+from controller_node.planner.compiled.mass_matrix import MassMatrix
 from controller_node.planner.compiled.rotations import (
     quaternion,
     right_jacobian_inverse,
@@ -17,7 +17,7 @@ from controller_node.planner.compiled.rotations import (
     to_parent,
 )
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from msgs_config.geometry.frames import Triple
+from msgs_config.geometry.frames import Quaternion, Triple
 
 MOST_BOUNDS = 32
 """More that are passed at once are left out."""
@@ -33,6 +33,7 @@ class SoftLimits(NamedTuple):
     velocities: IntArray  # (k,) where its angular velocity begins
     lower: FloatArray  # (k, 3) rad
     upper: FloatArray  # (k, 3) rad
+    free: FloatArray  # (k,) rad, angle of the smallest turn that reaches a bound
     stiffness: FloatArray  # (k,) N m/rad
     damping: FloatArray  # (k,) N m s/rad
 
@@ -58,21 +59,19 @@ def add_soft_limits(
     velocity: FloatArray,
     period: float,
     limits: SoftLimits,
-    factor: FloatArray,
-    inverse_diagonal: FloatArray,
-    tree: Tree,
+    mass: MassMatrix,
     room: PassedBounds,
 ) -> None:
     """Add to an effort (n,) what the soft limits do in a state, over a period in s.
 
-    `factor` and `inverse_diagonal` are those of the mass matrix in the state.
+    `mass` is the mass matrix in the state, factorised.
     """
     count = 0
     for joint in range(len(limits.positions)):
         count = _find_passed(joint, position, velocity, period, limits, room, count)
     if not count:
         return
-    _couple(count, factor, inverse_diagonal, tree, room)
+    _couple(count, mass, room)
     _find_forces(count, room)
     for bound in range(count):
         force = max(room.forces[bound], 0.0)
@@ -94,8 +93,11 @@ def _find_passed(
     first = limits.velocities[joint]
     spin = (velocity[first], velocity[first + 1], velocity[first + 2])
     lower, upper = limits.lower[joint], limits.upper[joint]
-    turn = rotation_vector(quaternion(position, limits.positions[joint]))
+    turned = quaternion(position, limits.positions[joint])
     reach = 2.0 * period * math.sqrt(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2])
+    if _is_less(turned, limits.free[joint] - reach):
+        return count
+    turn = rotation_vector(turned)
     if not _is_near(turn, lower, upper, reach):
         return count
     turn = _nearer_to(turn, lower, upper)
@@ -117,6 +119,15 @@ def _find_passed(
             room.implicit[count] = period * (stiffness * period + damping)
             count += 1
     return count
+
+
+@compiled
+def _is_less(turn_xyzw: Quaternion, angle: float) -> bool:
+    """Whether a turn is surely less than an angle in rad: quick, by sin x >= x - x^3 / 6."""
+    x, y, z, _ = turn_xyzw
+    half = min(0.499 * angle, 1.0)
+    sine = half - half * half * half / 6.0
+    return half > 0.0 and x * x + y * y + z * z < sine * sine
 
 
 @compiled
@@ -150,13 +161,10 @@ def _squared_excess(turn: Triple, lower: FloatArray, upper: FloatArray) -> float
 
 
 @compiled
-def _couple(
-    count: int, factor: FloatArray, inverse_diagonal: FloatArray, tree: Tree, room: PassedBounds
-) -> None:
+def _couple(count: int, mass: MassMatrix, room: PassedBounds) -> None:
     """Work out how the bounds' forces take from each other: the implicit share times A."""
     for j in range(count):
-        room.column[:] = room.rows[j]
-        mass_matrix.solve(factor, inverse_diagonal, tree, room.column)
+        mass_matrix.solve(mass, room.rows[j], room.column)
         for i in range(count):
             entry = 0.0
             for k in range(len(room.column)):
