@@ -41,6 +41,7 @@ from sim_node.simulation import Simulation  # noqa: E402
 
 LOWEST, FARTHEST_TURN = 0.65, 1.5  # of the clip's height; rad
 CYCLE = 1.27  # s, of the walk
+LINK = "root"
 EVERY = 0.1  # s, from one look to the next
 NODES = ("sim_node", "controller_node")
 
@@ -222,7 +223,7 @@ def _schedule(walk: Walk, plan: Plan) -> PushSchedule:
     for push in walk.pushes:
         force = np.array((*push.impulse, 0.0, 0.0, 0.0, 0.0)) / push.lasts
         schedule.add(
-            [plan.character.links[0].name],
+            [LINK],
             force[np.newaxis],
             nowhere,
             first_tick=1 + round(push.time * rate),

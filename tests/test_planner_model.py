@@ -11,7 +11,7 @@ from controller_node.control_laws import stable_pd_effort
 from controller_node.laws import GainArrays
 from controller_node.parameters import PARAMETERS as CONTROLLER
 from controller_node.parameters import character_parameters, make_settings
-from controller_node.planner.compiled import linear, mass_matrix
+from controller_node.planner.compiled import linear, mass_matrix, soft_limits
 from controller_node.planner.compiled.draws import normal_draws
 from controller_node.planner.compiled.rollout import Body, Desired
 from controller_node.planner.contact_model import ContactModel
@@ -19,6 +19,7 @@ from controller_node.planner.rollouts import Rollouts
 from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
 from controller_node.references.clip_file import read_clip
+from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.dynamics import DynamicsModel
 from msgs_config.parameters import resolve
@@ -245,6 +246,38 @@ def test_a_mass_matrix_is_factorised_along_its_tree(seed: int) -> None:
 
     np.testing.assert_allclose(momentum, (dense @ velocity)[:6], rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(dense @ solution, force, rtol=1e-8, atol=1e-9)
+
+
+def test_shapes_touch_the_ground_and_those_of_links_that_are_not_above_each_other() -> None:
+    model = MODEL._model
+
+    touching = {
+        frozenset(model.geom(int(geom)).name for geom in (pair.geom1[0], pair.geom2[0]))
+        for pair in (model.pair(number) for number in range(model.npair))
+    }
+
+    shapes = [f"{link.name} 0" for link in HUMANOID.links if link.collision_shapes]
+    assert all(frozenset((shape, "ground")) in touching for shape in shapes)
+    assert frozenset(("left_knee 0", "right_knee 0")) in touching
+    assert frozenset(("left_knee 0", "left_ankle 0")) not in touching
+    assert frozenset(("root 0", "left_ankle 0")) not in touching
+    assert len(touching) == model.npair
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_turn_that_is_less_than_an_angle_is_told_without_its_arc(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    told = 0
+    for turn in draw.normal(size=(300, 3)):
+        quaternion, size = rotations.exp(turn), float(np.linalg.norm(turn))
+        angle = float(draw.uniform(-0.5, 3.0))
+        x, y, z, w = map(float, quaternion)
+        if soft_limits.is_less((x, y, z, w), angle):
+            assert min(size, 2.0 * np.pi - size) < angle
+            told += 1
+        else:
+            assert angle < 0.01 or min(size, 2.0 * np.pi - size) > 0.9 * min(angle, 1.9)
+    assert told > 30
 
 
 def test_products_and_systems_are_those_of_linear_algebra() -> None:

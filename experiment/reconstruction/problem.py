@@ -11,7 +11,12 @@ from experiment.planned_push import PlannedPush, parsed_push
 from msgs_config.character_loading import load_character
 from msgs_config.errors import ConfigurationError
 
-_PLANNING = {"planner": PREDICTIVE, "plan.knots": 0.2}  # s
+_PLANNING = {
+    "planner": PREDICTIVE,
+    "plan.knots": 0.2,  # s
+    "plan.samples": 48,
+    "plan.rounds": 1,  # other worlds look further
+}
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def _find_passed(
     lower, upper = limits.lower[joint], limits.upper[joint]
     turned = quaternion(position, limits.positions[joint])
     reach = 2.0 * period * math.sqrt(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2])
-    if _is_less(turned, limits.free[joint] - reach):
+    if is_less(turned, limits.free[joint] - reach):
         return count
     turn = rotation_vector(turned)
     if not _is_near(turn, lower, upper, reach):
@@ -122,7 +122,7 @@ def _find_passed(
 
 
 @compiled
-def _is_less(turn_xyzw: Quaternion, angle: float) -> bool:
+def is_less(turn_xyzw: Quaternion, angle: float) -> bool:
     """Whether a turn is surely less than an angle in rad: quick, by sin x >= x - x^3 / 6."""
     x, y, z, _ = turn_xyzw
     half = min(0.499 * angle, 1.0)
