@@ -110,7 +110,7 @@ class ControllerNode(Node):
             self._layout.mask(commanded_joints(self._character, self._values))
         )
         self._actuation = Actuation(len(commanded), self._layout.size)
-        self._outputs = Outputs(self, self._layout, commanded)
+        self._outputs = Outputs(self, self._layout, commanded, self._simulators.bound)
         self._trajectories = Trajectories(self, self._controller, self._outputs, self._warnings)
         self._strengths = StrengthTopic(self, self._controller, self._outputs, self._warnings)
         self._publish_configuration()

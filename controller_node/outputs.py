@@ -40,11 +40,16 @@ class Answer:
 class Outputs:
     """The publishers of a controller. A topic that nobody listens to costs nothing."""
 
-    def __init__(self, node: Node, layout: JointLayout, commanded: IntArray) -> None:
-        """Offer the topics; `commanded` are the entries of the effort that are sent."""
+    def __init__(
+        self, node: Node, layout: JointLayout, commanded: IntArray, session: str | None
+    ) -> None:
+        """Offer the topics; `commanded` are the entries of the effort that are sent.
+
+        `session` is the simulator's, None as long as that is not known.
+        """
         self._layout = layout
         self._commanded = commanded
-        self.bind(ANONYMOUS)
+        self.bind(session or ANONYMOUS)
         self._wrench_encoder = DoublesEncoder(WORLD)
         self._initial_states = topics.create_publisher(node, topics.INITIAL_STATE)
         self._references = topics.create_publisher(node, topics.REFERENCE)

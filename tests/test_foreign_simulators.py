@@ -317,6 +317,21 @@ def test_a_session_that_is_given_is_the_only_one(
     assert {stamp_ns(torques) for torques in simulator.torques.messages} == {CLOCK.stamp_ns(3)}
 
 
+def test_in_a_session_that_is_given_a_state_that_comes_again_changes_nothing(
+    processes: Processes, simulator: ControllerClient
+) -> None:
+    gains: dict[str, object] = {"law": "pid", "gains__hinge__i": 1000.0}
+    processes.controller("pendulum", session=OTHER, **gains, **SINE)
+    simulator.ask(state(1, OTHER, first=True))
+    before = len(simulator.torques)
+
+    simulator.send(state(2, OTHER), lambda: len(simulator.torques) >= before + 4)
+
+    answers = simulator.torques.messages[before:]
+    assert {answer.header.frame_id for answer in answers} == {OTHER}
+    assert len(set(simulator.torques.raw[before:])) == 1
+
+
 def test_a_session_that_is_none_is_refused_in_one_line(processes: Processes) -> None:
     nodes = [
         processes.controller("pendulum", session="mine"),
