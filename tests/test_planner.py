@@ -322,7 +322,7 @@ REFUSED: dict[str, tuple[str, Mapping[str, object], str]] = {
     "a recorded one": (
         "humanoid",
         {"planner": "recorded", "behaviour": "reactive"},
-        "'recorded' is for tracking; 'behaviour' is reactive",
+        "'recorded' is for the behaviour tracking; 'behaviour' is reactive",
     ),
     "another law": ("humanoid", {"law": "pd"}, "'law' is pd"),
     "virtual forces": ("humanoid", {"balance": True}, "'balance' must be false"),

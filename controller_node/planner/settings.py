@@ -103,7 +103,9 @@ def check_planner(character: Character, values: Values) -> None:
             f"planner '{planner}' is for a floating base with joints; '{character.name}' is none"
         )
     if behaviour == "ragdoll" or (planner == RECORDED and behaviour != "tracking"):
-        wanted = "tracking" if planner == RECORDED else "a behaviour that follows a motion"
+        wanted = (
+            "the behaviour tracking" if planner == RECORDED else "a behaviour that follows a motion"
+        )
         raise ConfigurationError(f"planner '{planner}' is for {wanted}; 'behaviour' is {behaviour}")
 
 
