@@ -10,7 +10,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
@@ -29,15 +29,13 @@ from controller_node.behaviours.base import Mode  # noqa: E402
 from controller_node.parameters import make_controller  # noqa: E402
 from controller_node.planner.anchor import Anchor  # noqa: E402
 from experiment.commands.settings import node_settings  # noqa: E402
+from experiment.loop import ticks_in_process  # noqa: E402
 from experiment.plan import Plan, make_plan  # noqa: E402
+from experiment.planned_push import planned_push  # noqa: E402
 from msgs_config import rotations  # noqa: E402
-from msgs_config.arrays import FloatArray  # noqa: E402
 from msgs_config.dynamics import DynamicsModel  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa: E402
 from msgs_config.stamped import StampedReference, StampedState  # noqa: E402
-from sim_node.parameters import make_role, make_settings  # noqa: E402
-from sim_node.pushes import PushSchedule  # noqa: E402
-from sim_node.simulation import Simulation  # noqa: E402
 
 LOWEST, FARTHEST_TURN = 0.65, 1.5  # of the clip's height; rad
 CYCLE = 1.27  # s, of the walk
@@ -47,12 +45,33 @@ NODES = ("sim_node", "controller_node")
 
 
 @dataclass(frozen=True)
+class Kind:
+    """How walks are pushed."""
+
+    forwards: float = 0.0  # N s
+    sideways: float | None = None  # N s; None: as hard from any side
+    pushes: int = 1  # one every 2 s
+    lasts: float = 0.2  # s, of each
+    duration: float = 8.5  # s
+    behaviour: str = "tracking"
+
+
+KINDS = {
+    "none": Kind(pushes=0, duration=20.0),
+    "10 N s every 2 s": Kind(10.0, pushes=9, lasts=0.1, duration=20.0),
+    "20 N s every 2 s": Kind(20.0, pushes=9, lasts=0.1, duration=20.0),
+    "48 or 60 N s": Kind(48.0, 60.0),
+    "77 or 96 N s": Kind(77.0, 96.0),
+    "fall": Kind(200.0, duration=16.0, behaviour="active_ragdoll"),
+}
+
+
+@dataclass(frozen=True)
 class Push:
     """A push at the root's centre of mass."""
 
     time: float  # s
     impulse: tuple[float, float]  # N s, forwards and to the left
-    lasts: float  # s
 
 
 @dataclass(frozen=True)
@@ -61,9 +80,7 @@ class Walk:
 
     kind: str
     seed: int
-    duration: float  # s
     pushes: tuple[Push, ...]
-    behaviour: str
     settings: tuple[str, ...]
 
 
@@ -78,76 +95,23 @@ class Outcome:
     away: float  # m, of the clip's centre of mass from its own place, at the end
 
 
-# What is tried
-
-
-def _again_and_again(impulse: float) -> Callable[[np.random.Generator, int], list[Push]]:
-    def pushes(draws: np.random.Generator, number: int) -> list[Push]:
-        del number
-        sides, moments = draws.uniform(-math.pi, math.pi, 9), draws.uniform(0.0, 1.0, 9)
-        return [
-            Push(2.0 * k + 1.0 + float(moments[k]), _turned(impulse, float(sides[k])), 0.1)
-            for k in range(9)
-        ]
-
-    return pushes
-
-
-def _once(forwards: float, sideways: float) -> Callable[[np.random.Generator, int], list[Push]]:
-    def pushes(draws: np.random.Generator, number: int) -> list[Push]:
-        side = (0.0, sideways) if number % 4 == 0 else (0.0, -sideways)
-        impulse = (forwards, 0.0) if number % 2 else side
-        return [Push(1.0 + float(draws.uniform(0.0, CYCLE)), impulse, 0.2)]
-
-    return pushes
-
-
-def _anywhere(impulse: float) -> Callable[[np.random.Generator, int], list[Push]]:
-    def pushes(draws: np.random.Generator, number: int) -> list[Push]:
-        del number
-        time, side = 1.0 + float(draws.uniform(0.0, CYCLE)), float(draws.uniform(-math.pi, math.pi))
-        return [Push(time, _turned(impulse, side), 0.2)]
-
-    return pushes
-
-
-def _turned(length: float, angle: float) -> tuple[float, float]:
-    return length * math.cos(angle), length * math.sin(angle)
-
-
-@dataclass(frozen=True)
-class Kind:
-    """How a walk is pushed."""
-
-    pushes: Callable[[np.random.Generator, int], list[Push]]
-    duration: float  # s
-    behaviour: str = "tracking"
-
-
-KINDS = {
-    "none": Kind(lambda draws, number: [], 20.0),
-    "10 N s every 2 s": Kind(_again_and_again(10.0), 20.0),
-    "20 N s every 2 s": Kind(_again_and_again(20.0), 20.0),
-    "48 or 60 N s": Kind(_once(48.0, 60.0), 8.5),
-    "77 or 96 N s": Kind(_once(77.0, 96.0), 8.5),
-    "fall": Kind(_anywhere(200.0), 16.0, "active_ragdoll"),
-}
-
-
 def walks(name: str, count: int, settings: tuple[str, ...]) -> list[Walk]:
     """The walks of a kind, each with other pushes and another seed."""
-    kind = KINDS[name]
     return [
-        Walk(
-            name,
-            1 + number,
-            kind.duration,
-            tuple(kind.pushes(np.random.default_rng((number, len(name))), number)),
-            kind.behaviour,
-            settings,
-        )
-        for number in range(count)
+        Walk(name, 1 + number, tuple(_pushes(name, number)), settings) for number in range(count)
     ]
+
+
+def _pushes(name: str, number: int) -> Iterator[Push]:
+    kind, draws = KINDS[name], np.random.default_rng((number, len(name)))
+    for push in range(kind.pushes):
+        time, side = 2.0 * push + 1.0 + draws.uniform(0.0, CYCLE), draws.uniform(-math.pi, math.pi)
+        if kind.sideways is None:
+            impulse = kind.forwards * math.cos(side), kind.forwards * math.sin(side)
+        else:
+            sideways = math.copysign(kind.sideways, side)
+            impulse = (kind.forwards, 0.0) if number % 2 else (0.0, sideways)
+        yield Push(float(time), impulse)
 
 
 # A walk
@@ -159,6 +123,7 @@ class _Watch:
     def __init__(self, plan: Plan) -> None:
         self._centre_at = DynamicsModel(plan.character).centre_of_mass_at
         self._rate = plan.simulator.integer("rate")
+        self._time = 0.0  # s
         self.errors: list[float] = []
         self.fell_at: float | None = None  # s
         self.lies = False
@@ -168,6 +133,7 @@ class _Watch:
         self, tick: int, state: StampedState, wanted: StampedReference, anchor: Anchor
     ) -> None:
         """Look now and then."""
+        self._time = tick / self._rate
         if tick % round(EVERY * self._rate):
             return
         here, there = self._centre_at(state.position), self._centre_at(wanted.position)
@@ -180,64 +146,46 @@ class _Watch:
         )
         self.lies = bool(here[2] < LOWEST * there[2] or turn > FARTHEST_TURN)
         if self.lies:
-            self.fall(tick)
+            self.fall()
 
-    def fall(self, tick: int) -> None:
+    def fall(self) -> None:
         """Remember the first time."""
         self.lies = True
         if self.fell_at is None:
-            self.fell_at = tick / self._rate
+            self.fell_at = self._time
 
 
 def attempt(walk: Walk) -> Outcome:
     """Walk to the end, or to where it falls and nothing is to get it up."""
-    plan = _plan(walk)
+    plan, kind = _plan(walk), KINDS[walk.kind]
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    watch, pushes = _Watch(plan), _schedule(walk, plan)
-    role, world = make_role(plan.character, plan.simulator), make_settings(plan.simulator)
-    with Simulation([role], world) as simulation:
-        simulation.watches_contacts = controller.needs_contacts
-        (actor,) = simulation.actors
-        first_ns = actor.state.stamp_ns
-        for tick in range(plan.ticks):
-            contacts = None if actor.contacts is None else actor.contacts.wrenches
-            effort, wanted = controller.answer(actor.state, first_ns, contacts)
+    watch = _Watch(plan)
+    pushes = [
+        planned_push(plan, LINK, (x / kind.lasts, y / kind.lasts, 0.0), push.time)
+        for push in walk.pushes
+        for x, y in [push.impulse]
+    ]
+    try:
+        for number, tick in enumerate(ticks_in_process(plan, pushes, controller=controller)):
             outlook = controller.outlook
-            watch.look(tick, actor.state, wanted, outlook.anchor if outlook else Anchor())
-            if watch.lies and walk.behaviour == "tracking":
+            assert tick.reference is not None
+            watch.look(number, tick.state, tick.reference, outlook.anchor if outlook else Anchor())
+            if watch.lies and kind.behaviour == "tracking":
                 break
-            efforts = [np.where(actor.commanded, effort, 0.0)]
-            try:
-                simulation.step(efforts, [pushes.take(simulation.tick)])
-            except SimulationError:
-                watch.fall(tick)
-                break
+    except SimulationError:
+        watch.fall()
     tracks = controller.mode is not None and controller.mode.phase.mode is Mode.TRACK
     upright = tracks and not watch.lies
     return Outcome(walk, watch.fell_at, upright, tuple(watch.errors), watch.away)
 
 
-def _schedule(walk: Walk, plan: Plan) -> PushSchedule:
-    schedule, rate = PushSchedule(plan.character), plan.simulator.integer("rate")
-    nowhere: FloatArray = np.zeros((0, 3))  # the centre of mass
-    for push in walk.pushes:
-        force = np.array((*push.impulse, 0.0, 0.0, 0.0, 0.0)) / push.lasts
-        schedule.add(
-            [LINK],
-            force[np.newaxis],
-            nowhere,
-            first_tick=1 + round(push.time * rate),
-            ticks=round(push.lasts * rate),
-        )
-    return schedule
-
-
 def _plan(walk: Walk) -> Plan:
-    given = node_settings(list(walk.settings), NODES)
-    own = {"plan.seed": walk.seed, "plan.workers": 1, "behaviour": walk.behaviour}
+    given, kind = node_settings(list(walk.settings), NODES), KINDS[walk.kind]
+    simulator = {"wrench_duration": kind.lasts, **given["sim_node"]}
+    own = {"plan.seed": walk.seed, "plan.workers": 1, "behaviour": kind.behaviour}
     controller = {"planner": "predictive", **own, **given["controller_node"]}
     clip = {"reference": "clip", "clip": "walk"}
-    return make_plan("humanoid", walk.duration, clip, given["sim_node"], controller)
+    return make_plan("humanoid", kind.duration, clip, simulator, controller)
 
 
 # What is said of them
@@ -294,8 +242,9 @@ def _errors_after(outcomes: Sequence[Outcome]) -> list[list[float]]:
     found: list[list[float]] = [[], [], [], []]
     second = round(1.0 / EVERY)
     for each in outcomes:
-        for push in each.walk.pushes or (Push(1.0, (0.0, 0.0), 0.0),):
-            first = math.ceil((push.time + push.lasts) / EVERY)
+        lasts = KINDS[each.walk.kind].lasts
+        for push in each.walk.pushes or (Push(1.0, (0.0, 0.0)),):
+            first = math.ceil((push.time + lasts) / EVERY)
             for number, errors in enumerate(found):
                 errors += each.errors[first + number * second :][:second]
     return found

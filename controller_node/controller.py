@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from controller_node.behaviours.make import BehaviourChoice
 from controller_node.behaviours.ways import AS_IT_IS, Way
 from controller_node.effort_series import EffortSeries
 from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
+from controller_node.planner.base import Planner
 from controller_node.planner.outlook import Outlook
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.moved import Carry, MovedReference
@@ -26,9 +26,6 @@ from msgs_config.probe import Probe
 from msgs_config.stamped import StampedReference, StampedState
 from msgs_config.tick_clock import TickClock
 
-if TYPE_CHECKING:
-    from controller_node.planner.late_commands import LateCommands  # needs numba
-
 
 @dataclass(frozen=True)
 class Settings:
@@ -39,39 +36,6 @@ class Settings:
     follows_velocity: bool  # the reference's; else the desired velocity is zero
     balance: BalanceGains | None = None  # None: nothing but the law
     strengths: FloatArray | None = None  # (b,) shares of the gains that count; None: all of them
-
-
-class Planner(Protocol):
-    """What keeps a motion by offsets to the tracking errors. It remembers the ticks before."""
-
-    @property
-    def late_commands(self) -> "LateCommands | None":
-        """The commands that have not acted yet; None where they act at once."""
-
-    def between_rollouts(self, act: Callable[[], None]) -> None:
-        """Have something done again and again while it plans."""
-
-    def begin_episode(self, episode: int) -> None:
-        """Forget all; `episode` is the tick of the episode's first state."""
-
-    def change_reference(self) -> None:
-        """Say that the reference is another one from now on."""
-
-    def rest(self) -> None:
-        """Say that nothing is tracked in this tick: what was planned is over."""
-
-    @property
-    def outlook(self) -> Outlook | None:
-        """What is expected of the plan in force, the same object as long as it is."""
-
-    def offset(
-        self,
-        tick: int,
-        state: StampedState,
-        gains: GainArrays,
-        desired_at: Callable[[int], ReferenceState],
-    ) -> FloatArray:
-        """What is added to the tracking errors (n,) of a state at a tick of the episode."""
 
 
 @dataclass(frozen=True)

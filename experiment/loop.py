@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from controller_node.controller import Controller
 from controller_node.parameters import make_controller
 from experiment.metrics import Tick
 from experiment.plan import Plan
@@ -16,16 +17,20 @@ from sim_node.throwing import ThrowSchedule
 
 
 def ticks_in_process(
-    plan: Plan, pushes: Sequence[PlannedPush] = (), throws: Sequence[PlannedThrow] = ()
+    plan: Plan,
+    pushes: Sequence[PlannedPush] = (),
+    throws: Sequence[PlannedThrow] = (),
+    controller: Controller | None = None,
 ) -> Iterator[Tick]:
     """The ticks of a plan, one by one, with pushes and throws.
 
-    The states are those of a run over topics, bit for bit.
+    The states are those of a run over topics, bit for bit. Who wants to look at the controller
+    besides gives a fresh one of the plan.
 
     Raises:
         SimulationError: the simulation diverged.
     """
-    controller = make_controller(plan.character, plan.reference, plan.controller)
+    controller = controller or make_controller(plan.character, plan.reference, plan.controller)
     role = make_role(plan.character, plan.simulator)
     schedule, clock = push_schedule(plan, pushes), TickClock(plan.simulator.integer("rate"))
     balls = ThrowSchedule()

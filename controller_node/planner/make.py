@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from controller_node.controller import Planner
+from controller_node.planner.base import Planner
 from controller_node.planner.offsets import RecordedPlan
 from controller_node.planner.recorded import RecordedPlanner
 from controller_node.planner.settings import NO_PLANNER, RECORDED, check_planner, make_settings

@@ -12,13 +12,10 @@ from numba import types
 llvmlite.binding.load_library_permanently(str(_LIBRARY))
 
 
-_ModelAndData = Callable[[int, int], None]
-
-
-def _of_model_and_data(name: str) -> _ModelAndData:
+def _of_model_and_data(name: str) -> Callable[[int, int], None]:
     """A function of MuJoCo's, for compiled code alone; its arguments are addresses."""
     function = types.ExternalFunction(name, types.void(types.intp, types.intp))
-    return cast(_ModelAndData, function)
+    return cast(Callable[[int, int], None], function)
 
 
 step_before_forces = _of_model_and_data("mj_step1")

@@ -1,0 +1,46 @@
+"""What a controller asks of a planner."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol
+
+from controller_node.laws import GainArrays
+from controller_node.planner.outlook import Outlook
+from controller_node.references.base import ReferenceState
+from msgs_config.arrays import FloatArray
+from msgs_config.stamped import StampedState
+
+if TYPE_CHECKING:
+    from controller_node.planner.late_commands import LateCommands  # needs numba
+
+
+class Planner(Protocol):
+    """What keeps a motion by offsets to the tracking errors. It remembers the ticks before."""
+
+    @property
+    def late_commands(self) -> "LateCommands | None":
+        """The commands that have not acted yet; None where they act at once."""
+
+    def between_rollouts(self, act: Callable[[], None]) -> None:
+        """Have something done again and again while it plans."""
+
+    def begin_episode(self, episode: int) -> None:
+        """Forget all; `episode` is the tick of the episode's first state."""
+
+    def change_reference(self) -> None:
+        """Say that the reference is another one from now on."""
+
+    def rest(self) -> None:
+        """Say that nothing is tracked in this tick: what was planned is over."""
+
+    @property
+    def outlook(self) -> Outlook | None:
+        """What is expected of the plan in force, the same object as long as it is."""
+
+    def offset(
+        self,
+        tick: int,
+        state: StampedState,
+        gains: GainArrays,
+        desired_at: Callable[[int], ReferenceState],
+    ) -> FloatArray:
+        """What is added to the tracking errors (n,) of a state at a tick of the episode."""
