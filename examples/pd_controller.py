@@ -4,6 +4,8 @@ In two terminals, in any order (or with `&`); Ctrl-C ends each:
 
     .venv/bin/sim_node --ros-args -p character:=pendulum
     .venv/bin/python examples/pd_controller.py --ros-args -p target:=1.0
+
+With a recorder beside them, `-p wait_for_subscribers:=2` has it hear the first answer, too.
 """
 
 import numpy as np
@@ -22,11 +24,14 @@ class PdController(Node):
     def __init__(self):
         super().__init__("pd_controller")
         self.target = self.declare_parameter("target", 1.0).value  # rad; 0 hangs straight down
+        self.wanted = self.declare_parameter("wait_for_subscribers", 1).value  # to joint_torques
         self.torques = self.create_publisher(JointState, "joint_torques", 10)
         self.create_subscription(JointState, "joint_states", self.answer, 10)
 
     def answer(self, state):
         """Publish the torque for a state; its stamp says which state that is."""
+        if self.torques.get_subscription_count() < self.wanted:
+            return  # the simulator publishes the state again
         hinge = state.name.index("hinge")  # by name: the order of the entries may change
         q, v = state.position[hinge], state.velocity[hinge]
         effort = STIFFNESS * (self.target - q) - DAMPING * v + WEIGHT_TIMES_ARM * np.sin(q)

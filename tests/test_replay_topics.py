@@ -179,7 +179,8 @@ def foreign(folder: Path) -> Path:
     """The pendulum under somebody's own controller."""
     with recorded(folder / "foreign") as processes:
         simulator = processes.simulator(max_ticks=60, wait_for_subscribers=2)
-        processes.python(str(EXAMPLE))
+        all_heard = ("--ros-args", "-p", "wait_for_subscribers:=2")
+        processes.python(str(EXAMPLE), *all_heard)
         assert simulator.wait() == 0
     return folder / "foreign" / "run"
 
