@@ -107,7 +107,7 @@ class Controller:
     def while_planning(self, act: Callable[[], None]) -> None:
         """Have something done again and again while a planner plans; not to change this one."""
         if self._planner is not None:
-            self._planner.between_rollouts(act)
+            self._planner.while_waiting(act)
 
     @property
     def outlook(self) -> Outlook | None:

@@ -191,10 +191,13 @@ def test_neither_threads_nor_what_else_is_done_change_a_bit() -> None:
     assert walked(plan__workers=2) == alone
     assert walked(plan__workers=4) == alone
     assert walked(plan__seed=1) != alone
+    overlapping = walked(planning_delay_ticks=7, plan__workers=1)
+    assert walked(planning_delay_ticks=7, plan__workers=2) == overlapping != alone
 
 
-def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all() -> None:
-    controller = a_controller()
+@pytest.mark.parametrize("lead", [0, 5, 12])
+def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all(lead: int) -> None:
+    controller = a_controller(planning_delay_ticks=lead)
     sent = states(controller, 26)
     first = sent[0].stamp_ns
 
@@ -211,8 +214,9 @@ def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all() -
     assert answers(3) == once
 
 
-def test_a_state_of_before_is_planned_from_as_if_none_had_followed() -> None:
-    controller, fresh = a_controller(), a_controller()
+@pytest.mark.parametrize("lead", [0, 5])
+def test_a_state_of_before_is_planned_from_as_if_none_had_followed(lead: int) -> None:
+    controller, fresh = (a_controller(planning_delay_ticks=lead) for _ in range(2))
     sent = states(controller, 40)
     first = sent[0].stamp_ns
     for state in sent[::6]:
@@ -222,6 +226,28 @@ def test_a_state_of_before_is_planned_from_as_if_none_had_followed() -> None:
 
     expected, _ = fresh.answer(sent[2], first)
     assert effort.tobytes() == expected.tobytes()
+
+
+def test_a_plan_is_of_the_state_that_its_delay_is_before() -> None:
+    lead, acts = 5, 12
+
+    def plan_at(moved: int) -> Outlook:
+        """The second plan, where the states from a tick on are others."""
+        controller = a_controller(planning_delay_ticks=lead)
+        sent = states(controller, acts + 1)
+        for tick, state in enumerate(sent):
+            there = state.position + 0.05 * (tick >= moved)
+            before = controller.outlook
+            controller.answer(replace(state, position=there), sent[0].stamp_ns)
+            assert (controller.outlook is not before) == (tick in (0, acts))
+        assert controller.outlook is not None
+        return controller.outlook
+
+    seen, later = plan_at(moved=acts - lead), plan_at(moved=acts - lead + 1)
+    unmoved = plan_at(moved=acts + 1)
+
+    assert later.centres.tobytes() == unmoved.centres.tobytes()
+    assert seen.centres.tobytes() != unmoved.centres.tobytes()
 
 
 def test_what_is_done_in_between_is_done_and_changes_nothing() -> None:
@@ -327,6 +353,11 @@ REFUSED: dict[str, tuple[str, Mapping[str, object], str]] = {
     "another law": ("humanoid", {"law": "pd"}, "'law' is pd"),
     "virtual forces": ("humanoid", {"balance": True}, "'balance' must be false"),
     "a short horizon": ("humanoid", {"plan.horizon": 0.05, "plan.period": 0.1}, "plan.horizon"),
+    "a delay beyond the next plan": (
+        "humanoid",
+        {"planning_delay_ticks": 13},
+        "'planning_delay_ticks' is 13; it must be at most plan.period, 12 ticks",
+    ),
     "no samples": ("humanoid", {"plan.samples": 0}, "'plan.samples' is 0; it must be 8"),
     "no planner": ("humanoid", {"planner": "clairvoyant"}, "planner"),
 }

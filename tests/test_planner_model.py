@@ -15,6 +15,7 @@ from controller_node.planner.compiled import linear, mass_matrix, soft_limits
 from controller_node.planner.compiled.draws import normal_draws
 from controller_node.planner.compiled.rollout import Body, Desired
 from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.offsets import Offsets
 from controller_node.planner.rollouts import Rollouts
 from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
@@ -149,6 +150,10 @@ def test_a_rollout_is_that_of_the_products_law_and_limits(
                 course.positions[CHECKS * (check + 1)],
             )
             np.testing.assert_allclose(row[check], expected, atol=1e-6, rtol=1e-6)
+        offsets = Offsets(KNOTS, course.first_knot, plan)
+        last = rollouts.state_after(start, velocity, offsets, course, body)
+        np.testing.assert_allclose(last[0], positions[-1], atol=1e-6)
+        np.testing.assert_allclose(last[1], velocities[-1], atol=1e-5)
 
 
 def independent_features(

@@ -20,8 +20,8 @@ class Planner(Protocol):
     def late_commands(self) -> "LateCommands | None":
         """The commands that have not acted yet; None where they act at once."""
 
-    def between_rollouts(self, act: Callable[[], None]) -> None:
-        """Have something done again and again while it plans."""
+    def while_waiting(self, act: Callable[[], None]) -> None:
+        """Have something done again and again while it waits for a plan."""
 
     def begin_episode(self, episode: int) -> None:
         """Forget all; `episode` is the tick of the episode's first state."""

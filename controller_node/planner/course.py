@@ -1,6 +1,6 @@
 """The reference over a horizon, as rollouts and comparisons need it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,13 +60,23 @@ class Course:
             del self._targets[known]
         ticks = range(tick, tick + settings.horizon + 1)
         targets = [self.target(each, desired_at, body) for each in ticks]
-        desired = Desired(
+        desired = self._desired(tick, targets, tick // settings.knots)
+        checked = targets[settings.period :: settings.period]
+        return Foreseen(desired, np.array([target.features for target in checked]))
+
+    def between(
+        self, first: int, last: int, first_knot: int, desired_at: DesiredAt, body: Body
+    ) -> Desired:
+        """The reference from one tick to another, for offsets whose first knot is given."""
+        targets = [self.target(each, desired_at, body) for each in range(first, last + 1)]
+        return self._desired(first, targets, first_knot)
+
+    def _desired(self, tick: int, targets: Sequence[Target], first_knot: int) -> Desired:
+        return Desired(
             tick,
-            settings.knots,
-            tick // settings.knots,
-            settings.period,
+            self._settings.knots,
+            first_knot,
+            self._settings.period,
             np.array([target.position for target in targets]),
             np.array([target.velocity for target in targets]),
         )
-        checked = targets[settings.period :: settings.period]
-        return Foreseen(desired, np.array([target.features for target in checked]))

@@ -10,8 +10,8 @@ by samples); Howell et al. 2022, "Predictive Sampling: Real-time Behaviour Synth
 (planning online in a model).
 """
 
-import math
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,51 +19,47 @@ import numpy as np
 from controller_node.laws import GainArrays
 from controller_node.planner.anchor import Anchor, Balance, balance_of
 from controller_node.planner.comparison import Comparison
-from controller_node.planner.compiled.draws import normal_draws
 from controller_node.planner.compiled.rollout import Body
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.course import Course, DesiredAt, Foreseen, Target
+from controller_node.planner.course import Course, DesiredAt, Target
 from controller_node.planner.late_commands import LateCommands
-from controller_node.planner.offsets import Offsets
 from controller_node.planner.outlook import Outlook
+from controller_node.planner.plan import Plan
+from controller_node.planner.plan_search import PlanSearch, Start
 from controller_node.planner.rollouts import Rollouts
-from controller_node.planner.search import Found, Problem, improve
 from controller_node.planner.settings import PlannerSettings
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Character
-from msgs_config.geometry import fixed_order
 from msgs_config.stamped import StampedState
 
-_FIRST_ROUNDS = 6  # of the first plan: nothing has moved yet
-_LARGEST = 0.9  # sigma, of an offset
-_PENALTY = 0.2  # of an offset, for each sigma
-_FADING = 0.7  # of sensitivities, from plan to plan
-_FEWEST_DRAWS = 6
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Offsets over a horizon, and what was learned while they were found."""
-
-    tick: int  # at which it was made, since the episode began
-    offsets: Offsets
-    sensitivities: FloatArray | None  # (k (n - 6), checks f) of features to offsets
-    areas: FloatArray  # (k,) ticks of the horizon that each knot counts for
-    outlook: Outlook
+_PATIENCE = 0.005  # s between two looks at what else there is to do
 
 
 @dataclass(frozen=True)
 class PlannerMemory:
-    """All that a planner goes on from."""
+    """All that a planner goes on from that is not seeking a plan."""
 
     plan: Plan | None
     anchor: Anchor
     sent: Mapping[int, FloatArray]  # commands that have not acted yet
 
 
+@dataclass(frozen=True)
+class Coming:
+    """A plan that is being sought."""
+
+    seen: int  # tick of the state from which
+    tick: int  # from which on it acts
+    plan: Future[Plan]
+
+
 class PredictivePlanner:
-    """Plans for one character. It remembers its last plan, until an episode begins."""
+    """Plans for one character. It remembers its last plan, until an episode begins.
+
+    Plans are sought by a thread of their own, while the plan before leads over the ticks of
+    `PlannerSettings.lead`; what has not been found by then is waited for.
+    """
 
     def __init__(
         self, character: Character, settings: PlannerSettings, *, rate_hz: int, gravity: float
@@ -81,13 +77,16 @@ class PredictivePlanner:
             LateCommands(character, self._model, settings.delay) if settings.delay else None
         )
         self._comparison = Comparison(character, self._model, settings)
+        self._search = PlanSearch(self._rollouts, self._comparison, settings, rate_hz)
+        self._course = Course(self._model, self._rollouts, settings)
+        self._thread = ThreadPoolExecutor(1)
+        self._act: Callable[[], None] = lambda: None
         self._rate_hz = rate_hz
-        self._unit = settings.noise * settings.sigma  # (n - 6,) of what is looked for
         self._seed = settings.seed
         self._episode = 0
         self._plan: Plan | None = None
+        self._coming: Coming | None = None
         self._anchor = Anchor()
-        self._course = Course(self._model, self._rollouts, settings)
         self._compile(character)
 
     @property
@@ -95,15 +94,14 @@ class PredictivePlanner:
         """What is expected of the plan in force, the same object as long as it is."""
         return None if self._plan is None else self._plan.outlook
 
-    def between_rollouts(self, act: Callable[[], None]) -> None:
-        """Have something done again and again while it plans."""
-        self._rollouts.between = act
+    def while_waiting(self, act: Callable[[], None]) -> None:
+        """Have something done again and again while it waits for a plan."""
+        self._act = act
 
     def begin_episode(self, episode: int) -> None:
         """Forget plan and reference; `episode` is the tick of the episode's first state."""
         self._episode = episode
-        self._plan = None
-        self._anchor = Anchor()
+        self.rest()
         self._course.forget()
         if self.late_commands is not None:
             self.late_commands.forget()
@@ -121,6 +119,7 @@ class PredictivePlanner:
     def recall(self, memory: PlannerMemory, seed: int) -> None:
         """Go on from a memory, with samples of a seed."""
         self._seed, self._plan, self._anchor = seed, memory.plan, memory.anchor
+        self._coming = None
         if self.late_commands is not None:
             self.late_commands.recall(memory.sent)
 
@@ -130,7 +129,7 @@ class PredictivePlanner:
 
     def rest(self) -> None:
         """Forget the plan, and where the reference had given way to: nothing is tracked."""
-        self._plan, self._anchor = None, Anchor()
+        self._plan, self._coming, self._anchor = None, None, Anchor()
 
     def offset(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -143,26 +142,17 @@ class PredictivePlanner:
             gains: In force.
             desired_at: The reference.
         """
-        if self._plan is not None and tick < self._plan.tick:
-            self._plan = None  # a state of before comes once more: what was planned since is over
-        if self._plan is None or tick >= self._plan.tick + self.settings.period:
-            self._plan = self._planned(tick, state, gains, desired_at)
+        self._forget_what_is_over(tick)
+        self._take(tick)
+        if self._plan is None:
+            self._coming = self._sought(tick, tick, state, gains, desired_at)
+            self._take(tick)
+        assert self._plan is not None
+        acts = tick + self.settings.lead
+        if self._coming is None and acts >= self._plan.tick + self.settings.period:
+            self._coming = self._sought(tick, acts, state, gains, desired_at)
+            self._take(tick)
         return np.concatenate((np.zeros(6), self._plan.offsets.at(tick)))
-
-    def _compile(self, character: Character) -> None:
-        """Have all compiled before the first state waits for an answer: one rollout at rest."""
-        layout = character.layout
-        rest, nothing = np.array(character.rest_position), np.zeros(layout.size)
-        still = ReferenceState(layout.configuration(rest), nothing, nothing)
-        gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
-        position, body = self._model.position_of(rest), self._model.body(gains)
-        desired = self._course.ahead(0, lambda _: still, body)
-        problem = self._problem(position, nothing, desired, body, gives_way=False)
-        place = np.zeros(self._knot_count(0) * len(self._unit))
-        draws = normal_draws((0, 0), (0, 0), _FEWEST_DRAWS * place.size).reshape(-1, place.size)
-        found = improve(problem, place, draws, None)
-        improve(problem, found.place, draws, found.sensitivities)
-        self._course.forget()
 
     def cost(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -173,9 +163,7 @@ class PredictivePlanner:
         """
         body, position = self._model.body(gains), self._model.position_of(state.position)
         features = self._rollouts.features_of(position, state.velocity.copy(), body)
-        wanted = self._course.target(tick, desired_at, body).features
-        residuals = self._comparison.residuals(features - wanted, gives_way=False)
-        return self.settings.checks * float(fixed_order.dot(residuals, residuals))
+        return self._search.cost(features, self._course.target(tick, desired_at, body).features)
 
     def cost_ahead(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -186,64 +174,59 @@ class PredictivePlanner:
         """
         body, position = self._model.body(gains), self._model.position_of(state.position)
         desired = self._course.ahead(tick, desired_at, body)
-        problem = self._problem(position, state.velocity.copy(), desired, body, gives_way=False)
-        residuals = problem.residuals(problem.deviations(self._left(tick).ravel()[np.newaxis])[0])
-        cost = float(fixed_order.dot(residuals, residuals))
-        return cost if math.isfinite(cost) else math.inf
+        velocity = state.velocity.copy()
+        start = Start(tick, position, velocity, desired, body, Anchor(), gives_way=False)
+        return self._search.cost_ahead(start, self._plan)
 
-    def _planned(
-        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
-    ) -> Plan:
-        """A plan from a state."""
-        settings, old = self.settings, self._plan
+    def _compile(self, character: Character) -> None:
+        """Have all compiled before the first state waits for an answer: one rollout at rest."""
+        layout = character.layout
+        rest, nothing = np.array(character.rest_position), np.zeros(layout.size)
+        still = ReferenceState(layout.configuration(rest), nothing, nothing)
+        gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
         body = self._model.body(gains)
-        desired = self._course.ahead(tick, desired_at, body)
-        position, velocity = self._look(
-            tick, state, body, self._course.target(tick, desired_at, body)
+        desired = self._course.ahead(0, lambda _: still, body)
+        position = self._model.position_of(rest)
+        self._search.rehearse(
+            Start(0, position, nothing, desired, body, self._anchor, gives_way=False)
         )
-        gives_way = self._anchor.gives_way(tick / self._rate_hz)
-        problem = self._problem(position, velocity, desired, body, gives_way=gives_way)
-        place = self._left(tick)
-        first_knot = desired.rollout.first_knot
-        areas = _areas(tick - first_knot * settings.knots, settings, len(place))
-        sensitivities, rounds, enough = None, _FIRST_ROUNDS, 0.0
-        if old is not None:
-            sensitivities = self._faded(old, tick, first_knot, areas)
-            rounds, enough = settings.rounds, settings.tolerance
-        best = place.ravel()
-        for number in range(rounds):
-            draws = normal_draws(
-                (self._seed, self._episode), (number, tick), settings.samples * place.size
+        self._course.forget()
+
+    def _forget_what_is_over(self, tick: int) -> None:
+        """Plan anew from a state of before, which comes once more, or beyond the plan's end."""
+        plan, coming, settings = self._plan, self._coming, self.settings
+        if plan is not None and not 0 <= tick - plan.tick < settings.horizon - settings.lead:
+            self._plan = self._coming = None
+        elif coming is not None and tick < coming.seen:
+            self._coming = None
+
+    def _take(self, tick: int) -> None:
+        """Take the plan that acts from a tick on, if there is one; wait for it if need be."""
+        if self._coming is None or tick < self._coming.tick:
+            return
+        sought = self._coming.plan
+        while not wait((sought,), timeout=_PATIENCE).done:
+            self._act()
+        self._plan, self._coming = sought.result(), None
+
+    def _sought(
+        self, tick: int, acts: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+    ) -> Coming:
+        """A plan that acts from a later tick on, from the state to which this one will lead."""
+        body = self._model.body(gains)
+        target = self._course.target(tick, desired_at, body)
+        position, velocity = self._look(tick, state, body, target)
+        if self._plan is not None and acts > tick:
+            offsets = self._plan.offsets
+            between = self._course.between(tick, acts, offsets.first_knot, desired_at, body)
+            position, velocity = self._rollouts.state_after(
+                position, velocity, offsets, between, body
             )
-            samples = draws.reshape(settings.samples, place.size)
-            found = improve(problem, best, samples, sensitivities)
-            best, sensitivities = found.place, found.sensitivities
-            if found.cost < enough:
-                break
-        offsets = Offsets(settings.knots, first_knot, best.reshape(place.shape) * self._unit)
-        outlook = self._outlook(found, problem, desired)
-        return Plan(tick, offsets, sensitivities, areas, outlook)
-
-    def _left(self, tick: int) -> FloatArray:
-        """What is left of the plan in force at a tick, in units (k, n - 6); zero beyond its end."""
-        place = np.zeros((self._knot_count(tick), len(self._unit)))
-        if self._plan is not None:
-            known = self._plan.offsets
-            rows = np.arange(len(place)) + (tick // known.knot_ticks - known.first_knot)
-            there = rows < len(known.rows)
-            place[there] = known.rows[np.maximum(rows[there], 0)] / self._unit
-        return place
-
-    def _outlook(self, found: Found, problem: Problem, desired: Foreseen) -> Outlook:
-        """What is expected of a plan."""
-        settings, checks = self.settings, self.settings.checks
-        residuals = problem.residuals(found.deviations).reshape(2, checks, -1)
-        best = found.deviations[0].reshape(checks, -1)
-        centres, _ = self._comparison.balance(desired.features + best)
-        numbers: FloatArray = np.arange(1.0, checks + 1.0)
-        times = (settings.delay + settings.period * numbers) / self._rate_hz
-        costs, others = fixed_order.dot(residuals, residuals)
-        return Outlook(times, self._anchor.out_of(centres), costs, others, self._anchor)
+        desired = self._course.ahead(acts, desired_at, body)
+        gives_way = self._anchor.gives_way(tick / self._rate_hz)
+        start = Start(tick, position, velocity, desired, body, self._anchor, gives_way)
+        seed = (self._seed, self._episode)
+        return Coming(tick, acts, self._thread.submit(self._search.find, start, self._plan, seed))
 
     def _look(
         self, tick: int, state: StampedState, body: Body, target: Target
@@ -253,7 +236,7 @@ class PredictivePlanner:
         velocity = state.velocity.copy()  # a message's cannot be written to: another type
         seen = self._anchor.into(position, velocity)
         features = self._rollouts.features_of(*seen, body)
-        since_plan = tick - (tick if self._plan is None else self._plan.tick)
+        since_plan = tick - (tick if self._plan is None else self._plan.seen)
         self._anchor = self._anchor.follow(
             self._balance(seen[0], features),
             self._balance(target.position, target.features),
@@ -265,63 +248,3 @@ class PredictivePlanner:
     def _balance(self, position: FloatArray, features: FloatArray) -> Balance:
         centre, velocity = self._comparison.balance(features)
         return balance_of(position, velocity, centre)
-
-    def _problem(
-        self,
-        position: FloatArray,
-        velocity: FloatArray,
-        desired: Foreseen,
-        body: Body,
-        *,
-        gives_way: bool,
-    ) -> Problem:
-        """What a plan from a state is to make small."""
-        settings, checks = self.settings, self.settings.checks
-
-        def deviations(places: FloatArray) -> FloatArray:
-            plans = places.reshape(len(places), -1, len(self._unit)) * self._unit
-            found, sound = self._rollouts.simulate(position, velocity, plans, desired.rollout, body)
-            rows = (found - desired.features).reshape(len(places), -1)
-            rows[~sound] = np.nan
-            return rows
-
-        def residuals(rows: FloatArray) -> FloatArray:
-            by_check = rows.reshape(*rows.shape[:-1], checks, -1)
-            return self._comparison.residuals(by_check, gives_way=gives_way).reshape(rows.shape)
-
-        knots = self._knot_count(desired.rollout.first_tick)
-        penalty = _PENALTY * settings.noise
-        largest = _LARGEST / settings.noise
-        return Problem(deviations, residuals, penalty * penalty / knots, largest)
-
-    def _knot_count(self, tick: int) -> int:
-        """How many knots a plan has that is made at a tick."""
-        settings = self.settings
-        return (tick + settings.horizon - 1) // settings.knots + 2 - tick // settings.knots
-
-    def _faded(self, old: Plan, tick: int, first_knot: int, areas: FloatArray) -> FloatArray | None:
-        """The sensitivities (d, m) of the plan before, at this one's knots and checks.
-
-        A knot's go with its part in the horizon. A new knot's are zero, a new check has the last
-        one's.
-        """
-        if old.sensitivities is None:
-            return None
-        settings = self.settings
-        known = old.sensitivities.reshape(len(old.areas), len(self._unit), settings.checks, -1)
-        passed = (tick - old.tick) // settings.period
-        checks = np.minimum(np.arange(settings.checks) + passed, settings.checks - 1)
-        faded = np.zeros((len(areas), *known.shape[1:]))
-        for knot, area in enumerate(areas):
-            before = knot + first_knot - old.offsets.first_knot
-            if before < len(known) and old.areas[before] > 0.0:
-                share = _FADING * min(1.0, area / old.areas[before])
-                faded[knot] = share * known[before][:, checks]
-        return faded.reshape(len(areas) * len(self._unit), -1)
-
-
-def _areas(since_knot: int, settings: PlannerSettings, count: int) -> FloatArray:
-    """For how many ticks of the horizon each knot (k,) counts, by its weight in each."""
-    ticks = (since_knot + np.arange(settings.horizon)) / settings.knots
-    from_knots = np.abs(ticks - np.arange(count)[:, np.newaxis])
-    return np.array([float(np.add.accumulate(row)[-1]) for row in np.maximum(1.0 - from_knots, 0)])

@@ -25,8 +25,8 @@ class RecordedPlanner:
         self._plan = plan
         self.late_commands = late_commands
 
-    def between_rollouts(self, act: Callable[[], None]) -> None:
-        """There are none."""
+    def while_waiting(self, act: Callable[[], None]) -> None:
+        """It waits for no plan."""
 
     def begin_episode(self, episode: int) -> None:
         """Begin anew."""

@@ -4,7 +4,6 @@ Each depends on its own plan alone, so that neither their number nor their order
 """
 
 import itertools
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -17,7 +16,7 @@ from controller_node.planner.compiled.rollout import (
     roll_out,
 )
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.offsets import knot_before
+from controller_node.planner.offsets import Offsets, knot_before
 from msgs_config.arrays import BoolArray, FloatArray
 
 _LARGEST = 1e4  # of a feature; beyond, a rollout has come to nothing
@@ -29,16 +28,31 @@ class Rollouts:
     def __init__(self, model: ContactModel, workers: int) -> None:
         """The thread that asks is one of the workers."""
         self._model = model
+        self._own = model.engine()  # of the thread that asks for single states
         self._engines = [model.engine() for _ in range(workers)]
-        self._threads = ThreadPoolExecutor(workers - 1) if workers > 1 else None
-        self.between: Callable[[], None] = lambda: None
-        """What the thread that asks does between two rollouts."""
+        self._threads = ThreadPoolExecutor(max(workers - 1, 1))
 
     def features_of(self, position: FloatArray, velocity: FloatArray, body: Body) -> FloatArray:
         """The features (f,) of a reference's state, MuJoCo's position (q,) and velocity (n,)."""
         row = np.zeros(self._model.feature_count)
-        features_of(row, position, velocity, body, self._engines[0])
+        features_of(row, position, velocity, body, self._own)
         return row
+
+    def state_after(
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        offsets: Offsets,
+        desired: Desired,
+        body: Body,
+    ) -> tuple[FloatArray, FloatArray]:
+        """The state, (q,) and (n,), to which offsets lead; the same one if they lead to nothing."""
+        unchecked = desired._replace(check_ticks=len(desired.positions))
+        nothing = np.zeros((0, self._model.feature_count))
+        assert _has_knots(offsets.rows, desired)
+        if not roll_out(nothing, position, velocity, offsets.rows, unchecked, body, self._own):
+            return position, velocity
+        return self._own.position.copy(), self._own.velocity.copy()
 
     def simulate(
         self,
@@ -53,31 +67,31 @@ class Rollouts:
         The features of those that did not are zero.
         """
         ticks = len(desired.positions) - 1
-        last_knot, _ = knot_before(desired.first_tick + ticks - 1, desired.knot_ticks)
-        # compiled code does not look whether the knots are there
-        assert plans.shape[1] >= last_knot + 2 - desired.first_knot
+        assert _has_knots(plans[0], desired)
         checks = ticks // desired.check_ticks
         features = np.zeros((len(plans), checks, self._model.feature_count))
         sound = np.zeros(len(plans), dtype=np.bool_)
         numbers = itertools.count()  # each worker takes the next plan
 
-        def work(engine: Engine, between: Callable[[], None] | None) -> None:
+        def work(engine: Engine) -> None:
             while (number := next(numbers)) < len(plans):
                 sound[number] = roll_out(
                     features[number], position, velocity, plans[number], desired, body, engine
                 )
-                if between is not None:
-                    between()
 
         own, *others = self._engines
-        if self._threads is None:
-            work(own, self.between)
-        else:
-            waiting = [self._threads.submit(work, engine, None) for engine in others]
-            work(own, self.between)
-            for done in waiting:
-                done.result()
+        waiting = [self._threads.submit(work, engine) for engine in others]
+        work(own)
+        for done in waiting:
+            done.result()
         with np.errstate(invalid="ignore"):
             sound &= (np.abs(features) < _LARGEST).all(axis=(1, 2))  # NaN is not
         features[~sound] = 0.0
         return features, sound
+
+
+def _has_knots(rows: FloatArray, desired: Desired) -> bool:
+    """Whether the knots (k, n - 6) are there, for which compiled code does not look."""
+    last_tick = desired.first_tick + len(desired.positions) - 2
+    last_knot, _ = knot_before(last_tick, desired.knot_ticks)
+    return len(rows) >= last_knot + 2 - desired.first_knot

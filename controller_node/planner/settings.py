@@ -17,6 +17,8 @@ NO_PLANNER = "none"
 PREDICTIVE = "predictive"
 RECORDED = "recorded"
 
+LEAD = "planning_delay_ticks"
+
 _WEIGHTS = {  # by name: the default, the unit, and of what
     "root_rotation": (5.0, "1/rad", "the root's rotation"),
     "joints": (1.0, "1/rad", "the joints' rotations"),
@@ -60,6 +62,14 @@ PLANNER_PARAMETERS = [
     ),
     Parameter("plan.seed", 0, "of the samples", maximum=2**53),
     Parameter("plan.friction", 0.45, "of contacts, as the planner takes it", maximum=10.0),
+    Parameter(
+        LEAD,
+        0,
+        "from the state that a plan is made from to the first tick in which it acts; meanwhile the "
+        "plan before leads, and the world need not wait",
+        maximum=1000,
+        unit="ticks",
+    ),
     Parameter("plan.workers", 0, "threads; 0: one for each processor", maximum=256),
     *(
         Parameter(f"plan.weight.{name}", default, f"of the error of {what}", unit=unit)
@@ -78,6 +88,7 @@ class PlannerSettings:
     horizon: int
     period: int
     knots: int
+    lead: int  # of the plan before, while the next one is sought
     delay: int  # until a command acts
     samples: int
     rounds: int
@@ -119,6 +130,11 @@ def make_settings(character: Character, values: Values) -> PlannerSettings:
             f"parameter 'plan.horizon' is {values.number('plan.horizon'):g}; it must be "
             f"plan.period, {values.number('plan.period'):g} s, or more"
         )
+    lead = values.integer(LEAD)
+    if lead > period:
+        raise ConfigurationError(
+            f"parameter '{LEAD}' is {lead}; it must be at most plan.period, {period} ticks"
+        )
     delay = values.integer(COMMAND_DELAY.name)
     if delay >= horizon:
         raise ConfigurationError(
@@ -129,6 +145,7 @@ def make_settings(character: Character, values: Values) -> PlannerSettings:
         horizon=horizon - horizon % period,
         period=period,
         knots=knots,
+        lead=lead,
         delay=delay,
         samples=values.integer("plan.samples"),
         rounds=values.integer("plan.rounds"),
