@@ -1,4 +1,4 @@
-"""Balls in the engine: solid spheres that are thrown into the world and stay in it."""
+"""Balls in the engine: solid spheres that are thrown into the world."""
 
 from collections.abc import Sequence
 
@@ -8,6 +8,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.bullet import pybullet
 from msgs_config.throw import Throw
 from sim_node.links import Links
+
+_AWAY = 10_000.0  # m, where nobody is
 
 
 class Balls:
@@ -55,6 +57,18 @@ class Balls:
         self.throws = tuple(throws[:common])
         for throw in throws[common:]:
             self.add(throw)
+
+    def put_away(self, ball: int) -> None:
+        """Take a ball, by its place in the order, to where it is in nobody's way; it lies there.
+
+        It stays a body of the engine, which goes by their order.
+        """
+        number, client = self._numbers[ball], self._client
+        centre = (_AWAY, 20.0 * ball, self.throws[ball].radius)
+        pybullet.resetBasePositionAndOrientation(
+            number, centre, (0.0, 0.0, 0.0, 1.0), physicsClientId=client
+        )
+        pybullet.resetBaseVelocity(number, (0.0,) * 3, (0.0,) * 3, physicsClientId=client)
 
     def place(self, centre: FloatArray) -> None:
         """Put the last ball to where its centre (3,) is then, m."""

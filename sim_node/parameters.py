@@ -101,6 +101,9 @@ WORLD_PARAMETERS = [
         "wrench_duration", 0.1, "a push is held this long, at least a tick", unit="s", live=True
     ),
     Parameter(
+        "ball_lifetime", 0.0, "a thrown ball is taken out of the way after it; 0: never", unit="s"
+    ),
+    Parameter(
         "step_count",
         1,
         "ticks of one call of ~/step",
@@ -282,6 +285,12 @@ def push_ticks(values: Values) -> int:
     return max(round(values.number("wrench_duration") * values.integer("rate")), 1)
 
 
+def ball_ticks(values: Values) -> int:
+    """After how many ticks a ball is taken out of the way; 0: never."""
+    lifetime = values.number("ball_lifetime")
+    return max(round(lifetime * values.integer("rate")), 1) if lifetime else 0
+
+
 def display_ticks(values: Values) -> int:
     """After how many ticks the markers are due again."""
     return max(round(values.integer("rate") / values.number("display_rate")), 1)
@@ -300,6 +309,7 @@ def make_settings(values: Values) -> SimulationSettings:
         substeps=substeps,
         speed_limit=values.number("speed_limit"),
         command_delay_ticks=values.integer("command_delay_ticks"),
+        ball_ticks=ball_ticks(values),
         world=WorldSettings(
             step_s=1.0 / (rate * substeps),
             gravity=values.number("gravity"),

@@ -22,6 +22,7 @@ class SimulationSettings:
     substeps: int
     speed_limit: float  # rad/s or m/s
     command_delay_ticks: int
+    ball_ticks: int  # after which a ball is taken out of the way; 0: never
     world: WorldSettings
 
 
@@ -33,6 +34,7 @@ class Saved:
     episode: int
     actors: tuple[ActorMemory, ...]
     throws: tuple[Throw, ...]  # of the last tick
+    thrown_at: tuple[int, ...]  # ticks, of the balls that are in the world
     world: int  # its number in the engine
 
 
@@ -44,7 +46,8 @@ class Snapshot:
     episode: int
     actors: tuple[ActorMemory, ...]
     throws: tuple[Throw, ...]  # of the last tick
-    balls: tuple[Throw, ...]  # that are in the world
+    thrown_at: tuple[int, ...]  # ticks, of the balls that are in the world
+    balls: tuple[Throw, ...]
     world: bytes
 
 
@@ -75,6 +78,7 @@ class Simulation:
         self.episode = 1
         self.watches_contacts = False  # whether to find out what touches, which takes time
         self.throws: tuple[Throw, ...] = ()  # what was thrown at the beginning of the last tick
+        self._thrown_at: tuple[int, ...] = ()
         self._world = self._fresh_world()
 
     def __enter__(self) -> "Simulation":
@@ -123,9 +127,7 @@ class Simulation:
         nothing: list[tuple[Push, ...]] = [()] * len(self.actors)
         for actor, effort, its in zip(self.actors, efforts, pushes or nothing, strict=True):
             actor.begin_tick(effort, its, self.watches_contacts)
-        self.throws = tuple(throws)
-        for throw in throws:
-            self._world.balls.add(throw)
+        self._move_balls(throws)
         substeps = self.settings.substeps
         for substep in range(substeps):
             for actor in self.actors:
@@ -145,6 +147,18 @@ class Simulation:
             self.tick -= 1  # nobody is to see that state; a reset's first one has its stamp
             raise
 
+    def _move_balls(self, throws: Sequence[Throw]) -> None:
+        """Let balls go, and take those out of the way whose time is over."""
+        if self.settings.ball_ticks and self._thrown_at:
+            over = self.tick - self.settings.ball_ticks
+            for number, thrown_at in enumerate(self._thrown_at):
+                if thrown_at == over:
+                    self._world.balls.put_away(number)
+        self.throws = tuple(throws)
+        for throw in throws:
+            self._world.balls.add(throw)
+        self._thrown_at += (self.tick,) * len(throws)
+
     def reset(self) -> None:
         """Begin a new episode in a new world, whose first states have the next tick's stamp.
 
@@ -152,7 +166,7 @@ class Simulation:
         """
         self.tick += 1
         self.episode += 1
-        self.throws = ()
+        self.throws, self._thrown_at = (), ()
         self._world.close()  # first: two engines at a time would take twice the memory
         self._world = self._fresh_world()
 
@@ -166,7 +180,8 @@ class Simulation:
 
     def save(self) -> Saved:
         """Keep the present state in memory, until it is forgotten."""
-        return Saved(self.tick, self.episode, self._memories(), self.throws, self._world.save())
+        memories, world = self._memories(), self._world.save()
+        return Saved(self.tick, self.episode, memories, self.throws, self._thrown_at, world)
 
     def restore(self, saved: Saved) -> None:
         """Return to a saved state: what follows is what followed it, to the bit.
@@ -188,6 +203,7 @@ class Simulation:
             self.episode,
             self._memories(),
             self.throws,
+            self._thrown_at,
             self.balls,
             self._world.to_bytes(),
         )
@@ -201,7 +217,8 @@ class Simulation:
         return tuple(actor.memory() for actor in self.actors)
 
     def _recall(self, state: Saved | Snapshot) -> None:
-        self.tick, self.episode, self.throws = state.tick, state.episode, state.throws
+        self.tick, self.episode = state.tick, state.episode
+        self.throws, self._thrown_at = state.throws, state.thrown_at
         for actor, memory in zip(self.actors, state.actors, strict=True):
             actor.recall(memory)
 

@@ -293,7 +293,7 @@ THROWN = [
 def thrown(tmp_path_factory: pytest.TempPathFactory) -> Made:
     directory = tmp_path_factory.mktemp("thrown") / "run"
     prepare_directory(directory, overwrite=False)
-    plan = make_plan("humanoid", 0.75, WALK, {}, {"behaviour": "reactive"})
+    plan = make_plan("humanoid", 0.75, WALK, {"ball_lifetime": 0.25}, {"behaviour": "reactive"})
     throws, _ = plan_throws(plan, THROWN)
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("ROS_DOMAIN_ID", raising=False)
@@ -313,6 +313,8 @@ def test_the_bag_says_what_was_thrown_and_where_it_went(thrown: Made) -> None:
     first, second = ticks
     there = [0 if balls is None else len(balls.names) for balls in recording.balls]
     assert there == [0] * (first + 1) + [1] * (second - first) + [2] * (181 - second - 1)
+    gone = [balls is not None and bool(balls.motion[0, 0] > 5e3) for balls in recording.balls]
+    assert gone == [row > first + 60 for row in range(181)] and gone[-1]
 
 
 @pytest.mark.slow

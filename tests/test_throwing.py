@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from physics import DATA, LoneWorld, character, joint_simulation, momentum, simu
 from controller_node.parameters import make_controller
 from experiment.plan import Plan, make_plan
 from msgs_config.arrays import FloatArray
-from msgs_config.errors import CommandError
+from msgs_config.errors import CommandError, ConfigurationError
+from msgs_config.parameters import Values
 from msgs_config.throw import NUMBERS, Throw, natural_radius, throw_of
 from sim_node.parameters import make_role, make_settings
 from sim_node.simulation import Simulation
@@ -265,14 +267,56 @@ def test_far_away_two_characters_are_hit_as_if_each_were_alone() -> None:
         assert not np.allclose(one.state.velocity, other.state.velocity, atol=0.1)
 
 
+# Balls whose time is over
+
+
+def with_lifetime(plan: Plan, seconds: float) -> Plan:
+    return replace(plan, simulator=Values({**plan.simulator, "ball_lifetime": seconds}))
+
+
+def test_after_its_lifetime_a_ball_lies_far_away() -> None:
+    lying = Throw(4.0, 0.1, (0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
+    with simulation(FREE_BOX, ball_lifetime=0.5, initial_position=[9.0, 9.0, 1.0, 0, 0, 0]) as run:
+        nothing = np.zeros(run.actors[0].character.layout.size)
+        places = []
+        for tick in range(200):
+            run.step([nothing], None, [[lying, AT_CHEST], [FAR]][tick] if tick < 2 else ())
+            places.append(run.ball_motion()[:, :3])
+
+    away = np.linalg.norm(places[2:], axis=2) > 5e3  # all three are there
+    assert away.sum(axis=0).tolist() == [80, 80, 79]
+    assert away[-80:, :2].all() and away[-79:, 2].all()
+    np.testing.assert_allclose(places[-1][:, 2], 0.1, atol=2e-3)
+    np.testing.assert_allclose(places[-1], places[-60], atol=1e-3)
+    with pytest.raises(ConfigurationError, match="'ball_lifetime' is -1"):
+        simulation(FREE_BOX, ball_lifetime=-1.0)
+
+
+def test_what_stood_against_a_ball_falls_when_it_is_taken_away(block: str) -> None:
+    """A box on a ball that cannot roll away, as it is between the box and the ground."""
+    under = Throw(50.0, 0.1, (0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
+    begin = [0.0, 0.0, 0.31, 0.0, 0.0, 0.0]
+    with simulation(block, ball_lifetime=0.25, initial_position=begin) as run:
+        heights = []
+        for tick in range(180):
+            run.step([np.zeros(6)], None, [under] if not tick else ())
+            heights.append(float(run.actors[0].state.position[2]))
+
+    assert heights[55] == pytest.approx(0.3, abs=0.01)
+    assert heights[-1] == pytest.approx(0.1, abs=0.01)
+
+
 # States that are saved
 
 
 @pytest.mark.parametrize("ticks", [20, 60, 110], ids=["before", "in flight", "after the impact"])
-def test_a_saved_state_is_restored_whatever_was_thrown_since(walk: Plan, ticks: int) -> None:
+@pytest.mark.parametrize("lifetime", [0.0, 0.3], ids=["for ever", "for a time"])
+def test_a_saved_state_is_restored_whatever_was_thrown_since(
+    walk: Plan, ticks: int, lifetime: float
+) -> None:
     throws = {30: [AT_CHEST], 31: [FAR], 120: [AT_CHEST]}
 
-    with fresh(walk) as run:
+    with fresh(with_lifetime(walk, lifetime)) as run:
         walked(walk, run, ticks, throws)
         early = run.save()
         followed = in_bytes(walked(walk, run, 80, throws)[0])
@@ -292,6 +336,7 @@ def test_a_saved_state_is_restored_whatever_was_thrown_since(walk: Plan, ticks: 
 @pytest.mark.parametrize("dirty", [0, 40], ids=["fresh", "with balls of its own"])
 def test_another_simulation_takes_a_state_over_with_its_balls(walk: Plan, dirty: int) -> None:
     throws = {30: [AT_CHEST], 31: [FAR]}
+    walk = with_lifetime(walk, 0.3)
 
     with fresh(walk) as run:
         walked(walk, run, 60, throws)
