@@ -2,8 +2,9 @@
 
 A row a kind of push at the root, at random moments and from random sides. A walk ends by falling:
 the centre of mass lower than 0.65 of the clip's, or the root turned by more than 1.5 rad from the
-clip's, where that has given way to. Kind `fall` is a push that throws the character down, which is
-to get up and to walk on. All of them take two hours on two cores.
+clip's, where that has given way to. Kind `balls` throws them at the chest. Kind `fall` is a push
+that throws the character down, which is to get up and to walk on. Kind `any` is for `--picture`:
+the impulse that half of the walks bear, by direction. All of them take two hours on two cores.
 """
 
 import argparse
@@ -25,13 +26,15 @@ from rich.console import Console  # noqa: E402
 from rich.progress import track  # noqa: E402
 from rich.table import Table  # noqa: E402
 
+from benchmarks.push_picture import draw  # noqa: E402
 from controller_node.behaviours.base import Mode  # noqa: E402
 from controller_node.parameters import make_controller  # noqa: E402
 from controller_node.planner.anchor import Anchor  # noqa: E402
 from experiment.commands.settings import node_settings  # noqa: E402
 from experiment.loop import ticks_in_process  # noqa: E402
 from experiment.plan import Plan, make_plan  # noqa: E402
-from experiment.planned_push import planned_push  # noqa: E402
+from experiment.planned_push import PlannedPush, planned_push  # noqa: E402
+from experiment.planned_throw import PlannedThrow, plan_throws  # noqa: E402
 from msgs_config import rotations  # noqa: E402
 from msgs_config.dynamics import DynamicsModel  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa: E402
@@ -40,7 +43,11 @@ from msgs_config.stamped import StampedReference, StampedState  # noqa: E402
 LOWEST, FARTHEST_TURN = 0.65, 1.5  # of the clip's height; rad
 CYCLE = 1.27  # s, of the walk
 LINK = "root"
+BALL = "mass=2.5 speed=8 target=chest at={:.4f} from={:.4f}"
+BALL_LIFETIME = 0.6  # s, of which it flies 0.2
+MISSED = 0.2  # m, of the walk beside its clip
 EVERY = 0.1  # s, from one look to the next
+COLUMNS = ("kind", "upright", "fell at, s", "error 0, 1, 2, 3 s after, m", "away, m", "missed")
 NODES = ("sim_node", "controller_node")
 
 
@@ -50,8 +57,11 @@ class Kind:
 
     forwards: float = 0.0  # N s
     sideways: float | None = None  # N s; None: as hard from any side
-    pushes: int = 1  # one every 2 s
+    hardest: float | None = None  # N s, likewise; None: all are as hard
+    pushes: int = 1
+    every: float = 2.0  # s
     lasts: float = 0.2  # s, of each
+    balls: bool = False  # at the chest; the clip's heading is forwards
     duration: float = 8.5  # s
     behaviour: str = "tracking"
 
@@ -62,6 +72,8 @@ KINDS = {
     "20 N s every 2 s": Kind(20.0, pushes=9, lasts=0.1, duration=20.0),
     "48 or 60 N s": Kind(48.0, 60.0),
     "77 or 96 N s": Kind(77.0, 96.0),
+    "balls": Kind(20.0, pushes=5, every=4.0, duration=20.0, balls=True),
+    "any": Kind(40.0, hardest=160.0, duration=5.5),
     "fall": Kind(200.0, duration=16.0, behaviour="active_ragdoll"),
 }
 
@@ -93,6 +105,7 @@ class Outcome:
     upright: bool  # at the end, and tracking its own clip
     errors: tuple[float, ...]  # m, of the centre of mass, from where the clip has given way to
     away: float  # m, of the clip's centre of mass from its own place, at the end
+    missed: int  # balls
 
 
 def walks(name: str, count: int, settings: tuple[str, ...]) -> list[Walk]:
@@ -105,9 +118,11 @@ def walks(name: str, count: int, settings: tuple[str, ...]) -> list[Walk]:
 def _pushes(name: str, number: int) -> Iterator[Push]:
     kind, draws = KINDS[name], np.random.default_rng((number, len(name)))
     for push in range(kind.pushes):
-        time, side = 2.0 * push + 1.0 + draws.uniform(0.0, CYCLE), draws.uniform(-math.pi, math.pi)
+        time = kind.every * push + 1.0 + draws.uniform(0.0, CYCLE)
+        side = draws.uniform(-math.pi, math.pi)
         if kind.sideways is None:
-            impulse = kind.forwards * math.cos(side), kind.forwards * math.sin(side)
+            size = draws.uniform(kind.forwards, kind.hardest) if kind.hardest else kind.forwards
+            impulse = size * math.cos(side), size * math.sin(side)
         else:
             sideways = math.copysign(kind.sideways, side)
             impulse = (kind.forwards, 0.0) if number % 2 else (0.0, sideways)
@@ -122,19 +137,26 @@ class _Watch:
 
     def __init__(self, plan: Plan) -> None:
         self._centre_at = DynamicsModel(plan.character).centre_of_mass_at
-        self._rate = plan.simulator.integer("rate")
+        self.rate = plan.simulator.integer("rate")
         self._time = 0.0  # s
         self.errors: list[float] = []
         self.fell_at: float | None = None  # s
         self.lies = False
         self.away = 0.0  # m
+        self.missed = 0
+
+    def aim(self, state: StampedState, wanted: StampedReference, ball: Sequence[float]) -> None:
+        """Look at whether a ball of this velocity hits, which arrives now where the clip is."""
+        beside = self._centre_at(state.position) - self._centre_at(wanted.position)
+        distance = abs(beside[0] * ball[1] - beside[1] * ball[0]) / math.hypot(*ball[:2])
+        self.missed += bool(distance > MISSED)
 
     def look(
         self, tick: int, state: StampedState, wanted: StampedReference, anchor: Anchor
     ) -> None:
         """Look now and then."""
-        self._time = tick / self._rate
-        if tick % round(EVERY * self._rate):
+        self._time = tick / self.rate
+        if tick % round(EVERY * self.rate):
             return
         here, there = self._centre_at(state.position), self._centre_at(wanted.position)
         placed = anchor.out_of(there[np.newaxis])[0]
@@ -160,32 +182,53 @@ def attempt(walk: Walk) -> Outcome:
     plan, kind = _plan(walk), KINDS[walk.kind]
     controller = make_controller(plan.character, plan.reference, plan.controller)
     watch = _Watch(plan)
-    pushes = [
-        planned_push(plan, LINK, (x / kind.lasts, y / kind.lasts, 0.0), push.time)
-        for push in walk.pushes
-        for x, y in [push.impulse]
-    ]
+    pushes, throws = ([], _throws(plan, walk)) if kind.balls else (_planned(plan, walk), [])
+    arrivals = {
+        round(push.time * watch.rate): each.throw.velocity
+        for push, each in zip(walk.pushes, throws, strict=False)
+    }
     try:
-        for number, tick in enumerate(ticks_in_process(plan, pushes, controller=controller)):
+        ticks = ticks_in_process(plan, pushes, throws, controller)
+        for number, tick in enumerate(ticks):
             outlook = controller.outlook
             assert tick.reference is not None
             watch.look(number, tick.state, tick.reference, outlook.anchor if outlook else Anchor())
+            if number in arrivals:
+                watch.aim(tick.state, tick.reference, arrivals[number])
             if watch.lies and kind.behaviour == "tracking":
                 break
     except SimulationError:
         watch.fall()
     tracks = controller.mode is not None and controller.mode.phase.mode is Mode.TRACK
     upright = tracks and not watch.lies
-    return Outcome(walk, watch.fell_at, upright, tuple(watch.errors), watch.away)
+    return Outcome(walk, watch.fell_at, upright, tuple(watch.errors), watch.away, watch.missed)
+
+
+def _planned(plan: Plan, walk: Walk) -> list[PlannedPush]:
+    lasts = KINDS[walk.kind].lasts
+    return [
+        planned_push(plan, LINK, (x / lasts, y / lasts, 0.0), push.time)
+        for push in walk.pushes
+        for x, y in [push.impulse]
+    ]
+
+
+def _throws(plan: Plan, walk: Walk) -> list[PlannedThrow]:
+    """A ball for each push, from where it comes."""
+    texts = [
+        BALL.format(push.time, math.degrees(math.atan2(-push.impulse[1], -push.impulse[0])))
+        for push in walk.pushes
+    ]
+    return plan_throws(plan, texts)[0]
 
 
 def _plan(walk: Walk) -> Plan:
     given, kind = node_settings(list(walk.settings), NODES), KINDS[walk.kind]
-    simulator = {"wrench_duration": kind.lasts, **given["sim_node"]}
+    simulator = {"wrench_duration": kind.lasts, "ball_lifetime": BALL_LIFETIME}
     own = {"plan.seed": walk.seed, "plan.workers": 1, "behaviour": kind.behaviour}
     controller = {"planner": "predictive", **own, **given["controller_node"]}
     clip = {"reference": "clip", "clip": "walk"}
-    return make_plan("humanoid", kind.duration, clip, simulator, controller)
+    return make_plan("humanoid", kind.duration, clip, simulator | given["sim_node"], controller)
 
 
 # What is said of them
@@ -195,12 +238,16 @@ def main() -> int:
     """Push walks, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     kinds = list(KINDS)
-    parser.add_argument("kinds", nargs="*", default=kinds, help=", ".join(f"'{k}'" for k in kinds))
+    usual = [kind for kind in kinds if kind != "any"]
+    parser.add_argument("kinds", nargs="*", default=usual, help=", ".join(f"'{k}'" for k in kinds))
     parser.add_argument("--runs", type=int, default=24, help="of each kind (%(default)s)")
     parser.add_argument("--set", action="append", default=[], help="NODE.NAME:=VALUE, as of run")
     parser.add_argument("--processes", type=int, default=2, help="(%(default)s)")
     parser.add_argument("--out", type=Path, help="file for what has become of each, JSON")
+    parser.add_argument("--picture", type=Path, help="file for the picture of the kind `any`, PNG")
     options = parser.parse_args()
+    if options.picture is not None and "any" not in options.kinds:
+        parser.error("--picture is of the kind 'any'")
     if min(options.runs, options.processes) < 1:
         parser.error("--runs and --processes must be 1 or more")
     if unknown := set(options.kinds) - set(KINDS):
@@ -216,13 +263,23 @@ def main() -> int:
     except ActuatedCharactersError as error:
         raise SystemExit(f"error: {error}") from error
     table = Table(title="pushes that the planner does not know of", title_justify="left")
-    for column in ("kind", "upright", "fell at, s", "error 0, 1, 2, 3 s after, m", "away, m"):
+    for column in (
+        "kind",
+        "upright",
+        "fell at, s",
+        "error 0, 1, 2, 3 s after, m",
+        "away, m",
+        "missed",
+    ):
         table.add_column(column)
     for kind in options.kinds:
         table.add_row(kind, *_row([each for each in done if each.walk.kind == kind]))
     console.print(table)
     if options.out is not None:
         options.out.write_text(json.dumps([asdict(each) for each in done]))
+    if options.picture is not None:
+        impulses = [each.walk.pushes[0].impulse for each in done if each.walk.kind == "any"]
+        draw(impulses, [each.upright for each in done if each.walk.kind == "any"], options.picture)
     return 0
 
 
@@ -234,6 +291,7 @@ def _row(outcomes: Sequence[Outcome]) -> list[str]:
         " ".join(fell),
         " ".join(f"{np.median(errors):.3f}" for errors in _errors_after(outcomes) if errors),
         f"{np.median([each.away for each in upright]):.2f}" if upright else "",
+        str(sum(each.missed for each in outcomes)) if KINDS[outcomes[0].walk.kind].balls else "",
     ]
 
 
