@@ -129,11 +129,17 @@ class Planning:
 
 @dataclass(frozen=True)
 class ClipFormat:
-    """Where a character's motion clips lie and which joints their columns are."""
+    """Where a character's motion clips lie, which joints their columns are, and how they count."""
 
     pattern: str = ""  # a path with one '*', the clip's name
     joints: tuple[str, ...] = ()
     up_axis: str = "z"
+    quaternion: str = "wxyz"
+    base_rotation: Vector = (0.0, 0.0, 0.0)  # rad, rotation vector: the root's axes in their base's
+    signs: dict[str, float] = field(default_factory=dict)
+    """By joint: 1 or -1, of its angle in a clip."""
+    offsets: dict[str, float] = field(default_factory=dict)
+    """By joint, rad or m: what is added to it then."""
 
 
 @dataclass(frozen=True)

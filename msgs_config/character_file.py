@@ -198,12 +198,26 @@ def _soft_limit(limit: "_Reader") -> SoftLimit:
 def _clip_format(clips: "_Reader") -> ClipFormat:
     if not clips.content:
         return ClipFormat()
-    clips.check_keys(["files", "joints", "up_axis"])
+    clips.check_keys(
+        ["files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets"]
+    )
     joints = clips.names("joints", "joint names", default=None)
     pattern = clips.path_of("files")
     if pattern.name.count("*") != 1:
         raise clips.wrong("files", pattern.name, "a path with one '*'")
-    return ClipFormat(str(pattern), tuple(joints), clips.choice("up_axis", ["z", "y"]))
+    signs, offsets = clips.part("signs"), clips.part("offsets")
+    for name, sign in signs.content.items():
+        if sign not in (1, -1):
+            raise signs.wrong(name, sign, "1 or -1")
+    return ClipFormat(
+        str(pattern),
+        tuple(joints),
+        clips.choice("up_axis", ["z", "y"]),
+        clips.choice("quaternion", ["wxyz", "xyzw"]),
+        clips.angles("base_rotation", default=[0.0, 0.0, 0.0]),
+        {name: signs.number(name) for name in signs.content},
+        {name: offsets.number(name) for name in offsets.content},
+    )
 
 
 def _planning(planner: "_Reader", joints: dict[str, "_Reader"]) -> Planning:
@@ -293,9 +307,9 @@ class _Reader:
         """The number of a key that may be absent."""
         return self.number(key) if key in self.content else None
 
-    def angles(self, key: str) -> Vector:
-        """Three numbers, each an angle in rad from -pi to pi."""
-        value = self.content.get(key)
+    def angles(self, key: str, default: list[float] | None = None) -> Vector:
+        """Three angles in rad from -pi to pi; without a default they must be there."""
+        value = self.content.get(key, default)
         right = "a list of three numbers from -pi to pi"
         if not isinstance(value, list) or len(value) != 3:
             raise self.wrong(key, value, right)

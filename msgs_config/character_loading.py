@@ -203,6 +203,8 @@ def _check_joint_names(file: CharacterFile, layout: JointLayout) -> None:
     for key, names in (
         ("joints", file.gains),
         ("clips.joints", file.clips.joints),
+        ("clips.signs", file.clips.signs),
+        ("clips.offsets", file.clips.offsets),
         ("planner.sigma", planning.sigma),
         ("planner.gains", planning.gains),
     ):

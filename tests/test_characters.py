@@ -612,6 +612,22 @@ REFUSED = {
         ["clips.joints", "'knee'", "height"],
     ),
     "clips without a star": (PREAMBLE + "clips: {files: a.txt, joints: [height]}", ["clips.files"]),
+    "clips with another sign": (
+        PREAMBLE + "clips: {files: 'a_*.txt', joints: [height], signs: {height: 2}}",
+        ["clips.signs.height is 2", "1 or -1"],
+    ),
+    "clips with offsets of unknown joints": (
+        PREAMBLE + "clips: {files: 'a_*.txt', joints: [height], offsets: {knee: 0.1}}",
+        ["clips.offsets", "'knee'", "height"],
+    ),
+    "clips with half a base": (
+        PREAMBLE + "clips: {files: 'a_*.txt', joints: [height], base_rotation: [0, 1]}",
+        ["clips.base_rotation", "three numbers"],
+    ),
+    "clips with other quaternions": (
+        PREAMBLE + "clips: {files: 'a_*.txt', joints: [height], quaternion: zyx}",
+        ["clips.quaternion", "'wxyz' or 'xyzw'"],
+    ),
     "clips without joints": (PREAMBLE + "clips: {files: 'a_*.txt'}", ["clips.joints"]),
     "a package that is not installed": (
         "urdf: package://no_such_package/x.urdf",

@@ -1,7 +1,8 @@
 """Motion clips in the format of DeepMimic (Peng et al. 2018): JSON with `Loop` and `Frames`.
 
 A frame is: its duration in s, the root's position in m, the root's quaternion (wxyz), and for each
-joint of the character's list an angle in rad or, for a ball joint, a quaternion (wxyz).
+joint of the character's list an angle in rad or, for a ball joint, a quaternion (wxyz). The
+character's file may say otherwise of quaternions, of the base's axes, and of angles.
 """
 
 import json
@@ -116,9 +117,11 @@ def _in_layout(character: Character, path: Path, loop: str, frames: FloatArray) 
         values = frames[:, column : column + width]
         column += width
         if width == 4:
-            orientations[:, rotation_of[joint.start]] = _quaternions(path, name, values)
+            turns = _quaternions(character, path, name, values)
+            orientations[:, rotation_of[joint.start]] = turns
         else:
-            positions[:, joint.start] = values[:, 0]
+            signs, offsets = character.clips.signs, character.clips.offsets
+            positions[:, joint.start] = signs.get(name, 1.0) * values[:, 0] + offsets.get(name, 0.0)
     positions, clamped = _within_limits(character, positions)
     times = np.concatenate(([0.0], np.cumsum(frames[:-1, 0])))
     return ClipFrames(
@@ -135,22 +138,27 @@ def _root_upright(
     character: Character, path: Path, frames: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Positions and orientations of the root in the character's own world, z up."""
-    position, turn = frames[:, 1:4], _quaternions(path, "root", frames[:, 4:8])
-    if character.clips.up_axis == "y":
+    clips = character.clips
+    position, turn = frames[:, 1:4], _quaternions(character, path, "root", frames[:, 4:8])
+    if any(clips.base_rotation):
+        turn = rotations.multiply(turn, rotations.exp(np.array(clips.base_rotation)))
+    if clips.up_axis == "y":
         upright = rotations.ABOUT_X_QUARTER_TURN_XYZW
         return rotations.rotate(upright, position), rotations.multiply(upright, turn)
     return position, turn
 
 
-def _quaternions(path: Path, joint: str, values_wxyz: FloatArray) -> FloatArray:
+def _quaternions(character: Character, path: Path, joint: str, values: FloatArray) -> FloatArray:
     """Unit quaternions xyzw; captured ones are rounded, and some shipped ones badly so."""
-    lengths = fixed_order.norm(values_wxyz)
+    lengths = fixed_order.norm(values)
     if lengths.min() < _SHORTEST_QUATERNION:
         raise ClipError(
             f"{path}: frame {lengths.argmin()}: the quaternion of '{joint}' has length "
             f"{lengths.min():.3g}; it must be 1"
         )
-    return rotations.normalised(rotations.xyzw_from_wxyz(values_wxyz))
+    if character.clips.quaternion == "wxyz":
+        values = rotations.xyzw_from_wxyz(values)
+    return rotations.normalised(values)
 
 
 def _within_limits(
