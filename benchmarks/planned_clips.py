@@ -1,25 +1,31 @@
 """Which clips are kept by planning ahead, and how well: `python -m benchmarks.planned_clips`.
 
 A row a clip, one cycle of it with each seed in one process, as over topics: how many came to the
-end, and medians over the seeds. It takes half an hour on two cores.
+end, and medians over the seeds. It takes half an hour on two cores. `--set` and `--mass` make the
+world another one than the planner takes it for.
 """
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from msgs_config.process import limit_threads
 
 limit_threads()
 
 import numpy as np  # noqa: E402 - after the limit on threads
+import yaml  # noqa: E402
 from rich.console import Console  # noqa: E402
 from rich.progress import track  # noqa: E402
 from rich.table import Table  # noqa: E402
 
+from controller_node.parameters import make_controller  # noqa: E402
 from controller_node.references.clip_file import available_clips, read_clip  # noqa: E402
 from experiment.commands.settings import node_settings  # noqa: E402
 from experiment.loop import ticks_in_process  # noqa: E402
@@ -30,7 +36,6 @@ from msgs_config.character_loading import load_character  # noqa: E402
 from msgs_config.dynamics import DynamicsModel  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa: E402
 
-CHARACTER = "humanoid"
 NODES = ("sim_node", "controller_node")
 
 
@@ -47,6 +52,8 @@ class Attempt:
 class Task:
     """What is tried."""
 
+    character: str
+    world: str  # the character that is simulated, which the planner need not know
     clip: str
     seed: int
     duration: float | None  # s; None: a cycle
@@ -57,33 +64,43 @@ class Task:
 def main() -> int:
     """Plan clips with some seeds, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    clips = available_clips(load_character(CHARACTER))
-    parser.add_argument("clips", nargs="*", default=clips, help=f"({' '.join(clips)})")
+    parser.add_argument("clips", nargs="*", help="(all)")
+    parser.add_argument("--character", default="humanoid", help="(%(default)s)")
     parser.add_argument("--seeds", type=int, default=5, help="(%(default)s)")
     parser.add_argument("--duration", type=float, help="s of each; else a cycle")
     parser.add_argument("--set", action="append", default=[], help="NODE.NAME:=VALUE, as of run")
     parser.add_argument("--push", action="append", default=[], help="LINK:FX,FY,FZ@S, as of run")
+    parser.add_argument("--mass", type=float, help="factor on each link's, which nobody plans with")
     parser.add_argument("--processes", type=int, default=2, help="(%(default)s)")
     options = parser.parse_args()
     if min(options.seeds, options.processes) < 1:
         parser.error("--seeds and --processes must be 1 or more")
+    with TemporaryDirectory() as folder:
+        try:
+            return _table(options, Path(folder))
+        except ActuatedCharactersError as error:
+            raise SystemExit(f"error: {error}") from error
+
+
+def _table(options: argparse.Namespace, folder: Path) -> int:
+    character = options.character
+    clips = options.clips or available_clips(load_character(character))
+    world = character if options.mass is None else _with_mass(character, options.mass, folder)
+    settings, pushes = tuple(options.set), tuple(options.push)
     tasks = [
-        Task(clip, seed, options.duration, tuple(options.set), tuple(options.push))
-        for clip in options.clips
+        Task(character, world, clip, seed, options.duration, settings, pushes)
+        for clip in clips
         for seed in range(1, options.seeds + 1)
     ]
     console = Console(width=100)
-    try:
-        for task in tasks[:: options.seeds]:
-            _plan(task)  # what is wrong is said at once
-        with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool:
-            done = list(track(pool.map(attempt, tasks), total=len(tasks), console=console))
-    except ActuatedCharactersError as error:
-        raise SystemExit(f"error: {error}") from error
+    for task in tasks[:: options.seeds]:
+        _plan(task, world)  # what is wrong is said at once
+    with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool:
+        done = list(track(pool.map(attempt, tasks), total=len(tasks), console=console))
     table = Table(title=f"seeds 1 to {options.seeds}", title_justify="left")
     for column in ("clip", "to the end", "centre of mass, m", "joints, rad", "lost at, s"):
         table.add_column(column, justify="right" if column != "clip" else "left")
-    for number, clip in enumerate(options.clips):
+    for number, clip in enumerate(clips):
         table.add_row(clip, *_row(done[number * options.seeds :][: options.seeds]))
     console.print(table)
     return 0
@@ -91,12 +108,14 @@ def main() -> int:
 
 def attempt(task: Task) -> Attempt:
     """Track a clip until it is lost or ends."""
-    plan = _plan(task)
+    plan, own = _plan(task, task.world), _plan(task, task.character)
+    controller = make_controller(own.character, own.reference, own.controller)
+    pushes = pushes_within(task.pushes, plan)
     layout, rate = plan.character.layout, _rate(plan)
     centre = DynamicsModel(plan.character).centre_of_mass_at
     off, turns = [], []
     try:
-        for number, tick in enumerate(ticks_in_process(plan, pushes_within(task.pushes, plan)), 1):
+        for number, tick in enumerate(ticks_in_process(plan, pushes, controller=controller), 1):
             wanted, got = plan.reference.sample(number / rate), tick.following.position
             here, there = centre(got), centre(wanted.configuration.position)
             difference = layout.difference(wanted.configuration, layout.configuration(got))
@@ -109,11 +128,26 @@ def attempt(task: Task) -> Attempt:
     return Attempt(float(np.mean(off)), float(np.mean(turns)), None)
 
 
-def _plan(task: Task) -> Plan:
+def _with_mass(character: str, factor: float, folder: Path) -> str:
+    """The file of a character whose links are heavier by a factor."""
+    file = load_character(character).file
+    content = yaml.safe_load(file.read_text("utf-8"))
+    urdf = load_character(character).loading.urdf_path
+    text = re.sub(
+        r'(<mass\s+value\s*=\s*")([^"]+)',
+        lambda found: f"{found[1]}{factor * float(found[2])!r}",
+        urdf.read_text("utf-8"),
+    )
+    (folder / urdf.name).write_text(text, "utf-8")
+    (folder / file.name).write_text(yaml.safe_dump(content | {"urdf": urdf.name}), "utf-8")
+    return str(folder / file.name)
+
+
+def _plan(task: Task, character: str) -> Plan:
     settings = node_settings(task.settings, NODES)
-    cycle = float(read_clip(load_character(CHARACTER), task.clip).times[-1])
+    cycle = float(read_clip(load_character(character), task.clip).times[-1])
     return make_plan(
-        CHARACTER,
+        character,
         task.duration or cycle,
         {"reference": "clip", "clip": task.clip},
         settings["sim_node"],

@@ -2,9 +2,10 @@
 
 A row a kind of push at the root, at random moments and from random sides. A walk ends by falling:
 the centre of mass lower than 0.65 of the clip's, or the root turned by more than 1.5 rad from the
-clip's, where that has given way to. Kind `balls` throws them at the chest. Kind `fall` is a push
-that throws the character down, which is to get up and to walk on. Kind `any` is for `--picture`:
-the impulse that half of the walks bear, by direction. All of them take two hours on two cores.
+clip's, where that has given way to. Kind `balls` throws them at the chest, kind `standing` holds a
+pose for a minute. Kind `fall` is a push that throws the character down, which is to get up and to
+walk on. Kind `any` is for `--picture`: the impulse that half of the walks bear, by direction. All
+of them take two hours on two cores.
 """
 
 import argparse
@@ -62,6 +63,7 @@ class Kind:
     every: float = 2.0  # s
     lasts: float = 0.2  # s, of each
     balls: bool = False  # at the chest; the clip's heading is forwards
+    stands: bool = False  # instead of walking
     duration: float = 8.5  # s
     behaviour: str = "tracking"
 
@@ -73,6 +75,7 @@ KINDS = {
     "48 or 60 N s": Kind(48.0, 60.0),
     "77 or 96 N s": Kind(77.0, 96.0),
     "balls": Kind(20.0, pushes=5, every=4.0, duration=20.0, balls=True),
+    "standing": Kind(12.0, pushes=11, every=5.0, lasts=0.1, duration=60.0, stands=True),
     "any": Kind(40.0, hardest=160.0, duration=5.5),
     "fall": Kind(200.0, duration=16.0, behaviour="active_ragdoll"),
 }
@@ -227,8 +230,8 @@ def _plan(walk: Walk) -> Plan:
     simulator = {"wrench_duration": kind.lasts, "ball_lifetime": BALL_LIFETIME}
     own = {"plan.seed": walk.seed, "plan.workers": 1, "behaviour": kind.behaviour}
     controller = {"planner": "predictive", **own, **given["controller_node"]}
-    clip = {"reference": "clip", "clip": "walk"}
-    return make_plan("humanoid", kind.duration, clip, simulator | given["sim_node"], controller)
+    motion = {"reference": "hold"} if kind.stands else {"reference": "clip", "clip": "walk"}
+    return make_plan("humanoid", kind.duration, motion, simulator | given["sim_node"], controller)
 
 
 # What is said of them

@@ -1,12 +1,15 @@
-"""What the table of pushed walks says is what was drawn, thrown and fitted."""
+"""What the tables of planned motion say is what was drawn, thrown, weighed and fitted."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.planned_clips import _with_mass
 from benchmarks.planned_pushes import KINDS, _plan, _planned, _throws, walks
 from benchmarks.push_picture import half_borne
+from msgs_config.character_loading import load_character
 from msgs_config.tick_clock import TickClock
 
 
@@ -55,3 +58,16 @@ def test_a_ball_arrives_from_its_side_at_its_time() -> None:
         left = chest - np.array(ball.position[:2]) - flies * velocity
         assert 0.0 < float(left @ velocity) / 8.0 < 0.4  # touches, and has not passed
         assert abs(float(left[0] * velocity[1] - left[1] * velocity[0])) / 8.0 < 0.15
+
+
+def test_a_heavier_character_is_heavier_and_else_the_same(tmp_path: Path) -> None:
+    usual, heavier = (
+        load_character("humanoid"),
+        load_character(_with_mass("humanoid", 1.1, tmp_path)),
+    )
+
+    assert heavier.layout.dof_names == usual.layout.dof_names
+    for one, other in zip(heavier.links, usual.links, strict=True):
+        assert one.mass == pytest.approx(1.1 * other.mass)
+        inertia = 1.1 * np.array(other.inertia_diagonal)
+        np.testing.assert_allclose(one.inertia_diagonal, inertia, rtol=1e-6)
