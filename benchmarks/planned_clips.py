@@ -34,7 +34,11 @@ from experiment.planned_push import pushes_within  # noqa: E402
 from experiment.reconstruction.world import is_lost  # noqa: E402
 from msgs_config.character_loading import load_character  # noqa: E402
 from msgs_config.dynamics import DynamicsModel  # noqa: E402
-from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa: E402
+from msgs_config.errors import (  # noqa: E402
+    ActuatedCharactersError,
+    ConfigurationError,
+    SimulationError,
+)
 
 NODES = ("sim_node", "controller_node")
 
@@ -132,6 +136,8 @@ def _with_mass(character: str, factor: float, folder: Path) -> str:
     """The file of a character whose links are heavier by a factor."""
     file = load_character(character).file
     content = yaml.safe_load(file.read_text("utf-8"))
+    if content.get("inertia") != "shapes":
+        raise ConfigurationError("--mass is for a character whose inertia is that of its shapes")
     urdf = load_character(character).loading.urdf_path
     text = re.sub(
         r'(<mass\s+value\s*=\s*")([^"]+)',

@@ -265,16 +265,7 @@ def main() -> int:
             done = list(track(pool.map(attempt, tasks), total=len(tasks), console=console))
     except ActuatedCharactersError as error:
         raise SystemExit(f"error: {error}") from error
-    table = Table(title="pushes that the planner does not know of", title_justify="left")
-    for column in (
-        "kind",
-        "upright",
-        "fell at, s",
-        "error 0, 1, 2, 3 s after, m",
-        "away, m",
-        "missed",
-    ):
-        table.add_column(column)
+    table = Table(*COLUMNS, title="what the planner does not know of", title_justify="left")
     for kind in options.kinds:
         table.add_row(kind, *_row([each for each in done if each.walk.kind == kind]))
     console.print(table)

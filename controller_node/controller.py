@@ -105,7 +105,7 @@ class Controller:
         return self._planner
 
     def while_planning(self, act: Callable[[], None]) -> None:
-        """Have something done again and again while a planner plans; not to change this one."""
+        """Have something done again and again while a plan is waited for; not to change this."""
         if self._planner is not None:
             self._planner.while_waiting(act)
 

@@ -16,7 +16,7 @@ _WIDTH = 8  # bytes
 
 
 def plan_message(outlook: Outlook, stamp_ns: int) -> PointCloud2:
-    """One point for each check of the plan; `stamp_ns` is that of the state that it was made in."""
+    """One point for each check of a plan; `stamp_ns` is of the first state in which it acts."""
     count, anchor = len(outlook.times), outlook.anchor
     rows = np.empty((count, len(FIELDS)))
     rows[:, :3] = outlook.centres

@@ -32,6 +32,7 @@ class PdController(Node):
         """Publish the torque for a state; its stamp says which state that is."""
         if self.torques.get_subscription_count() < self.wanted:
             return  # the simulator publishes the state again
+        self.wanted = 0  # only before the first answer
         hinge = state.name.index("hinge")  # by name: the order of the entries may change
         q, v = state.position[hinge], state.velocity[hinge]
         effort = STIFFNESS * (self.target - q) - DAMPING * v + WEIGHT_TIMES_ARM * np.sin(q)

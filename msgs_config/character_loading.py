@@ -203,8 +203,6 @@ def _check_joint_names(file: CharacterFile, layout: JointLayout) -> None:
     for key, names in (
         ("joints", file.gains),
         ("clips.joints", file.clips.joints),
-        ("clips.signs", file.clips.signs),
-        ("clips.offsets", file.clips.offsets),
         ("planner.sigma", planning.sigma),
         ("planner.gains", planning.gains),
     ):
@@ -212,6 +210,14 @@ def _check_joint_names(file: CharacterFile, layout: JointLayout) -> None:
             if name not in layout.actuated_joint_names:
                 sentence = one_of("joint", name, layout.actuated_joint_names)
                 raise CharacterError(f"{file.path}: {key}: {sentence}")
+    of_one_angle = [
+        name for name in file.clips.joints if layout.joint(name).type is not JointType.SPHERICAL
+    ]
+    for key, changed in (("signs", file.clips.signs), ("offsets", file.clips.offsets)):
+        for name in changed:
+            if name not in of_one_angle:
+                sentence = one_of("joint of one angle", name, of_one_angle)
+                raise CharacterError(f"{file.path}: clips.{key}: {sentence}")
     if file.assistance and not layout.has_floating_base:
         raise CharacterError(f"{file.path}: root_assistance is for a floating base, this is fixed")
 

@@ -9,7 +9,7 @@ from msgs_config.bullet import pybullet
 from msgs_config.throw import Throw
 from sim_node.links import Links
 
-_AWAY = 10_000.0  # m, where nobody is
+_AWAY = 10_000.0  # m along x
 
 
 class Balls:
@@ -59,7 +59,7 @@ class Balls:
             self.add(throw)
 
     def put_away(self, ball: int) -> None:
-        """Take a ball, by its place in the order, to where it is in nobody's way; it lies there.
+        """Put a ball, by its place in the order, far away: on the ground, where that is a plane.
 
         It stays a body of the engine, which goes by their order.
         """

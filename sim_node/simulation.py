@@ -149,7 +149,7 @@ class Simulation:
 
     def _move_balls(self, throws: Sequence[Throw]) -> None:
         """Let balls go, and take those out of the way whose time is over."""
-        if self.settings.ball_ticks and self._thrown_at:
+        if self.settings.ball_ticks:
             over = self.tick - self.settings.ball_ticks
             for number, thrown_at in enumerate(self._thrown_at):
                 if thrown_at == over:

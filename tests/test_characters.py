@@ -618,7 +618,7 @@ REFUSED = {
     ),
     "clips with offsets of unknown joints": (
         PREAMBLE + "clips: {files: 'a_*.txt', joints: [height], offsets: {knee: 0.1}}",
-        ["clips.offsets", "'knee'", "height"],
+        ["clips.offsets", "'knee'", "joint of one angle", "height"],
     ),
     "clips with half a base": (
         PREAMBLE + "clips: {files: 'a_*.txt', joints: [height], base_rotation: [0, 1]}",

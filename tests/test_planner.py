@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +24,7 @@ from controller_node.parameters import PARAMETERS, character_parameters, make_co
 from controller_node.plan_message import plan_message
 from controller_node.planner import gauss_newton
 from controller_node.planner.outlook import Outlook
+from controller_node.planner.plan_search import PlanSearch
 from controller_node.planner.search import Problem, improve
 from experiment.bags.plans import decode_plan
 from experiment.bags.recording import Recording, read_recording
@@ -39,6 +42,7 @@ from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import TickClock
 
 HUMANOID = character("humanoid")
+LAYOUT_INDEX = np.arange(HUMANOID.layout.size)
 CLOCK = TickClock(240)
 OF_STATES = ("stamps_ns", "published_ns", "position", "velocity", "reference_position")
 OF_TICKS = ("effort", "contacts", "applied_wrench")
@@ -250,16 +254,62 @@ def test_a_plan_is_of_the_state_that_its_delay_is_before() -> None:
     assert seen.centres.tobytes() != unmoved.centres.tobytes()
 
 
-def test_what_is_done_in_between_is_done_and_changes_nothing() -> None:
-    controller, other, done = a_controller(), a_controller(), []
-    controller.while_planning(lambda: done.append(0))
+def test_what_is_done_while_a_plan_is_waited_for_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    controller, other, done = a_controller(), a_controller(), threading.Event()
+    controller.while_planning(done.set)
     (state,) = states(controller, 1)
-
-    effort, _ = controller.answer(state, state.stamp_ns)
     same, _ = other.answer(state, state.stamp_ns)
 
-    assert len(done) > 20
+    with monkeypatch.context() as patch:
+        patch.setattr(PlanSearch, "find", _after(lambda: done.wait(60.0)))
+        effort, _ = controller.answer(state, state.stamp_ns)
+
+    assert done.is_set()
     assert effort.tobytes() == same.tobytes()
+
+
+def test_it_does_not_matter_who_is_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+    def efforts(before_a_search: float, before_an_answer: float) -> bytes:
+        controller = a_controller(planning_delay_ticks=5)
+        sent, found = states(controller, 26), []
+        with monkeypatch.context() as patch:
+            patch.setattr(PlanSearch, "find", _after(lambda: time.sleep(before_a_search)))
+            for state in sent:
+                time.sleep(before_an_answer)
+                found.append(controller.answer(state, sent[0].stamp_ns)[0])
+        return np.array(found).tobytes()
+
+    assert efforts(0.4, 0.0) == efforts(0.0, 0.05)
+
+
+def _after(act: Callable[[], object]) -> Callable[..., Any]:
+    """A search before which something is done."""
+    find = PlanSearch.find
+
+    def later(self: PlanSearch, *given: Any) -> Any:
+        act()
+        return find(self, *given)
+
+    return later
+
+
+@pytest.mark.parametrize("again", [6, 9])
+def test_a_state_that_comes_while_a_plan_is_sought_is_no_news(again: int) -> None:
+    """Pushed, so that the reference gives way; the plan of tick 12 is sought in tick 7."""
+    controller, fresh = (a_controller(planning_delay_ticks=5) for _ in range(2))
+    sent = states(controller, 26)
+    pushed = [replace(each, position=each.position + 0.4 * (LAYOUT_INDEX == 0)) for each in sent]
+
+    def answers(of: Controller, ticks: list[int]) -> list[bytes]:
+        return [of.answer(pushed[tick], sent[0].stamp_ns)[0].tobytes() for tick in ticks]
+
+    expected = answers(fresh, list(range(26)))
+    found = answers(controller, [*range(10), *range(again, 26)])
+
+    assert fresh.outlook is not None and abs(fresh.outlook.anchor.place) > 0.05
+    assert found == expected[:10] + expected[again:]
 
 
 @pytest.mark.slow
@@ -356,7 +406,12 @@ REFUSED: dict[str, tuple[str, Mapping[str, object], str]] = {
     "a delay beyond the next plan": (
         "humanoid",
         {"planning_delay_ticks": 13},
-        "'planning_delay_ticks' is 13; it must be at most plan.period, 12 ticks",
+        "'planning_delay_ticks' is 13; it must be at most 12",
+    ),
+    "a delay beyond the plan": (
+        "humanoid",
+        {"planning_delay_ticks": 5, "plan.horizon": 0.06},
+        "'planning_delay_ticks' is 5; it must be at most 0",
     ),
     "no samples": ("humanoid", {"plan.samples": 0}, "'plan.samples' is 0; it must be 8"),
     "no planner": ("humanoid", {"planner": "clairvoyant"}, "planner"),

@@ -57,8 +57,8 @@ class Coming:
 class PredictivePlanner:
     """Plans for one character. It remembers its last plan, until an episode begins.
 
-    Plans are sought by a thread of their own, while the plan before leads over the ticks of
-    `PlannerSettings.lead`; what has not been found by then is waited for.
+    Plans are sought by a thread of their own. For the ticks of `PlannerSettings.planning_delay` the
+    plan before goes on acting; a plan that has not been found by then is waited for.
     """
 
     def __init__(
@@ -112,7 +112,8 @@ class PredictivePlanner:
         return self._plan
 
     def memory(self) -> PlannerMemory:
-        """What it goes on from, to be recalled by this planner or an equal one."""
+        """What it goes on from while no plan is sought, for this planner or an equal one."""
+        assert self._coming is None
         late = self.late_commands
         return PlannerMemory(self._plan, self._anchor, {} if late is None else late.sent())
 
@@ -124,8 +125,9 @@ class PredictivePlanner:
             self.late_commands.recall(memory.sent)
 
     def change_reference(self) -> None:
-        """Say that the reference is another one from now on; the plan stays."""
+        """Say that the reference is another one from now on; the plan in force stays."""
         self._course.forget()
+        self._abandon_search()
 
     def rest(self) -> None:
         """Forget the plan, and where the reference had given way to: nothing is tracked."""
@@ -148,7 +150,7 @@ class PredictivePlanner:
             self._coming = self._sought(tick, tick, state, gains, desired_at)
             self._take(tick)
         assert self._plan is not None
-        acts = tick + self.settings.lead
+        acts = tick + self.settings.planning_delay
         if self._coming is None and acts >= self._plan.tick + self.settings.period:
             self._coming = self._sought(tick, acts, state, gains, desired_at)
             self._take(tick)
@@ -172,6 +174,7 @@ class PredictivePlanner:
 
         As `cost`; infinite where that leads to nothing.
         """
+        assert self._coming is None
         body, position = self._model.body(gains), self._model.position_of(state.position)
         desired = self._course.ahead(tick, desired_at, body)
         velocity = state.velocity.copy()
@@ -194,11 +197,22 @@ class PredictivePlanner:
 
     def _forget_what_is_over(self, tick: int) -> None:
         """Plan anew from a state of before, which comes once more, or beyond the plan's end."""
-        plan, coming, settings = self._plan, self._coming, self.settings
-        if plan is not None and not 0 <= tick - plan.tick < settings.horizon - settings.lead:
-            self._plan = self._coming = None
-        elif coming is not None and tick < coming.seen:
-            self._coming = None
+        plan, settings = self._plan, self.settings
+        if plan is None:
+            return
+        if tick < plan.tick:
+            self.rest()
+        elif tick - plan.tick >= settings.horizon - settings.planning_delay:
+            self._abandon_search()
+            self._plan = None
+        elif self._coming is not None and tick < self._coming.seen:
+            self._abandon_search()
+
+    def _abandon_search(self) -> None:
+        """Seek no plan, as if none had been sought since the one in force."""
+        if self._coming is not None and self._plan is not None:
+            self._anchor = self._plan.outlook.anchor
+        self._coming = None
 
     def _take(self, tick: int) -> None:
         """Take the plan that acts from a tick on, if there is one; wait for it if need be."""

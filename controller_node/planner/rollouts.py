@@ -93,5 +93,6 @@ class Rollouts:
 def _has_knots(rows: FloatArray, desired: Desired) -> bool:
     """Whether the knots (k, n - 6) are there, for which compiled code does not look."""
     last_tick = desired.first_tick + len(desired.positions) - 2
-    last_knot, _ = knot_before(last_tick, desired.knot_ticks)
-    return len(rows) >= last_knot + 2 - desired.first_knot
+    first, _ = knot_before(desired.first_tick, desired.knot_ticks)
+    last, _ = knot_before(last_tick, desired.knot_ticks)
+    return desired.first_knot <= first and last + 2 - desired.first_knot <= len(rows)

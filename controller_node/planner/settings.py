@@ -17,7 +17,7 @@ NO_PLANNER = "none"
 PREDICTIVE = "predictive"
 RECORDED = "recorded"
 
-LEAD = "planning_delay_ticks"
+PLANNING_DELAY = "planning_delay_ticks"
 
 _WEIGHTS = {  # by name: the default, the unit, and of what
     "root_rotation": (5.0, "1/rad", "the root's rotation"),
@@ -63,7 +63,7 @@ PLANNER_PARAMETERS = [
     Parameter("plan.seed", 0, "of the samples", maximum=2**53),
     Parameter("plan.friction", 0.45, "of contacts, as the planner takes it", maximum=10.0),
     Parameter(
-        LEAD,
+        PLANNING_DELAY,
         0,
         "from the state that a plan is made from to the first tick in which it acts; meanwhile the "
         "plan before leads, and the world need not wait",
@@ -88,7 +88,7 @@ class PlannerSettings:
     horizon: int
     period: int
     knots: int
-    lead: int  # of the plan before, while the next one is sought
+    planning_delay: int  # from the state that a plan is sought from to when it acts
     delay: int  # until a command acts
     samples: int
     rounds: int
@@ -130,10 +130,12 @@ def make_settings(character: Character, values: Values) -> PlannerSettings:
             f"parameter 'plan.horizon' is {values.number('plan.horizon'):g}; it must be "
             f"plan.period, {values.number('plan.period'):g} s, or more"
         )
-    lead = values.integer(LEAD)
-    if lead > period:
+    planning_delay = values.integer(PLANNING_DELAY)
+    most = min(period, horizon - horizon % period - period)  # until then the plan before lasts
+    if planning_delay > most:
         raise ConfigurationError(
-            f"parameter '{LEAD}' is {lead}; it must be at most plan.period, {period} ticks"
+            f"parameter '{PLANNING_DELAY}' is {planning_delay}; it must be at most {most}: no more "
+            f"than plan.period, {period} ticks, and than what plan.horizon leaves beside it"
         )
     delay = values.integer(COMMAND_DELAY.name)
     if delay >= horizon:
@@ -145,7 +147,7 @@ def make_settings(character: Character, values: Values) -> PlannerSettings:
         horizon=horizon - horizon % period,
         period=period,
         knots=knots,
-        lead=lead,
+        planning_delay=planning_delay,
         delay=delay,
         samples=values.integer("plan.samples"),
         rounds=values.integer("plan.rounds"),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # it takes a second to import
     from experiment.reconstruction.search import Progress as SearchProgress
 
 _NODES = ("sim_node", "controller_node")
-_OWN = ("planner", "reference", "clip", "plan.seed", "plan.workers")
+_OWN = ("planner", "reference", "clip", "plan.seed", "plan.workers", "planning_delay_ticks")
 _CHARACTER = "humanoid"
 
 

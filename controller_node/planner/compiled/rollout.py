@@ -99,7 +99,7 @@ def roll_out(
             if not _is_bounded(engine):
                 return False  # before MuJoCo writes a warning
             step_after_forces(engine.model, engine.data)
-    return True
+    return _is_bounded(engine)
 
 
 @compiled
