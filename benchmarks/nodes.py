@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -39,12 +38,7 @@ class Nodes:
         self.node.create_subscription(topic.message_type, topic.name, self._listen, topic.qos)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._stack.close()
 
     def start(self, name: str, parameters: Mapping[str, object]) -> Child:

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 
 _END_PATIENCE = 10.0  # s that a child has to end after SIGINT, before it is killed
 _PR_SET_PDEATHSIG = 1  # prctl(2)
@@ -91,12 +90,7 @@ class Children:
     def __enter__(self) -> "Children":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         for child in reversed(self._children):
             child.interrupt()
             child.end()

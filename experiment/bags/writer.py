@@ -4,7 +4,6 @@ What is written is version 9, as ROS 2 Jazzy's `ros2 bag record` writes it.
 """
 
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from rclpy.duration import Duration, Infinite
@@ -54,12 +53,7 @@ class BagWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     @property
