@@ -20,6 +20,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
 _FIRST_ROUNDS = 6  # of the first plan: nothing has moved yet
+_WIDE = 2.0  # every other round looks so much farther: it may find another way out
+_MORE = 2  # times the samples, in the rounds after the first
 _LARGEST = 0.9  # sigma, of an offset
 _PENALTY = 0.2  # of an offset, for each sigma
 _FEWEST_DRAWS = 6
@@ -63,9 +65,7 @@ class PlanSearch:
             sensitivities = old.faded(tick, areas, settings)
             rounds, enough = settings.rounds, settings.tolerance
         for number in range(rounds):
-            draws = normal_draws(seed, (number, tick), settings.samples * place.size)
-            samples = draws.reshape(settings.samples, place.size)
-            found = improve(problem, place, samples, sensitivities)
+            found = improve(problem, place, self._samples(seed, number, tick), sensitivities)
             place, sensitivities = found.place, found.sensitivities
             if found.cost < enough:
                 break
@@ -95,6 +95,13 @@ class PlanSearch:
         residuals = problem.residuals(problem.deviations(place[np.newaxis])[0])
         cost = float(fixed_order.dot(residuals, residuals))
         return cost if math.isfinite(cost) else math.inf
+
+    def _samples(self, seed: tuple[int, int], number: int, tick: int) -> FloatArray:
+        """The draws (s, d) of a round, by its number."""
+        count = self._settings.samples * (_MORE if number else 1)
+        size = self._knot_count(tick) * len(self._unit)
+        draws = normal_draws(seed, (number, tick), count * size).reshape(count, size)
+        return _WIDE * draws if number % 2 else draws
 
     def _left(self, plan: Plan | None, tick: int) -> FloatArray:
         """What is left of a plan at a tick (d,), in units."""

@@ -52,7 +52,7 @@ PLANNER_PARAMETERS = [
         maximum=10_000,
     ),
     Parameter("plan.rounds", 4, "at most, for a plan", minimum=1, maximum=100),
-    Parameter("plan.tolerance", 15.0, "cost at which a plan needs no further round"),
+    Parameter("plan.tolerance", 30.0, "cost at which a plan needs no further round"),
     Parameter(
         "plan.noise",
         0.2,
