@@ -152,7 +152,7 @@ def test_without_clips_given_all_of_the_characters_are_there() -> None:
     ("name", "clips", "lasting", "word"),
     [
         ("humanoid", ["wlak"], LASTING, "did you mean 'walk'"),
-        ("laikago", [], LASTING, "no key 'clips'|has none"),
+        ("kuka", [], LASTING, "no key 'clips'|has none"),
         ("humanoid", ["kick"], 50.0, "50 s"),
     ],
 )
