@@ -42,7 +42,7 @@ from msgs_config.stamped import StampedState
 from msgs_config.tick_clock import TickClock
 
 HUMANOID = character("humanoid")
-LAYOUT_INDEX = np.arange(HUMANOID.layout.size)
+ENTRIES = np.arange(HUMANOID.layout.size)
 CLOCK = TickClock(240)
 OF_STATES = ("stamps_ns", "published_ns", "position", "velocity", "reference_position")
 OF_TICKS = ("effort", "contacts", "applied_wrench")
@@ -199,9 +199,9 @@ def test_neither_threads_nor_what_else_is_done_change_a_bit() -> None:
     assert walked(planning_delay_ticks=7, plan__workers=2) == overlapping != alone
 
 
-@pytest.mark.parametrize("lead", [0, 5, 12])
-def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all(lead: int) -> None:
-    controller = a_controller(planning_delay_ticks=lead)
+@pytest.mark.parametrize("delay", [0, 5, 12])
+def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all(delay: int) -> None:
+    controller = a_controller(planning_delay_ticks=delay)
     sent = states(controller, 26)
     first = sent[0].stamp_ns
 
@@ -218,9 +218,9 @@ def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all(lea
     assert answers(3) == once
 
 
-@pytest.mark.parametrize("lead", [0, 5])
-def test_a_state_of_before_is_planned_from_as_if_none_had_followed(lead: int) -> None:
-    controller, fresh = (a_controller(planning_delay_ticks=lead) for _ in range(2))
+@pytest.mark.parametrize("delay", [0, 5])
+def test_a_state_of_before_is_planned_from_as_if_none_had_followed(delay: int) -> None:
+    controller, fresh = (a_controller(planning_delay_ticks=delay) for _ in range(2))
     sent = states(controller, 40)
     first = sent[0].stamp_ns
     for state in sent[::6]:
@@ -233,11 +233,11 @@ def test_a_state_of_before_is_planned_from_as_if_none_had_followed(lead: int) ->
 
 
 def test_a_plan_is_of_the_state_that_its_delay_is_before() -> None:
-    lead, acts = 5, 12
+    delay, acts = 5, 12
 
     def plan_at(moved: int) -> Outlook:
         """The second plan, where the states from a tick on are others."""
-        controller = a_controller(planning_delay_ticks=lead)
+        controller = a_controller(planning_delay_ticks=delay)
         sent = states(controller, acts + 1)
         for tick, state in enumerate(sent):
             there = state.position + 0.05 * (tick >= moved)
@@ -247,11 +247,23 @@ def test_a_plan_is_of_the_state_that_its_delay_is_before() -> None:
         assert controller.outlook is not None
         return controller.outlook
 
-    seen, later = plan_at(moved=acts - lead), plan_at(moved=acts - lead + 1)
+    seen, later = plan_at(moved=acts - delay), plan_at(moved=acts - delay + 1)
     unmoved = plan_at(moved=acts + 1)
 
     assert later.centres.tobytes() == unmoved.centres.tobytes()
     assert seen.centres.tobytes() != unmoved.centres.tobytes()
+
+
+def test_a_plan_that_is_taken_late_says_when_from_there() -> None:
+    """In real time states are skipped: the plan of tick 12 is taken in tick 14."""
+    controller = a_controller(planning_delay_ticks=5)
+    sent = states(controller, 15)
+
+    for tick in (0, 7, 14):
+        controller.answer(sent[tick], sent[0].stamp_ns)
+
+    assert controller.outlook is not None
+    np.testing.assert_allclose(controller.outlook.times, 0.05 * np.arange(1, 7) - 2 / 240)
 
 
 def test_what_is_done_while_a_plan_is_waited_for_changes_nothing(
@@ -300,7 +312,7 @@ def test_a_state_that_comes_while_a_plan_is_sought_is_no_news(again: int) -> Non
     """Pushed, so that the reference gives way; the plan of tick 12 is sought in tick 7."""
     controller, fresh = (a_controller(planning_delay_ticks=5) for _ in range(2))
     sent = states(controller, 26)
-    pushed = [replace(each, position=each.position + 0.4 * (LAYOUT_INDEX == 0)) for each in sent]
+    pushed = [replace(each, position=each.position + 0.4 * (ENTRIES == 0)) for each in sent]
 
     def answers(of: Controller, ticks: list[int]) -> list[bytes]:
         return [of.answer(pushed[tick], sent[0].stamp_ns)[0].tobytes() for tick in ticks]

@@ -12,6 +12,9 @@ from msgs_config.stamped import StampedState
 if TYPE_CHECKING:
     from controller_node.planner.late_commands import LateCommands  # needs numba
 
+DesiredAt = Callable[[int], ReferenceState]
+"""The desired state of a tick, counted from the episode's first state."""
+
 
 class Planner(Protocol):
     """What keeps a motion by offsets to the tracking errors. It remembers the ticks before."""
@@ -37,10 +40,6 @@ class Planner(Protocol):
         """What is expected of the plan in force, the same object as long as it is."""
 
     def offset(
-        self,
-        tick: int,
-        state: StampedState,
-        gains: GainArrays,
-        desired_at: Callable[[int], ReferenceState],
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
         """What is added to the tracking errors (n,) of a state at a tick of the episode."""

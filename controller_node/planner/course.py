@@ -1,19 +1,16 @@
 """The reference over a horizon, as rollouts and comparisons need it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.planner.base import DesiredAt
 from controller_node.planner.compiled.rollout import Body, Desired
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.rollouts import Rollouts
 from controller_node.planner.settings import PlannerSettings
-from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
-
-DesiredAt = Callable[[int], ReferenceState]
-"""The desired state of a tick, counted from the episode's first state."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from msgs_config.arrays import FloatArray
 class Outlook:
     """What a plan is expected to lead to at each of its checks."""
 
-    times: FloatArray  # (checks,) s after the state that was told
+    times: FloatArray  # (checks,) s after the first state in which it acts
     centres: FloatArray  # (checks, 3) m, of mass, in the world
     costs: FloatArray  # (checks,) of the deviations from the reference; the plan's is their sum
     alternatives: FloatArray  # (checks,) of the best of what was tried besides

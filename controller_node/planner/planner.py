@@ -12,16 +12,17 @@ by samples); Howell et al. 2022, "Predictive Sampling: Real-time Behaviour Synth
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from controller_node.laws import GainArrays
 from controller_node.planner.anchor import Anchor, Balance, balance_of
+from controller_node.planner.base import DesiredAt
 from controller_node.planner.comparison import Comparison
 from controller_node.planner.compiled.rollout import Body
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.course import Course, DesiredAt, Target
+from controller_node.planner.course import Course, Target
 from controller_node.planner.late_commands import LateCommands
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.plan import Plan
@@ -221,7 +222,11 @@ class PredictivePlanner:
         sought = self._coming.plan
         while not wait((sought,), timeout=_PATIENCE).done:
             self._act()
-        self._plan, self._coming = sought.result(), None
+        plan, self._coming = sought.result(), None
+        if tick > plan.tick:  # in real time states are skipped
+            late = (tick - plan.tick) / self._rate_hz
+            plan = replace(plan, outlook=replace(plan.outlook, times=plan.outlook.times - late))
+        self._plan = plan
 
     def _sought(
         self, tick: int, acts: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt

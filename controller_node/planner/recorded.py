@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller_node.laws import GainArrays
+from controller_node.planner.base import DesiredAt
 from controller_node.planner.offsets import RecordedPlan
 from controller_node.planner.outlook import Outlook
-from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.stamped import StampedState
 
@@ -41,11 +41,7 @@ class RecordedPlanner:
         """It goes on by the tick, whatever is tracked."""
 
     def offset(
-        self,
-        tick: int,
-        state: StampedState,
-        gains: GainArrays,
-        desired_at: Callable[[int], ReferenceState],
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
         """What is added to the tracking errors (n,) at a tick; zero for the root."""
         del state, gains, desired_at
