@@ -35,6 +35,7 @@ setup(
     install_requires=[
         "lz4>=4.0,<5",  # which rosbags needs as well
         "matplotlib>=3.6,<4",
+        "mcap>=1.2,<2",  # reads files that nobody closed, which rosbags does not
         "mujoco-core==4.0.1",  # exactly: another engine may have other last bits
         "numpy>=1.26,<3",
         "pybullet==3.2.7",  # exactly, likewise
@@ -58,7 +59,6 @@ setup(
         "test": [
             "av>=14,<19",
             "hypothesis>=6.98,<7",
-            "mcap>=1.2,<2",
             "mcap-ros2-support>=0.5.5,<0.7",
             "mypy>=2.4,<2.5",
             "numba>=0.61,<0.70",

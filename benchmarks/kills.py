@@ -34,7 +34,7 @@ from rosbags.highlevel import AnyReader  # noqa: E402
 
 from benchmarks.nodes import Nodes  # noqa: E402
 from experiment.bags.recover import recover  # noqa: E402
-from experiment.bags.storage import COMPRESSIONS, STORAGES  # noqa: E402
+from experiment.bags.storage import COMPRESSIONS  # noqa: E402
 from experiment.domain import own_domain  # noqa: E402
 from experiment.figures import BAG  # noqa: E402
 from experiment.plan import make_plan  # noqa: E402
@@ -43,7 +43,6 @@ from msgs_config import topics  # noqa: E402
 from msgs_config.errors import RecordingError  # noqa: E402
 from msgs_config.tick_clock import NANOSECONDS_PER_SECOND, TickClock  # noqa: E402
 
-_KINDS = [(storage, compression) for storage in STORAGES for compression in COMPRESSIONS]
 _RATE = 500  # Hz: in real time a machine that cannot keep up loses messages, killed or not
 _LONGEST = 3.0  # s that a recorder lives, from when it has heard a state
 _PATIENCE = 30.0  # s for its start; longer than Fast DDS remembers the dead
@@ -57,7 +56,7 @@ _STAMP = struct.Struct("<4xiI")  # of the header that a message begins with: CDR
 
 @dataclass
 class _Found:
-    """What became of the recorders of one kind."""
+    """What became of the recorders of one compression."""
 
     recovered: int = 0
     deaf: int = 0  # heard nothing, and had nothing to lose
@@ -67,10 +66,10 @@ class _Found:
     problems: list[str] = field(default_factory=list)
 
 
-def kill_recorders(count: int, seed: int, console: Console) -> dict[tuple[str, str], _Found]:
-    """Kill so many recorders, of each kind in turn."""
+def kill_recorders(count: int, seed: int, console: Console) -> dict[str, _Found]:
+    """Kill so many recorders, of each compression in turn."""
     rng = np.random.default_rng(seed)
-    found = {kind: _Found() for kind in _KINDS}
+    found = {kind: _Found() for kind in COMPRESSIONS}
     with Nodes() as nodes, tempfile.TemporaryDirectory() as scratch:
         # In lockstep the simulator would wait for a dead subscriber; a ragdoll never diverges.
         settings = {"mode": "realtime", "rate": _RATE}
@@ -78,7 +77,7 @@ def kill_recorders(count: int, seed: int, console: Console) -> dict[tuple[str, s
         nodes.start(topics.SIM_NODE, {**plan.simulator, "max_ticks": 0})
         nodes.start(topics.CONTROLLER_NODE, plan.controller)
         for number in range(count):
-            kind = _KINDS[number % len(_KINDS)]
+            kind = COMPRESSIONS[number % len(COMPRESSIONS)]
             run = Path(scratch) / "run"
             try:
                 for _ in range(_MOST_DEAF):
@@ -94,10 +93,9 @@ def kill_recorders(count: int, seed: int, console: Console) -> dict[tuple[str, s
     return found
 
 
-def _kill_one(nodes: Nodes, run: Path, kind: tuple[str, str], life: float, found: _Found) -> bool:
+def _kill_one(nodes: Nodes, run: Path, compression: str, life: float, found: _Found) -> bool:
     """Start a recorder, kill it and recover what it leaves; False if it was a deaf one."""
-    storage, compression = kind
-    parameters = {"directory": str(run), "storage": storage, "compression": compression}
+    parameters = {"directory": str(run), "compression": compression}
     recorder = nodes.start(topics.RECORDER_NODE, {**parameters, "progress_period": 0.1})
     said, spoke_at = _kill(recorder, life)
     if not _FIRST_STATE.search(said):
@@ -186,10 +184,9 @@ def _check(bag: Path, counts: Counter[str], last_flushed: int, found: _Found) ->
     found.ticks += len(ticks)
 
 
-def _table(found: dict[tuple[str, str], _Found]) -> Table:
+def _table(found: dict[str, _Found]) -> Table:
     table = Table(title="recorders killed", title_justify="left")
     for column in (
-        "storage",
         "compression",
         "recovered",
         "too early",
@@ -198,9 +195,8 @@ def _table(found: dict[tuple[str, str], _Found]) -> Table:
         "lost, at most",
     ):
         table.add_column(column)
-    for (storage, compression), each in found.items():
+    for compression, each in found.items():
         table.add_row(
-            storage,
             compression,
             str(each.recovered),
             str(each.too_early),
@@ -223,9 +219,7 @@ def main() -> int:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
         found = kill_recorders(arguments.count, arguments.seed, console)
     console.print(_table(found))
-    problems = [
-        f"{' '.join(kind)}: {problem}" for kind, each in found.items() for problem in each.problems
-    ]
+    problems = [f"{kind}: {problem}" for kind, each in found.items() for problem in each.problems]
     for problem in problems:
         console.print(f"[red]{problem}", soft_wrap=True)
     return 1 if problems else 0

@@ -190,7 +190,7 @@ def test_a_bomb_is_refused_in_one_line(write: Callable[[str], Path], kind: str) 
     line = str(caught.value)
     assert line.startswith(f"cannot read recording {bag}: ")
     assert KINDS[kind][1] in line
-    assert "recover" in line
+    assert ("recover" in line) == bool(list(bag.glob("*.mcap")))
     assert "\n" not in line and len(line) < 500
 
 
@@ -250,7 +250,7 @@ def test_a_command_refuses_a_bomb_in_little_memory(
     assert ended.mebibytes < MOST_MEBIBYTES
 
 
-@pytest.mark.parametrize("kind", ["message", "message undeclared", "chunk", "chunk that lies"])
+@pytest.mark.parametrize("kind", ["chunk", "chunk that lies", "chunk of lz4"])
 def test_recover_keeps_the_rest_and_says_what_it_left(
     write: Callable[[str], Path], kind: str
 ) -> None:
@@ -261,7 +261,7 @@ def test_recover_keeps_the_rest_and_says_what_it_left(
     assert ended.code == 0, ended.errors
     assert KINDS[kind][1] in " ".join(ended.errors.split())
     assert ended.mebibytes < MOST_MEBIBYTES
-    assert texts(bag) == (SOUND[1:] if "chunk" in kind else SOUND)
+    assert texts(bag) == SOUND[1:]
 
 
 def test_a_file_that_declares_nothing_is_unpacked_up_to_the_limit(

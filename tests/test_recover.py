@@ -2,9 +2,7 @@
 
 import shutil
 import signal
-import sqlite3
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +21,7 @@ from experiment.figures import SUMMARY, read_figures, write_figures
 from experiment.listener import RunListener
 from msgs_config.errors import RecordingError
 from tests.bags import add_to, make_run
-from tests.foreign_bags import SAID, texts, write_humble_db3
+from tests.foreign_bags import SAID, texts
 from tests.limits import file_size_limit, unprivileged
 from tests.ros import Process, wait_until
 
@@ -31,8 +29,8 @@ pytestmark = pytest.mark.slow
 
 QOS = QoSProfile(depth=5000)
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-KINDS = [(s, c) for s in ("mcap", "sqlite3") for c in ("none", "zstd")]
-EACH_KIND = pytest.mark.parametrize(("storage", "compression"), KINDS)
+COMPRESSIONS = ("none", "zstd")
+EACH_COMPRESSION = pytest.mark.parametrize("compression", COMPRESSIONS)
 
 # A recorder at its simplest: says what it has flushed, until it is killed.
 WRITER = """
@@ -42,8 +40,8 @@ import numpy as np
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 from experiment.bags.writer import BagWriter
-rng = np.random.default_rng(int(sys.argv[4]))
-bag = BagWriter(Path(sys.argv[1]), storage=sys.argv[2], compression=sys.argv[3])
+rng = np.random.default_rng(int(sys.argv[3]))
+bag = BagWriter(Path(sys.argv[1]), compression=sys.argv[2])
 bag.add_topic("/text", String, QoSProfile(depth=10))
 number = 0
 while True:
@@ -62,9 +60,9 @@ def bag(tmp_path: Path) -> Path:
     return tmp_path / "bag"
 
 
-def unclosed(bag: Path, storage: str = "mcap", compression: str = "none") -> BagWriter:
+def unclosed(bag: Path, compression: str = "none") -> BagWriter:
     """A bag with SAID flushed, and five messages more that were not."""
-    writer = BagWriter(bag, storage=storage, compression=compression)
+    writer = BagWriter(bag, compression=compression)
     for topic in ("/a", "/b"):
         writer.add_topic(topic, String, LATCHED_QOS if topic == "/b" else QOS)
     for said in SAID:
@@ -75,9 +73,9 @@ def unclosed(bag: Path, storage: str = "mcap", compression: str = "none") -> Bag
     return writer
 
 
-def killed(tmp_path: Path, storage: str = "mcap", compression: str = "none") -> Path:
+def killed(tmp_path: Path, compression: str = "none") -> Path:
     """A bag as it is on the disk while its writer is still at work: as a kill leaves it."""
-    writer = unclosed(tmp_path / "alive" / "bag", storage, compression)
+    writer = unclosed(tmp_path / "alive" / "bag", compression)
     shutil.copytree(tmp_path / "alive" / "bag", tmp_path / "bag")
     writer.close()
     return tmp_path / "bag"
@@ -86,15 +84,13 @@ def killed(tmp_path: Path, storage: str = "mcap", compression: str = "none") -> 
 # Killed
 
 
-@pytest.mark.parametrize(
-    ("storage", "compression", "seed"), [*((*k, 1) for k in KINDS), ("mcap", "none", 2)]
-)
+@pytest.mark.parametrize(("compression", "seed"), [("none", 1), ("none", 2), ("zstd", 1)])
 def test_a_killed_recorder_loses_nothing_that_it_flushed(
-    tmp_path: Path, storage: str, compression: str, seed: int
+    tmp_path: Path, compression: str, seed: int
 ) -> None:
     bag = tmp_path / "bag"
     enough = int(np.random.default_rng(seed).integers(1, 8))
-    child = Process(["-c", WRITER, str(bag), storage, compression, str(seed)], tmp_path / "child")
+    child = Process(["-c", WRITER, str(bag), compression, str(seed)], tmp_path / "child")
     try:
         wait_until(lambda: child.stdout.count("\n") > enough, "flushes")
         child.send(signal.SIGKILL)
@@ -121,11 +117,11 @@ def assert_others_read_it(bag: Path, count: int) -> None:
             assert sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages()) == count
 
 
-@EACH_KIND
+@EACH_COMPRESSION
 def test_all_that_was_flushed_is_recovered_with_type_hash_and_qos(
-    tmp_path: Path, storage: str, compression: str
+    tmp_path: Path, compression: str
 ) -> None:
-    bag = killed(tmp_path, storage, compression)
+    bag = killed(tmp_path, compression)
     before = {file.name: file.read_bytes() for file in bag.iterdir()}
 
     recovered = recover(bag)
@@ -144,11 +140,9 @@ def test_all_that_was_flushed_is_recovered_with_type_hash_and_qos(
         }
 
 
-@EACH_KIND
-def test_what_is_recovered_is_compressed_as_it_was(
-    tmp_path: Path, storage: str, compression: str
-) -> None:
-    bag = killed(tmp_path, storage, compression)
+@EACH_COMPRESSION
+def test_what_is_recovered_is_compressed_as_it_was(tmp_path: Path, compression: str) -> None:
+    bag = killed(tmp_path, compression)
 
     recover(bag)
 
@@ -157,7 +151,7 @@ def test_what_is_recovered_is_compressed_as_it_was(
         for each in (bag, tmp_path / "alive" / "bag")
     )
     assert new.stat().st_size == pytest.approx(old.stat().st_size, rel=0.2)
-    assert new.name == ("bag.mcap" if storage == "mcap" else "bag.db3")
+    assert new.name == "bag.mcap"
 
 
 def test_a_recorder_that_was_killed_before_its_first_flush_leaves_nothing_to_recover(
@@ -174,11 +168,11 @@ def test_a_recorder_that_was_killed_before_its_first_flush_leaves_nothing_to_rec
     assert [path.name for path in (tmp_path / "run").iterdir()] == ["bag"]
 
 
-@EACH_KIND
+@EACH_COMPRESSION
 def test_a_bag_whose_recorder_is_still_at_work_is_left_to_it(
-    tmp_path: Path, storage: str, compression: str
+    tmp_path: Path, compression: str
 ) -> None:
-    writer = unclosed(tmp_path / "bag", storage, compression)
+    writer = unclosed(tmp_path / "bag", compression)
     with pytest.raises(RecordingError, match=r"a recorder is still at work on .*; end it"):
         recover(tmp_path / "bag")
 
@@ -186,46 +180,6 @@ def test_a_bag_whose_recorder_is_still_at_work_is_left_to_it(
 
     assert len(texts(tmp_path / "bag")) == len(SAID) + 5
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
-
-
-def test_an_sqlite_journal_that_a_kill_left_is_played_back(tmp_path: Path) -> None:
-    """A transaction so large that SQLite has begun to write it into the file itself."""
-    (tmp_path / "alive").mkdir()
-    file = write_humble_db3(tmp_path / "alive" / "bag_0.db3", SAID)
-    with closing(sqlite3.connect(file)) as database:
-        database.execute("PRAGMA cache_size=2")
-        database.execute("UPDATE messages SET topic_id = 77")
-        rows = [(1, number, bytes(5000)) for number in range(100, 200)]
-        database.executemany(
-            "INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", rows
-        )
-        shutil.copytree(tmp_path / "alive", tmp_path / "bag")
-    journal = tmp_path / "bag" / "bag_0.db3-journal"
-    assert journal.stat().st_size > 0
-    before = journal.read_bytes()
-
-    recover(tmp_path / "bag")
-
-    assert texts(tmp_path / "bag") == SAID
-    assert (tmp_path / "bag.damaged" / journal.name).read_bytes() == before
-
-
-def test_an_sqlite_log_that_was_never_merged_is_read(tmp_path: Path) -> None:
-    (tmp_path / "alive").mkdir()
-    file = write_humble_db3(tmp_path / "alive" / "bag_0.db3", SAID[:-1], journal="WAL")
-    with closing(sqlite3.connect(file)) as database:
-        (last_topic,) = database.execute("SELECT id FROM topics WHERE name = ?", SAID[-1][:1])
-        database.execute(
-            "INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)",
-            (last_topic[0], SAID[-1].log_time_ns, SAID[-1].cdr),
-        )
-        database.commit()
-        shutil.copytree(tmp_path / "alive", tmp_path / "bag")
-    assert (tmp_path / "bag" / "bag_0.db3-wal").stat().st_size > 0
-
-    recover(tmp_path / "bag")
-
-    assert texts(tmp_path / "bag") == SAID
 
 
 def test_a_file_that_was_being_compressed_is_read_once(tmp_path: Path) -> None:
@@ -237,9 +191,8 @@ def test_a_file_that_was_being_compressed_is_read_once(tmp_path: Path) -> None:
     assert texts(bag) == SAID and recovered.contents.lost == []
 
 
-@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-def test_topics_without_messages_are_kept(tmp_path: Path, storage: str) -> None:
-    writer = BagWriter(tmp_path / "alive" / "bag", storage=storage)
+def test_topics_without_messages_are_kept(tmp_path: Path) -> None:
+    writer = BagWriter(tmp_path / "alive" / "bag")
     for topic in ("/a", "/silent"):
         writer.add_topic(topic, String, QOS)
     writer.write("/a", SAID[1].cdr, 1)
@@ -309,16 +262,13 @@ def test_a_complete_bag_is_not_touched(tmp_path: Path) -> None:
 def test_where_there_is_nothing_the_error_says_so(tmp_path: Path, bag: Path) -> None:
     with pytest.raises(RecordingError, match=r"nothing to recover: .*nowhere is no directory$"):
         recover(tmp_path / "nowhere")
-    with pytest.raises(RecordingError, match=r"nothing to recover in .*: it has no .mcap or .db3"):
+    with pytest.raises(RecordingError, match=r"nothing to recover in .*: it has no .mcap file"):
         recover(bag)
     (bag / "bag_0.mcap").write_bytes(b"garbage")
     with pytest.raises(RecordingError, match=r"no message reached the disk .*is no MCAP file"):
         recover(bag)
     with pytest.raises(RecordingError, match="give the directory that it lies in"):
         recover(bag / "bag_0.mcap")
-    (bag / "bag_0.db3").write_bytes(b"garbage")
-    with pytest.raises(RecordingError, match="it has files of different storages"):
-        recover(bag)
 
 
 def test_an_earlier_original_is_not_overwritten(tmp_path: Path) -> None:

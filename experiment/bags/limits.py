@@ -16,6 +16,7 @@ MOST_OF_MESSAGE = 64 * MIB  # bytes; a large image has 50 million
 MOST_OF_CHUNK = 128 * MIB  # bytes, together with those of overlapping times; mostly it is 1 MiB
 MOST_SORTED = 1024 * MIB  # bytes of a file without an index, which is sorted in memory
 MOST_OF_FILES = 8192 * MIB  # bytes on the disk, of all files of a bag that are compressed whole
+ZstdError = zstd.ZstdError
 _PIECE = MIB
 _LONGEST_HEAD = 18  # bytes of a zstd frame
 
@@ -27,10 +28,6 @@ class LimitError(ValueError):
         """`size` is what is known of it, bytes; None if that is no more than the limit."""
         more = "more" if size is None else f"at least {_shown(size)}, more"
         super().__init__(f"{what} would unpack to {more} than the limit of {_shown(limit)}")
-
-
-UNPACKING_FAILED = (LimitError, EOFError, zstd.ZstdError)
-"""What is raised for something compressed that is damaged or too large."""
 
 
 class Allowance:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-from experiment.bags.storage import SUFFIXES, ZSTD, reason
+from experiment.bags.storage import MCAP, SUFFIXES, ZSTD, reason
 from experiment.figures import BAG
 from msgs_config import files
 from msgs_config.errors import RecordingError, one_of
@@ -88,16 +88,14 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
 
 
 def recover_hint(bag: Path, does: str) -> str:
-    """A sentence on the command `recover`, of the run that a bag lies in, if it does."""
+    """What follows in an error of a bag: what the command `recover` does, if it can."""
     run = bag.parent if bag.name == BAG else bag
-    return f"'actuated_characters recover {run}' {does}"
+    can = bag.is_dir() and any(file.suffix == SUFFIXES[MCAP] for file in bag.iterdir())
+    return f"; 'actuated_characters recover {run}' {does}" if can else ""
 
 
 def _missing(bag: Path) -> str:
     """Why there is no metadata file, and what would help."""
     if not bag.is_dir():
         return "there is no such directory"
-    suffixes = set(SUFFIXES.values())
-    if any(file.suffix in suffixes for file in bag.iterdir()):  # as a killed recorder leaves it
-        return f"it has no {METADATA}; {recover_hint(bag, 'makes one')}"
-    return f"it has no {METADATA}"
+    return f"it has no {METADATA}{recover_hint(bag, 'makes one')}"

@@ -26,8 +26,8 @@ from experiment.bags.limits import (
     unpack_file,
     unpack_message,
 )
-from experiment.bags.mcap_records import McapRecords
 from experiment.bags.metadata import CDR, FILE, MESSAGE, BagMetadata, read_metadata, recover_hint
+from experiment.bags.salvage import Salvage
 from experiment.bags.storage import SQLITE3, SUFFIXES, ZSTD_MAGIC, check_sqlite_path, reason
 from msgs_config.errors import RecordingError, one_of
 
@@ -88,7 +88,7 @@ def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator
 
 def _hint(path: Path) -> str:
     """What may help with a bag that cannot be read; of a file alone it would not."""
-    return "" if path.is_file() else f"; {recover_hint(path, 'keeps what is whole of it')}"
+    return "" if path.is_file() else recover_hint(path, "keeps what is whole of it")
 
 
 def _messages(
@@ -146,7 +146,7 @@ def _open(
             if journal.is_file() and journal.stat().st_size > 0:  # what rosbags would not look at
                 raise RecordingError(
                     f"cannot read recording {path}: {file.name} was never closed, a journal lies "
-                    f"beside it; {recover_hint(path, 'makes it whole')}"
+                    f"beside it; 'sqlite3 {file.name} .tables' makes it whole"
                 )
         with closing(sqlite3.connect(f"file:{file}?immutable=1", uri=True)) as tables:
             check_tables(tables)
@@ -233,14 +233,14 @@ def _is_unindexed(reader: Reader) -> bool:
 def _sorted(file: Path, chosen: list[Connection]) -> Iterator[Stored]:
     """The messages of an MCAP file that has no index; all of them are held in memory."""
     topics = {connection.topic for connection in chosen}
-    records, memory = McapRecords(file), Allowance("a file without an index", MOST_SORTED)
+    salvage, memory = Salvage(file), Allowance("a file without an index", MOST_SORTED)
     messages: list[Stored] = []
-    for channel, log_time_ns, raw in records.messages():
-        if channel.topic in topics:
+    for topic, log_time_ns, raw in salvage.messages():
+        if topic.name in topics:
             memory.take(len(raw) + _LEAST_HELD)
-            messages.append((channel.topic, log_time_ns, raw, channel.type_name))
-    if records.unreadable_bytes:
-        raise ValueError(records.refusal or f"{records.unreadable_bytes} bytes of it are damaged")
+            messages.append((topic.name, log_time_ns, raw, topic.type_name))
+    if salvage.damage:
+        raise ValueError(f"it cannot be read whole: {salvage.damage}")
     yield from sorted(messages, key=lambda message: message[1])
 
 

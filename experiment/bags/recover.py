@@ -19,7 +19,7 @@ from msgs_config.configuration import parse_world
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import decode
 
-_DAMAGED, _SCRATCH, _COPIES = ".damaged", ".recovering", ".copies"
+_DAMAGED, _SCRATCH = ".damaged", ".recovering"
 _REPORT_PERIOD = 1000  # messages
 
 
@@ -38,9 +38,9 @@ class Recovered:
 def recover(path: Path, progress: Progress | None = None) -> Recovered:
     """Make a bag complete that is not, in its place; the original stays beside it as `.damaged`.
 
-    Every message that is whole is kept, with its type's definition and its publishers' quality of
-    service. A run's directory gets the figures that it lacks. A bag that is complete is not
-    touched. Being killed itself does no harm: the next call goes on.
+    Every message of a chunk that is whole is kept, with its type's definition and its publishers'
+    quality of service. A run's directory gets the figures that it lacks. A bag that is complete is
+    not touched. Being killed itself does no harm: the next call goes on.
 
     Args:
         path: A run's directory, or a bag: the directory that its files lie in.
@@ -81,11 +81,11 @@ def _recover_bag(bag: Path, report: Progress) -> Recovered:
         raise RecordingError(f"{damaged} is in the way: what an earlier recovery kept; move it")
     claim = _claim(bag)
     try:
-        _check_unwritten(bag)
+        writer = writer_of(storage_files(bag))  # of another recorder, which makes no claim
+        if writer is not None:
+            raise RecordingError(f"process {writer} is still writing to {bag}; end it first")
         shutil.rmtree(scratch, ignore_errors=True)  # of a recovery that was killed
-        copies = scratch / (bag.name + _COPIES)
-        copies.mkdir(parents=True)
-        contents = rewrite(bag, scratch / bag.name, copies, report)
+        contents = rewrite(bag, scratch / bag.name, report)
         bag.rename(damaged)
         _finish_swap(bag)
     finally:
@@ -100,13 +100,6 @@ def _claim(bag: Path) -> Claim:
         return Claim(bag)
     except BlockingIOError as error:
         raise RecordingError(f"a recorder is still at work on {bag}; end it first") from error
-
-
-def _check_unwritten(bag: Path) -> None:
-    """Refuse what another recorder writes, which makes no claim."""
-    writer = writer_of(storage_files(bag))
-    if writer is not None:
-        raise RecordingError(f"process {writer} is still writing to {bag}; end it first")
 
 
 def _scratch(bag: Path) -> Path:

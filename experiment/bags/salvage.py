@@ -1,220 +1,167 @@
-"""Reads storage files that nobody closed: every message that is whole, in the file's order."""
+"""Reads MCAP files in their order, also those that nobody closed: every record that is whole."""
 
-import sqlite3
-from collections.abc import Iterator
-from contextlib import closing
+import struct
+from collections import Counter
+from collections.abc import Collection, Iterator
+from io import BytesIO
+from os import SEEK_CUR
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import BinaryIO, NamedTuple
 
-from experiment.bags.limits import (
-    UNPACKING_FAILED,
-    LimitError,
-    check_message,
-    check_tables,
-    unpack_message,
-)
-from experiment.bags.mcap_records import Channel, McapRecords
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Message, Schema
+from rosbags.rosbag2.storage_mcap import decompress
+
+from experiment.bags.limits import MOST_OF_CHUNK, LimitError
 from experiment.bags.metadata import CDR
-from experiment.bags.storage import ZSTD_MAGIC, reason
 from msgs_config.errors import RecordingError
+
+_MAGIC = b"\x89MCAP0\r\n"
+_HEAD = struct.Struct("<BQ")  # of a record: its kind, and the length of what follows
+_TAIL = struct.Struct("<BQQQI8s")  # footer record and magic
+_ANNOUNCEMENTS = (Opcode.SCHEMA, Opcode.CHANNEL)
+_ENDS = ((Opcode.DATA_END, 4), (Opcode.FOOTER, 20))  # with their lengths
+_PRIVATE = 0x80  # kinds of others begin here
+_CUT_OFF = "bytes cut off"
+_MOST_NAMED = 5  # kinds of damage
 
 
 class StoredTopic(NamedTuple):
-    """What a storage file says of a topic; a text is empty where the file says nothing."""
+    """A topic of a file."""
 
     name: str
     type_name: str  # as "sensor_msgs/msg/JointState"
     definition: str
-    type_hash: str
+    type_hash: str  # empty before Jazzy
     offered_qos: str  # YAML, as rosbag2 writes it
 
 
 class StoredMessage(NamedTuple):
-    """A message as it lies in a storage file."""
+    """A message of a file."""
 
     topic: StoredTopic
     log_time_ns: int
-    raw: bytes
-    was_compressed: bool  # alone, or with others
+    raw: bytes  # as it is stored: rosbag2 may have compressed each
 
 
-class Salvage(Protocol):
-    """A damaged file that is being read."""
+class Salvage:
+    """Reads one MCAP file once, and counts what of it cannot be read.
 
-    def messages(self) -> Iterator[StoredMessage]:
-        """What can be read, in the file's order."""
-        ...
+    A chunk whose checksum or compression is wrong is left out whole; after a record that is cut
+    off nothing more is found.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self.lost: Counter[str] = Counter()
+        """How often something could not be read, so far, by what it was."""
+        self.fraction = 0.0
+        """Of the file that has been read."""
+        self.is_compressed = False
+        """Whether there was something compressed, so far."""
+        self.path = file
+        self._schemas: dict[int, Schema] = {}
+        self._topics: dict[int, StoredTopic] = {}
 
     @property
     def topics(self) -> list[StoredTopic]:
         """What the file announces, as far as it was read: with messages or without."""
-        ...
+        return list(self._topics.values())
 
     @property
     def damage(self) -> str:
         """What could not be read, in a few words; empty if there was nothing of it so far."""
-        ...
-
-    @property
-    def fraction(self) -> float:
-        """How much of the file has been read, 0 to 1."""
-        ...
-
-
-class McapSalvage:
-    """An MCAP file: as a stream of records, up to the first one that is not whole."""
-
-    def __init__(self, file: Path) -> None:
-        self._records = McapRecords(file)
-        self._lost = _Lost()
+        kinds = sorted(self.lost, key=lambda what: what != _CUT_OFF)
+        named = [f"{what} ({self.lost[what]})" for what in kinds[:_MOST_NAMED]]
+        return ", ".join([*named, *["..."] * (len(kinds) > _MOST_NAMED)])
 
     def messages(self) -> Iterator[StoredMessage]:
-        """What can be read, in the file's order.
+        """Yield the messages in the file's order.
 
         Raises:
-            RecordingError: it is no MCAP file, or none of ROS 2.
+            RecordingError: it is no MCAP file.
         """
-        topics: dict[Channel, StoredTopic] = {}
-        for channel, log_time_ns, packed in self._records.messages():
-            if channel not in topics:
-                topics[channel] = _topic_of(channel)
-            raw = self._lost.unpacked(packed)
-            if raw is None:
-                continue
-            was_compressed = self._records.is_compressed or raw is not packed
-            yield StoredMessage(topics[channel], log_time_ns, raw, was_compressed)
+        size = self.path.stat().st_size
+        with self.path.open("rb") as file:
+            if file.read(len(_MAGIC)) != _MAGIC:
+                raise RecordingError(f"{self.path} is no MCAP file")
+            self._read_summary(file, size)
+            file.seek(len(_MAGIC))
+            for message in self._records(
+                file, size, (*_ANNOUNCEMENTS, Opcode.MESSAGE, Opcode.CHUNK)
+            ):
+                self.fraction = file.tell() / size
+                yield message
+        self.fraction = 1.0
 
-    @property
-    def topics(self) -> list[StoredTopic]:
-        """What the file announces."""
-        return [_topic_of(each) for each in self._records.channels() if each.serialization == CDR]
+    def _read_summary(self, file: BinaryIO, size: int) -> None:
+        """Take topics from a closed file's end, where they are told again."""
+        file.seek(max(size - _TAIL.size, 0))
+        tail = file.read()
+        kind, length, start, *_, magic = _TAIL.unpack(tail.rjust(_TAIL.size, b"\0"))
+        whole = (kind, length, magic) == (Opcode.FOOTER, 20, _MAGIC) and 0 < start < size
+        if whole and size - start <= MOST_OF_CHUNK:
+            file.seek(start)
+            for _ in self._records(file, size, _ANNOUNCEMENTS):
+                pass
+            self.lost.clear()  # it is not what messages are in
 
-    @property
-    def damage(self) -> str:
-        """What could not be read."""
-        count, why = self._records.unreadable_bytes, self._records.refusal
-        unread = f"{count} bytes{f' ({why})' if why else ''}" if count else ""
-        return ", ".join(filter(None, (unread, str(self._lost))))
-
-    @property
-    def fraction(self) -> float:
-        """How much of the file has been read."""
-        return self._records.fraction
-
-
-def _topic_of(channel: Channel) -> StoredTopic:
-    if channel.serialization != CDR:
-        raise RecordingError(
-            f"'{channel.topic}' is serialised as {channel.serialization}, not as {CDR}"
-        )
-    metadata = dict(channel.metadata)
-    return StoredTopic(
-        channel.topic,
-        channel.type_name,
-        channel.definition,
-        metadata.get("topic_type_hash", ""),  # as rosbag2 writes it from Jazzy on
-        metadata.get("offered_qos_profiles", ""),
-    )
-
-
-class SqliteSalvage:
-    """An SQLite file, which is written to: its journal, if one lies beside it, is played back."""
-
-    def __init__(self, file: Path) -> None:
-        self._file = file
-        self._lost = _Lost()
-        self._end = ""  # why it was reached too early
-        self.topics: list[StoredTopic] = []
-        self.fraction = 0.0
-
-    @property
-    def damage(self) -> str:
-        """What could not be read."""
-        return "; ".join(filter(None, (str(self._lost), self._end)))
-
-    def messages(self) -> Iterator[StoredMessage]:
-        """What can be read, in the file's order.
-
-        Raises:
-            RecordingError: it is no SQLite file, or none of a recording.
-        """
-        try:
-            with closing(sqlite3.connect(self._file)) as connection:
-                connection.text_factory = lambda text: text.decode(errors="replace")
-                connection.execute("PRAGMA writable_schema=ON")  # else a cut file is refused whole
-                check_tables(connection)
-                topics = self._topics(connection)
-                self.topics = list(topics.values())
-                yield from self._rows(connection, topics)
-        except (sqlite3.Error, ValueError) as error:
-            raise RecordingError(f"{self._file.name} cannot be read: {reason(error)}") from error
-
-    def _topics(self, connection: sqlite3.Connection) -> dict[int, StoredTopic]:
-        definitions: dict[str, str] = {}
-        if _columns(connection, "message_definitions"):
-            query = "SELECT topic_type, encoded_message_definition FROM message_definitions"
-            definitions = dict(connection.execute(query))
-        known = _columns(connection, "topics")
-        optional = [  # of later versions of rosbag2
-            name if name in known else "''"
-            for name in ("offered_qos_profiles", "type_description_hash")
-        ]
-        rows = connection.execute(f"SELECT id, name, type, {', '.join(optional)} FROM topics")
-        return {
-            number: StoredTopic(name, type_name, definitions.get(type_name, ""), type_hash, qos)
-            for number, name, type_name, qos, type_hash in rows
-        }
-
-    def _rows(
-        self, connection: sqlite3.Connection, topics: dict[int, StoredTopic]
+    def _records(
+        self, file: BinaryIO, size: int, wanted: Collection[int]
     ) -> Iterator[StoredMessage]:
-        size, done = max(self._file.stat().st_size, 1), 0
-        rows = connection.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
+        """What records from the file's position on hold, up to one that is cut off."""
+        while (begin := file.tell()) < size:
+            kind, length = _HEAD.unpack(file.read(_HEAD.size).ljust(_HEAD.size, b"\0"))
+            if (kind, length) in _ENDS:
+                return
+            if not kind or file.tell() + length > size:  # the format has no kind 0
+                self.lost[_CUT_OFF] += size - begin
+                return
+            if max(Opcode) < kind < _PRIVATE:
+                self.lost["unknown record"] += 1
+            if kind in wanted and length <= MOST_OF_CHUNK:
+                yield from self._messages_of(kind, file.read(length))
+                continue
+            if kind in wanted:
+                self.lost[f"record of more than {MOST_OF_CHUNK} bytes"] += 1
+            file.seek(length, SEEK_CUR)
+
+    def _messages_of(self, kind: int, body: bytes) -> list[StoredMessage]:
+        """The messages of one record that is whole."""
+        stream = ReadDataStream(BytesIO(body))
         try:
-            for number, log_time_ns, packed in rows:
-                is_sound = isinstance(packed, bytes) and isinstance(log_time_ns, int)
-                raw = self._lost.unpacked(packed if is_sound and number in topics else None)
-                if raw is None:
-                    continue
-                done += len(packed)
-                self.fraction = min(done / size, 1.0)
-                yield StoredMessage(topics[number], log_time_ns, raw, raw is not packed)
-        except sqlite3.Error as error:
-            self._end = f"what comes after its {done} first bytes of messages ({reason(error)})"
-
-
-class _Lost:
-    """Counts the messages that are there and cannot be kept."""
-
-    def __init__(self) -> None:
-        self._damaged = 0
-        self._refused = 0
-        self._refusal = ""
-
-    def unpacked(self, packed: bytes | None) -> bytes | None:
-        """A message as it was serialised, also where rosbag2 compressed each; None if it is lost.
-
-        `packed` is None for what is no message.
-        """
-        try:
-            if packed is not None:
-                is_packed = packed.startswith(ZSTD_MAGIC)
-                return unpack_message(packed) if is_packed else check_message(packed)
+            if kind == Opcode.SCHEMA:
+                schema = Schema.read(stream)
+                self._schemas[schema.id] = schema
+            elif kind == Opcode.CHANNEL:
+                self._add(Channel.read(stream))
+            elif kind == Opcode.MESSAGE:
+                message = Message.read(stream, len(body))
+                if (topic := self._topics.get(message.channel_id)) is not None:
+                    return [StoredMessage(topic, message.log_time, message.data)]
+                self.lost["message of a topic that is not announced"] += 1
+            elif kind == Opcode.CHUNK:
+                chunk = Chunk.read(stream)
+                self.is_compressed |= bool(chunk.compression)
+                size, checksum = chunk.uncompressed_size, chunk.uncompressed_crc
+                data = decompress(chunk.data, chunk.compression, size, checksum)
+                inside = (*_ANNOUNCEMENTS, Opcode.MESSAGE)
+                return list(self._records(BytesIO(data), len(data), inside))
         except LimitError as error:
-            self._refused += 1
-            self._refusal = str(error)
-            return None
-        except UNPACKING_FAILED:
-            pass
-        self._damaged += 1
-        return None
+            self.lost[str(error)] += 1
+        except Exception:  # whatever their libraries raise for damaged bytes
+            self.lost[f"damaged {Opcode(kind).name.lower()}"] += 1
+        return []
 
-    def __str__(self) -> str:
-        """How many, and why; empty if there are none."""
-        damaged = f"{self._damaged} messages" if self._damaged else ""
-        refused = f"{self._refused} messages ({self._refusal})" if self._refused else ""
-        return ", ".join(filter(None, (damaged, refused)))
-
-
-def _columns(connection: sqlite3.Connection, table: str) -> list[str]:
-    return [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
+    def _add(self, channel: Channel) -> None:
+        if channel.message_encoding != CDR:
+            self.lost[f"topic '{channel.topic}' as {channel.message_encoding}, not as {CDR}"] += 1
+            return
+        schema = self._schemas[channel.schema_id]
+        self._topics[channel.id] = StoredTopic(
+            channel.topic,
+            schema.name,
+            schema.data.decode(errors="replace"),
+            channel.metadata.get("topic_type_hash", ""),  # as rosbag2 writes it from Jazzy on
+            channel.metadata.get("offered_qos_profiles", ""),
+        )

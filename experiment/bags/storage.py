@@ -50,7 +50,7 @@ class BagFiles:
         if compression not in COMPRESSIONS:
             raise ConfigurationError(one_of("compression", compression, list(COMPRESSIONS)))
         check_sqlite_path(path, storage)
-        self._path = path
+        self.path = path
         self.is_open = False
         try:
             self._writer = Writer(path, version=9, storage_plugin=_PLUGINS[storage])
@@ -68,24 +68,19 @@ class BagFiles:
     def _open(self) -> None:
         try:
             self._writer.open()
-            self._claim = Claim(self._path)  # lest it is recovered while it is being written
+            self._claim = Claim(self.path)  # lest it is recovered while it is being written
         except _REFUSED:
             with suppress(*_REFUSED):
                 self._writer.abort()
-            shutil.rmtree(self._path, ignore_errors=True)  # it was not there before
+            shutil.rmtree(self.path, ignore_errors=True)  # it was not there before
             raise
         storage = self._writer.storage
         if isinstance(storage, Sqlite3Writer):
             # A process that is killed loses nothing by it, and a commit does not wait for the disk.
             storage.conn.execute("PRAGMA synchronous=OFF")
 
-    @property
-    def counts(self) -> dict[int, int]:
-        """How many messages there are of each connection's number."""
-        return self._writer.counts
-
     def add(self, topic: str, definition: MessageDefinition, offered: Sequence[Qos]) -> Connection:
-        """Announce a topic with what its publishers offer; its handle for `write`.
+        """Announce a topic with what its publishers offer; its handle for `append`.
 
         Raises:
             RecordingError: the recording is closed, has the topic already, or the disk is full.
@@ -100,11 +95,11 @@ class BagFiles:
                 offered_qos_profiles=offered,
             )
         except WriterError as error:
-            raise RecordingError(f"recording {self._path} has topic '{topic}' already") from error
+            raise RecordingError(f"recording {self.path} has topic '{topic}' already") from error
         except _REFUSED as error:
             raise self._abandoned(error) from error
 
-    def write(self, connection: Connection, raw: bytes, log_time_ns: int) -> None:
+    def append(self, connection: Connection, raw: bytes, log_time_ns: int) -> None:
         """Append a message.
 
         Raises:
@@ -117,7 +112,11 @@ class BagFiles:
             raise self._abandoned(error) from error
 
     def flush(self) -> None:
-        """Hand all that was written to the operating system: killing the process loses none of it.
+        """Hand all that was written to the operating system.
+
+        What was flushed outlives this process, however that ends: `actuated_characters recover`
+        makes a recording of MCAP's, and SQLite's file can be read alone. Without it a killed
+        recorder loses up to the last MiB of MCAP, and all of SQLite.
 
         Raises:
             RecordingError: the recording is closed, or the disk refuses the data, which closes it.
@@ -141,6 +140,8 @@ class BagFiles:
     def close(self) -> None:
         """Complete the recording: the rest of the messages, the index and the metadata.
 
+        Closing again does nothing.
+
         Raises:
             RecordingError: the disk refuses the data.
         """
@@ -157,7 +158,7 @@ class BagFiles:
     def check_open(self) -> None:
         """Raises RecordingError once the recording is closed."""
         if not self.is_open:
-            raise RecordingError(f"recording {self._path} is closed")
+            raise RecordingError(f"recording {self.path} is closed")
 
     def _abandoned(self, cause: Exception) -> RecordingError:
         """Give up the file, whose end is undefined now; it has no index and no metadata."""
@@ -165,9 +166,7 @@ class BagFiles:
         with suppress(*_REFUSED):  # it flushes once more, to the same full disk
             self._writer.abort()
         self._claim.release()
-        return RecordingError(
-            f"recording {self._path} is incomplete, cannot write: {reason(cause)}"
-        )
+        return RecordingError(f"recording {self.path} is incomplete, cannot write: {reason(cause)}")
 
 
 def check_sqlite_path(path: Path, storage: str) -> None:

@@ -26,7 +26,7 @@ LATEST_NS = 2**63 - 1  # rosbag2 holds times in int64
 _NS_PER_S = 10**9
 
 
-class BagWriter:
+class BagWriter(BagFiles):
     """Writes serialised messages into a new rosbag2 directory.
 
     `close` makes the recording complete. Leaving the `with` block closes it after an error too:
@@ -46,20 +46,14 @@ class BagWriter:
             ConfigurationError: There is no such storage or compression.
             RecordingError: `path` exists already or cannot be created.
         """
-        self._path = path
+        super().__init__(path, storage, compression)
         self._connections: dict[str, Connection] = {}
-        self._files = BagFiles(path, storage, compression)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
         self.close()
-
-    @property
-    def message_counts(self) -> dict[str, int]:
-        """How many messages each topic has got so far; right after `close` as well."""
-        return {name: self._files.counts[to.id] for name, to in self._connections.items()}
 
     def add_topic(self, topic: str, message_type: type, qos: QoSProfile) -> None:
         """Announce a topic, with the quality of service that its publisher offers.
@@ -68,11 +62,11 @@ class BagWriter:
             RecordingError: The recording is closed or has the topic already, the definition of
                 the message type is not installed, or the disk refuses the data.
         """
-        self._files.check_open()
+        self.check_open()
         if topic in self._connections:
-            raise RecordingError(f"recording {self._path} has topic '{topic}' already")
+            raise RecordingError(f"recording {self.path} has topic '{topic}' already")
         definition = read_definition(message_type)
-        self._connections[topic] = self._files.add(topic, definition, [_offered(qos)])
+        self._connections[topic] = self.add(topic, definition, [_offered(qos)])
 
     def write(self, topic: str, raw: bytes, log_time_ns: int) -> None:
         """Append a message, serialised as CDR; `log_time_ns` is when it was published, ns.
@@ -81,34 +75,12 @@ class BagWriter:
             RecordingError: The recording is closed, the topic was never added, the time is out of
                 range, or the disk refuses the data, which closes the recording.
         """
-        self._files.check_open()
+        self.check_open()
         if topic not in self._connections:
             raise RecordingError(one_of("topic", topic, list(self._connections)))
         if not 0 <= log_time_ns <= LATEST_NS:
             raise RecordingError(f"log time {log_time_ns} ns is not within 0 to {LATEST_NS} ns")
-        self._files.write(self._connections[topic], raw, log_time_ns)
-
-    def flush(self) -> None:
-        """Hand all that was written to the operating system.
-
-        What was flushed outlives this process, however that ends: `actuated_characters recover`
-        makes a recording of it. Without it a killed recorder loses up to the last MiB of MCAP, and
-        all of SQLite.
-
-        Raises:
-            RecordingError: The recording is closed, or the disk refuses the data, which closes it.
-        """
-        self._files.flush()
-
-    def close(self) -> None:
-        """Complete the recording: the rest of the messages, the index and the metadata.
-
-        Closing again does nothing.
-
-        Raises:
-            RecordingError: The disk refuses the data.
-        """
-        self._files.close()
+        self.append(self._connections[topic], raw, log_time_ns)
 
 
 def _offered(qos: QoSProfile) -> Qos:

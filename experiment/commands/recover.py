@@ -14,7 +14,6 @@ if TYPE_CHECKING:  # it takes a second to import
     from experiment.bags.recover import Recovered
 
 _NS_PER_S = 10**9
-_MOST_LISTED = 5  # damaged places; more of them say nothing new
 
 
 def add_recover(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -23,10 +22,10 @@ def add_recover(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         "recover",
         help="make a bag complete that its recorder could not close",
         description=(
-            "Make a complete bag of all that reached the disk before a recorder was killed, the "
-            "disk was full, or a copy broke off: at most the last second of a run is missing. The "
-            "new bag takes the old one's place, which is kept beside it as BAG.damaged. In a run's "
-            "directory the figures that it lacks are made. A bag that is complete is not touched."
+            "Make a complete bag (MCAP) of all that reached the disk before a recorder was killed, "
+            "the disk was full, or a copy broke off: at most the last second of a run is missing. "
+            "The new bag takes the old one's place, which is kept beside it as BAG.damaged. In a "
+            "run's directory the figures that it lacks are made. A complete bag is not touched."
         ),
         epilog="example: actuated_characters recover runs/demo",
     )
@@ -58,10 +57,8 @@ def _tell(recovered: "Recovered") -> None:
         console.print(_table(recovered))
         last = datetime.fromtimestamp(contents.last_log_time_ns / _NS_PER_S, UTC)
         print(f"{bag}: {contents.counts.total()} messages, the last one of {last:%F %T.%f} UTC")
-        for lost in contents.lost[:_MOST_LISTED]:
+        for lost in contents.lost:
             print(f"unreadable: {lost}")
-        if len(contents.lost) > _MOST_LISTED:
-            print(f"unreadable: {len(contents.lost) - _MOST_LISTED} places more")
         print(f"the damaged bag: {recovered.damaged}")
     for directory in recovered.measured:
         print(f"figures: {directory}")
