@@ -133,6 +133,10 @@ def main():
         return pusher.report() if pusher.over.done() else 1
     except (KeyboardInterrupt, ExternalShutdownException):
         return 1
+    except RuntimeError:  # rcl's own, where a signal comes just before a wait
+        if rclpy.ok():
+            raise
+        return 1
     finally:
         rclpy.try_shutdown()
 

@@ -103,6 +103,10 @@ def main():
             rclpy.spin_until_future_complete(node, node.done, timeout_sec=0.5)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 1
+    except RuntimeError:  # rcl's own, where a signal comes just before a wait
+        if rclpy.ok():
+            raise
+        return 1
     finally:
         rclpy.try_shutdown()
     if not node.done.done():  # a signal other than Ctrl-C has ended it

@@ -108,5 +108,8 @@ try:
         rclpy.spin_once(node, timeout_sec=0.5)  # rclpy.spin may sleep through a SIGTERM
 except (KeyboardInterrupt, ExternalShutdownException):
     pass
+except RuntimeError:  # rcl's own, where a signal comes just before a wait
+    if rclpy.ok():
+        raise
 finally:
     rclpy.try_shutdown()

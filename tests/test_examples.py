@@ -84,6 +84,32 @@ def test_an_example_ends_quietly_on_a_signal(
     assert (started.stdout, started.stderr) == ("", "")
 
 
+# The example, to which a signal comes in the moment between the look at the context and the wait.
+JUST_BEFORE_A_WAIT = """
+import os, runpy, signal, sys, time
+import rclpy, rclpy.executors
+real = rclpy.executors._rclpy
+class Rcl:
+    def __getattr__(self, name):
+        if name == "WaitSet" and rclpy.ok():
+            os.kill(os.getpid(), signal.SIGTERM)
+            while rclpy.ok():
+                time.sleep(0.001)
+        return getattr(real, name)
+rclpy.executors._rclpy = Rcl()
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("name", INTERRUPTIBLE)
+def test_a_signal_just_before_a_wait_is_a_signal(processes: Processes, name: str) -> None:
+    started = processes.python("-c", JUST_BEFORE_A_WAIT, example(name), *INTERRUPTIBLE[name])
+
+    assert started.wait() in (0, 1)
+    assert (started.stdout, started.stderr) == ("", "")
+
+
 def test_the_pd_controller_with_gravity_compensation_comes_to_rest_at_its_target(
     processes: Processes, client: SimulatorClient
 ) -> None:
