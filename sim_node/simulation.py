@@ -26,14 +26,21 @@ class SimulationSettings:
 
 
 @dataclass(frozen=True)
-class Saved:
-    """A state between two ticks, which the simulation that saved it can return to."""
+class Memory:
+    """A state between two ticks, but for the engine's."""
 
     tick: int
     episode: int
     actors: tuple[ActorMemory, ...]
     throws: tuple[Throw, ...]  # of the last tick
     thrown_at: tuple[int, ...]  # ticks, of the balls that are in the world
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A state between two ticks, which the simulation that saved it can return to."""
+
+    memory: Memory
     world: int  # its number in the engine
 
 
@@ -41,11 +48,7 @@ class Saved:
 class Snapshot:
     """A state between two ticks, for any simulation of equal roles and settings."""
 
-    tick: int
-    episode: int
-    actors: tuple[ActorMemory, ...]
-    throws: tuple[Throw, ...]  # of the last tick
-    thrown_at: tuple[int, ...]  # ticks, of the balls that are in the world
+    memory: Memory
     balls: tuple[Throw, ...]
     world: bytes
 
@@ -174,8 +177,7 @@ class Simulation:
 
     def save(self) -> Saved:
         """Keep the present state in memory, until it is forgotten."""
-        memories, world = self._memories(), self._world.save()
-        return Saved(self.tick, self.episode, memories, self.throws, self._thrown_at, world)
+        return Saved(self._memory(), self._world.save())
 
     def restore(self, saved: Saved) -> None:
         """Return to a saved state: what follows is what followed it, to the bit.
@@ -184,7 +186,7 @@ class Simulation:
         not found out what touches. After a reset no state saved before can be restored.
         """
         self._world.restore(saved.world)
-        self._recall(saved)
+        self._recall(saved.memory)
 
     def forget(self, saved: Saved) -> None:
         """Give back the memory of a saved state."""
@@ -192,29 +194,22 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """The present state, to be taken over by a simulation in another process."""
-        return Snapshot(
-            self.tick,
-            self.episode,
-            self._memories(),
-            self.throws,
-            self._thrown_at,
-            self.balls,
-            self._world.to_bytes(),
-        )
+        return Snapshot(self._memory(), self.balls, self._world.to_bytes())
 
     def take_over(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot, as its own simulation would, to the bit."""
         self._world.from_bytes(snapshot.world, snapshot.balls)
-        self._recall(snapshot)
+        self._recall(snapshot.memory)
 
-    def _memories(self) -> tuple[ActorMemory, ...]:
-        return tuple(actor.memory() for actor in self.actors)
+    def _memory(self) -> Memory:
+        actors = tuple(actor.memory() for actor in self.actors)
+        return Memory(self.tick, self.episode, actors, self.throws, self._thrown_at)
 
-    def _recall(self, state: Saved | Snapshot) -> None:
-        self.tick, self.episode = state.tick, state.episode
-        self.throws, self._thrown_at = state.throws, state.thrown_at
-        for actor, memory in zip(self.actors, state.actors, strict=True):
-            actor.recall(memory)
+    def _recall(self, memory: Memory) -> None:
+        self.tick, self.episode = memory.tick, memory.episode
+        self.throws, self._thrown_at = memory.throws, memory.thrown_at
+        for actor, its in zip(self.actors, memory.actors, strict=True):
+            actor.recall(its)
 
     def _fresh_world(self) -> World:
         world = World(self.settings.world)

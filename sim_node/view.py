@@ -75,10 +75,6 @@ class View:
         position: FloatArray = np.array(self.target) + self.distance * self.axes()[2]
         return position
 
-    def seen_height(self) -> float:
-        """From the picture's lower edge to its upper one, m at the target."""
-        return 2.0 * self.distance * tan(0.5 * self.field_of_view)
-
     def points(self, pixels: IntArray, depth: FloatArray, size: tuple[int, int]) -> FloatArray:
         """What is seen at pixels (2, m): (3, m) in m, world.
 

@@ -15,7 +15,7 @@ from physics import (
     still_world,
 )
 
-from controller_node.balance import Balance, BalanceGains, cross
+from controller_node.balance import Balance, BalanceGains
 from controller_node.control_laws import stable_pd_effort
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
@@ -327,12 +327,6 @@ def test_without_gains_and_over_the_feet_nothing_would_move(
         link = [link.name for link in humanoid.links].index(name)
         force += model.point_jacobian(link, point).T @ np.concatenate(wrench)
     assert force == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_cross_product_is_numpys() -> None:
-    a, b = np.random.default_rng(7).normal(size=(2, 3))
-
-    assert cross(a, b) == pytest.approx(np.cross(a, b))
 
 
 # Who stands

@@ -15,7 +15,7 @@ from ros import Processes, wait_until
 from experiment.bags.recording import Recording, read_recording
 from experiment.cli import main
 from experiment.render.movie import Movie, MovieSettings
-from experiment.render.stills import pose_strip, render_still, save_png, strip
+from experiment.render.stills import pose_strip, save_png, strip
 from msgs_config.arrays import BoolArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from sim_node.camera import Camera, Picture
@@ -124,12 +124,6 @@ def test_a_ghost_is_drawn_where_there_is_a_reference_alone(recording: Recording)
     assert not green(haunted[1]).any()
 
 
-def test_a_still_is_one_picture_without_a_caption(recording: Recording) -> None:
-    still = render_still(recording, 0.1, size=SIZE)
-
-    np.testing.assert_array_equal(still, strip(recording, [0.1], labels=False, size=SIZE))
-
-
 def test_poses_have_one_scale_and_their_captions(walk: Made) -> None:
     rest = np.array(walk.plan.character.rest_position)
     lying = rest.copy()
@@ -149,7 +143,12 @@ def test_poses_have_one_scale_and_their_captions(walk: Made) -> None:
 def test_the_world_of_the_run_is_drawn(tmp_path: Path, walk: Made) -> None:
     floating = make_run("humanoid", 0.01, WALK, terrain="none")
     in_space, on_ground = (
-        render_still(read_recording(write_bag(tmp_path / name, made.messages())), 0.0, size=SIZE)
+        strip(
+            read_recording(write_bag(tmp_path / name, made.messages())),
+            [0.0],
+            labels=False,
+            size=SIZE,
+        )
         for name, made in (("none", floating), ("plane", walk))
     )
 

@@ -11,7 +11,7 @@ from physics import FLOATING_CHARACTERS, LoneWorld, character, momentum, random_
 from experiment.studies import joint_torque, rigid_body
 from experiment.studies.bodies import HINGE, Box, momenta, write_box
 from experiment.studies.catalogue import load_study
-from experiment.studies.euler import Load, Motion, RigidBody, angular_acceleration, axes, move
+from experiment.studies.euler import Load, Motion, RigidBody, angular_acceleration, move
 from experiment.studies.study import Findings
 from msgs_config import rotations
 from msgs_config.arrays import FloatArray
@@ -45,12 +45,6 @@ def energy(motion: Motion) -> FloatArray:
 
 
 # The theory that the runs are compared with
-
-
-def test_axes_are_those_of_the_quaternions_rotation() -> None:
-    turns = rotations.normalised(np.random.default_rng(1).normal(size=(20, 4)))
-
-    np.testing.assert_allclose(axes(3.0 * turns), rotations.matrix(turns), atol=1e-14)
 
 
 def test_a_free_spin_keeps_angular_momentum_and_energy() -> None:

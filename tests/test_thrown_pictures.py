@@ -97,7 +97,7 @@ def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
     # a sphere's outline, seen from the distance d, has the slope r / sqrt(d^2 - r^2)
     d = view.distance - 0.8
-    pixel = view.seen_height() / SIZE[1] / view.distance
+    pixel = 2.0 * np.tan(0.5 * view.field_of_view) / SIZE[1]
     radius = 0.15 / np.sqrt(d**2 - 0.15**2) / pixel
     away = np.hypot(rows + 0.5 - 0.5 * SIZE[1], columns + 0.5 - 0.5 * SIZE[0])
     assert differs[away < radius - 1.5].all()

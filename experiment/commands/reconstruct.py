@@ -11,7 +11,7 @@ from rich.table import Table
 
 from experiment.commands.checks import check_output, worker_count
 from experiment.commands.progress import search_bar
-from experiment.commands.settings import node_settings
+from experiment.commands.settings import add_repeated, node_settings
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -66,21 +66,17 @@ def _add_search(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--delay-ticks", type=int, default=0, metavar="D", help="by which commands come late (0)"
     )
-    command.add_argument(
+    add_repeated(
+        command,
         "--set",
-        action="append",
-        default=[],
-        metavar="NODE.NAME:=VALUE",
-        help="parameter of sim_node or controller_node, such as controller_node.plan.samples:=64; "
-        "may be repeated",
+        "NODE.NAME:=VALUE",
+        "parameter of sim_node or controller_node, such as controller_node.plan.samples:=64",
     )
-    command.add_argument(
+    add_repeated(
+        command,
         "--push",
-        action="append",
-        default=[],
-        metavar="LINK:FX,FY,FZ@S",
-        help="a force in N, world axes, on a link at a time in s; nobody foresees it, and it comes "
-        "in the run as well; may be repeated",
+        "LINK:FX,FY,FZ@S",
+        "a force in N, world axes, on a link at a time in s, not foreseen; the run has it as well",
     )
     command.add_argument(
         "--workers", type=int, metavar="N", help="processes (as many as there are cores)"
@@ -160,7 +156,6 @@ def _report(job: "Job", found: "Reconstruction") -> None:
         "centre of mass error, mean": f"{figures.centre_error_mean_m:.3f} m",
         "joint error, mean": f"{figures.joint_error_mean_rad:.3f} rad",
         "lowest root": f"{figures.least_root_height_m:.3f} m",
-        "root force, mean": f"{figures.assist_force_mean_n:.3g} N",
         "fell": str(figures.fell),
         "state_hash": figures.state_hash,
     }

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from experiment.commands.progress import progress_bar
 from experiment.commands.replay_verdict import difference_error, named, verdict
-from experiment.commands.settings import node_settings
+from experiment.commands.settings import add_repeated, node_settings
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # they take a second to import
@@ -41,13 +41,11 @@ def add_through_topics(parser: argparse.ArgumentParser) -> None:
         "simulator: the bag's states drive a controller, whose commands are compared",
     )
     options.add_argument("--character", metavar="NAME", help="simulator: of several, this one")
-    options.add_argument(
+    add_repeated(
+        options,
         "--set",
-        action="append",
-        default=[],
-        metavar="controller_node.NAME:=VALUE",
-        help="simulator: another value of a parameter of the bag's controller, to see what that "
-        "changes; may be repeated",
+        "controller_node.NAME:=VALUE",
+        "simulator: another value of a parameter of the bag's controller, to see what that changes",
     )
     options.add_argument(
         "--no-start",

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiment.commands.progress import progress_bar
-from experiment.commands.settings import bring_parameters, node_settings
+from experiment.commands.settings import add_repeated, bring_parameters, node_settings
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -71,34 +71,25 @@ def add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
     )
     run.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
     _add_recorded(run)
-    run.add_argument(
+    add_repeated(
+        run,
         "--push",
-        action="append",
-        default=[],
-        metavar="LINK:FX,FY,FZ@S",
-        help="a force in N, world axes, on a link at a time in s, for sim_node.wrench_duration; "
-        "may be repeated. A reconstruction brings those that it was found with, but for others "
-        "that are given; none: without any",
+        "LINK:FX,FY,FZ@S",
+        "a force in N, world axes, on a link at a time in s, for sim_node.wrench_duration. A "
+        "reconstruction brings those that it was found with, but for others that are given; none: "
+        "without any",
     )
-    run.add_argument(
+    add_repeated(
+        run,
         "--throw",
-        action="append",
-        default=[],
-        metavar="'mass=KG speed=M/S at=S target=LINK'",
-        help="a ball that hits a link, where the reference has it, at a time in s (it is let go "
-        "before); from=front, left, right, back, above or degrees (front), distance=M (2), "
-        "radius=M; may be repeated",
+        "'mass=KG speed=M/S at=S target=LINK'",
+        "a ball that hits a link, where the reference has it, at a time in s; from=front, left, "
+        "right, back, above or degrees (front), distance=M (2), radius=M",
     )
     run.add_argument(
         "--in-process", action="store_true", help="one process without ROS: the same states, no bag"
     )
-    run.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NODE.NAME:=VALUE",
-        help="a parameter of sim_node or controller_node; may be repeated",
-    )
+    add_repeated(run, "--set", "NODE.NAME:=VALUE", "a parameter of sim_node or controller_node")
 
 
 def _add_tracked(run: argparse.ArgumentParser) -> None:

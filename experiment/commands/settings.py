@@ -1,5 +1,6 @@
-"""What `--set NODE.NAME:=VALUE` says."""
+"""Options that may be repeated, and what `--set NODE.NAME:=VALUE` says."""
 
+import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -8,6 +9,12 @@ from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a while to import
     from controller_node.references.reconstructed_file import FoundWith
+
+
+def add_repeated(command: argparse._ActionsContainer, name: str, metavar: str, about: str) -> None:
+    """Add an option whose values are a list, empty by default."""
+    about = f"{about}; may be repeated"
+    command.add_argument(name, action="append", default=[], metavar=metavar, help=about)
 
 
 def node_settings(texts: Sequence[str], nodes: Sequence[str]) -> dict[str, dict[str, object]]:

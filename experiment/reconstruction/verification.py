@@ -28,10 +28,7 @@ class Figures:
     fell: bool
     centre_error_mean_m: float
     joint_error_mean_rad: float
-    root_error_mean_m: float
     least_root_height_m: float
-    assist_force_mean_n: float
-    saturated_fraction: float
     state_hash: str
 
 
@@ -66,10 +63,7 @@ def verified(problem: Problem, file: Path, best: Node) -> Figures:
         fell=bool(summary["fell"]),
         centre_error_mean_m=centre_error(plan, positions, motions),
         joint_error_mean_rad=joint_error(plan.character.layout, positions, motions),
-        root_error_mean_m=_number(summary["root_error_mean_m"]),
         least_root_height_m=float(min(position[2] for position in positions)),
-        assist_force_mean_n=_number(summary["assist_force_mean_n"]),
-        saturated_fraction=_number(summary["saturated_fraction"]),
         state_hash=measurement.state_hash,
     )
 
@@ -105,7 +99,3 @@ def joint_error(
         layout.configuration(np.array(motions)), layout.configuration(np.array(positions))
     )
     return float(layout.norms(difference)[:, rotates].mean())
-
-
-def _number(value: object) -> float:
-    return float(value) if isinstance(value, (int, float)) else float("nan")

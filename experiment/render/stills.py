@@ -14,7 +14,7 @@ from experiment.whole_files import write_whole
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character import Character
 from msgs_config.errors import ConfigurationError, RecordingError
-from sim_node.camera import DEFAULT_SIZE, Camera, Picture
+from sim_node.camera import Camera, Picture
 from sim_node.stage import Size
 from sim_node.world import WorldSettings
 
@@ -29,28 +29,6 @@ _WHITE = 255
 
 Progress = Callable[[int], None]
 """Is told the number of pictures so far."""
-
-
-def render_still(
-    recording: Recording | Sequence[Recording],
-    time: float,
-    *,
-    size: Size = DEFAULT_SIZE,
-    ghost: bool = False,
-) -> Picture:
-    """A picture (h, w, 3) of the state that is nearest to a time in s since the first state.
-
-    Args:
-        recording: The run, or those of several characters of one world.
-        time: When.
-        size: Width and height in pixels.
-        ghost: Draw the reference, too, transparent.
-
-    Raises:
-        ConfigurationError: the recording does not reach to that time, or the size is not sensible.
-        RecordingError: a ghost is asked for, and there is no reference.
-    """
-    return strip(recording, [time], size=size, ghost=ghost, labels=False)
 
 
 def strip(

@@ -79,8 +79,8 @@ class Marks:
             end = start + duration
             axes.axvspan(start, end, *band, color=color, linewidth=0, clip_on=False)
 
-    def legend(self, figure: Figure) -> None:
-        """Say below the panels what the marks are, if there are any."""
+    def explained(self, figure: Figure) -> Figure:
+        """The figure, with what the marks are below its panels, if there are any."""
         handles: list[Line2D | Patch] = []
         if self.pushes:
             handles.append(Patch(color=_PUSH, alpha=0.5, label="push"))
@@ -95,6 +95,7 @@ class Marks:
             figure.legend(
                 handles=handles, loc="outside lower center", ncols=len(handles), fontsize="small"
             )
+        return figure
 
 
 def error_chart(
@@ -122,8 +123,7 @@ def error_chart(
     for panel in panels[len(names) :]:
         panel.set_axis_off()
     span_time(panels, times)
-    marks.legend(figure)
-    return figure
+    return marks.explained(figure)
 
 
 def effort_chart(
@@ -149,8 +149,7 @@ def effort_chart(
     panel.set_xlabel(_TIME)
     bar = figure.colorbar(mesh, ax=panel, extend="max", pad=0.01)
     bar.set_label("effort / limit; red: at it", fontsize="small")
-    marks.legend(figure)
-    return figure
+    return marks.explained(figure)
 
 
 def root_chart(
@@ -193,8 +192,7 @@ def root_chart(
     for panel in panels:
         marks.draw(panel)
     span_time(panels, times)
-    marks.legend(figure)
-    return figure
+    return marks.explained(figure)
 
 
 def contact_chart(
@@ -227,8 +225,7 @@ def contact_chart(
     marks.draw(above, filled=False)
     marks.draw(below)
     span_time([above], times)
-    marks.legend(figure)
-    return figure
+    return marks.explained(figure)
 
 
 def tick_chart(
@@ -272,8 +269,7 @@ def tick_chart(
     for panel in panels:
         marks.draw(panel)
     span_time(panels, times)
-    marks.legend(figure)
-    return figure
+    return marks.explained(figure)
 
 
 def broken(

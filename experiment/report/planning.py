@@ -63,8 +63,7 @@ def plan_chart(recording: Recording, marks: Marks) -> Figure:
     for panel in panels[-2:]:
         panel.set_xlabel("simulation time (s)")
     span_time(panels, times)
-    marks.legend(figure)
-    return figure
+    return marks.explained(figure)
 
 
 def _rate(recording: Recording) -> int:

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from msgs_config import rotations
 from msgs_config.arrays import FloatArray
 from msgs_config.character import Vector
+from msgs_config.geometry.fixed_order import cross
 
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -43,22 +45,9 @@ class Motion:
     angular_velocity: FloatArray  # (t, 3) rad/s, body axes
 
 
-def axes(turn_xyzw: FloatArray) -> FloatArray:
-    """Rotation matrices (..., 3, 3), body to world, of quaternions (..., 4) of any length."""
-    x, y, z, w = (turn_xyzw[..., entry] for entry in range(4))
-    norm = x * x + y * y + z * z + w * w
-    rows = (
-        (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
-    )
-    matrices: FloatArray = np.array(rows) / norm
-    return matrices.transpose(*range(2, matrices.ndim), 0, 1)
-
-
 def net_load(loads: Sequence[Load], turn_xyzw: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Force (3,) in N and torque (..., 3) in N m about the centre, world, at turns (..., 4)."""
-    return _net_load(loads, axes(turn_xyzw))
+    return _net_load(loads, rotations.matrix(turn_xyzw))
 
 
 def _net_load(loads: Sequence[Load], turn: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -67,7 +56,7 @@ def _net_load(loads: Sequence[Load], turn: FloatArray) -> tuple[FloatArray, Floa
     for load in loads:
         force += load.force
         arm = np.einsum("...ij,j->...i", turn, np.array(load.point))
-        torque += np.array(load.torque) + _cross(arm, np.array(load.force))
+        torque += np.array(load.torque) + cross(arm, np.array(load.force))
     return force, torque
 
 
@@ -75,7 +64,7 @@ def angular_acceleration(
     inertia: FloatArray, angular_velocity: FloatArray, torque: FloatArray
 ) -> FloatArray:
     """`I^-1 (tau - w x I w)` in rad/s^2; all (..., 3) in body axes."""
-    gyroscopic = _cross(angular_velocity, inertia * angular_velocity)
+    gyroscopic = cross(angular_velocity, inertia * angular_velocity)
     acceleration: FloatArray = (torque - gyroscopic) / inertia
     return acceleration
 
@@ -103,21 +92,10 @@ def move(body: RigidBody, start: Motion, loads: Sequence[Load], times: FloatArra
 def _rate(body: RigidBody, loads: Sequence[Load], state: FloatArray) -> FloatArray:
     """The rate (13,) of centre, quaternion, velocity and angular velocity: `dq/dt = q w / 2`."""
     turn, velocity, spin = state[3:7], state[7:10], state[10:13]
-    matrix = axes(turn)
+    matrix = rotations.matrix(rotations.normalised(turn))
     force, torque = _net_load(loads, matrix)
     torque_in_body = matrix.T @ torque
     vector, scalar = turn[:3], turn[3]
-    turning = 0.5 * np.append(scalar * spin + _cross(vector, spin), -vector @ spin)
+    turning = 0.5 * np.append(scalar * spin + cross(vector, spin), -vector @ spin)
     acceleration = angular_acceleration(body.inertia, spin, torque_in_body)
     return np.concatenate((velocity, turning, force / body.mass, acceleration))
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """`numpy.cross` of (..., 3) each, much sooner for single vectors."""
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    product[..., 0] = y * w - z * v
-    product[..., 1] = z * u - x * w
-    product[..., 2] = x * v - y * u
-    return product

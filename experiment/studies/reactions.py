@@ -216,7 +216,7 @@ def _draw(
     for panel in panels[-1]:
         panel.set_xlabel("time (s)")
     panels[0, 1].legend(fontsize="small")
-    replace(marks, modes=modes).legend(figure)
+    replace(marks, modes=modes).explained(figure)
     figure.suptitle("hit against the chest at 1 s; the assistance is full in TRACK and BLEND")
     return figure
 

@@ -9,15 +9,7 @@ import numpy as np
 from experiment.bags.recording import Recording
 from experiment.planned_push import PlannedPush
 from experiment.studies.bodies import IN_SPACE, Box, Momenta, momenta, write_box
-from experiment.studies.euler import (
-    Load,
-    Motion,
-    RigidBody,
-    angular_acceleration,
-    axes,
-    move,
-    net_load,
-)
+from experiment.studies.euler import Load, Motion, RigidBody, angular_acceleration, move, net_load
 from experiment.studies.plots import draw_over_theory, label, make_panels
 from experiment.studies.study import Case, Cell, Findings, Laboratory
 from msgs_config import rotations
@@ -179,7 +171,7 @@ def euler_residual(inertia: FloatArray, motion: Motion, torque: FloatArray, step
 
     `torque` (t, 3) is in the world, at the begin of each tick of `step` s.
     """
-    spin, turn = motion.angular_velocity[:-1], axes(motion.turn_xyzw[:-1])
+    spin, turn = motion.angular_velocity[:-1], rotations.matrix(motion.turn_xyzw[:-1])
     inertial = inertia * np.diff(motion.angular_velocity, axis=0) / step
     gyroscopic = np.cross(spin, inertia * spin)
     applied = np.einsum("tji,tj->ti", turn, torque)
@@ -205,7 +197,7 @@ def _row(one: Observed) -> tuple[Cell, ...]:
     linear = np.diff(motion.velocity[:2], axis=0)[0] / step
     angular = np.diff(motion.angular_velocity[:2], axis=0)[0] / step
     by_force = force / trial.box.mass
-    in_body = axes(motion.turn_xyzw[0]).T @ torque[0]
+    in_body = rotations.matrix(motion.turn_xyzw[0]).T @ torque[0]
     by_torque = angular_acceleration(inertia, motion.angular_velocity[0], in_body)
     off = np.concatenate((linear - by_force, angular - by_torque))
     largest = np.abs(np.concatenate((by_force, by_torque))).max()
