@@ -181,6 +181,8 @@ def test_a_costly_plan_is_sought_for_longer() -> None:
 
     assert long.costs.sum() < 0.98 * short.costs.sum()
     assert enough.centres.tobytes() == short.centres.tobytes()
+    for_two = plan_with(8, 0.7 * float(short.costs.sum()))  # each round may cost as much
+    assert for_two.centres.tobytes() == plan_with(2, 0.0).centres.tobytes()
 
 
 # Bits

@@ -145,12 +145,14 @@ def test_the_state_path_has_both_sides() -> None:
 
     assert {
         "controller_node/balance.py",
+        "controller_node/node.py",
         "controller_node/behaviours/library.py",
         "controller_node/references/clip.py",
         "controller_node/planner/offsets.py",
         "msgs_config/dynamics.py",
         "msgs_config/rotations.py",
         "sim_node/aim.py",
+        "sim_node/lockstep.py",
         "sim_node/body.py",
         "sim_node/passive.py",
     } <= path

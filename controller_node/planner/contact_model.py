@@ -23,7 +23,10 @@ from msgs_config.character import Character, Link, Shape, ShapeType
 from msgs_config.dynamics import add_links, compile_exactly, quaternion_starts
 
 _SOLVER_ITERATIONS = 6
-_CONTACT = (0.01, 1.0)  # time constant in s and damping ratio of contacts and of hinges' limits
+_CONTACT = (0.015, 3.0)  # time constant in s and damping ratio: what lands stays, as in the world
+_LIMIT = (0.01, 1.0)  # likewise, of hinges' limits
+
+_UNUSED = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR")  # of MuJoCo's parts
 
 _GROUND = "ground"
 _BY_PAIRS = {"contype": 0, "conaffinity": 0}  # of a shape: what touches what is said in pairs
@@ -160,8 +163,10 @@ def _compile(
     option.solver = mujoco.mjtSolver.mjSOL_PGS
     option.iterations = _SOLVER_ITERATIONS
     option.tolerance = 0.0  # always as many
-    option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.disableflags = sum(
+        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}")) for part in _UNUSED
+    )
     plane = mujoco.mjtGeom.mjGEOM_PLANE
     spec.worldbody.add_geom(type=plane, size=(0.0, 0.0, 1.0), name=_GROUND, **_BY_PAIRS)
     for link, body in zip(character.links, add_links(spec, character), strict=True):
@@ -169,7 +174,7 @@ def _compile(
             (joint,) = body.joints
             joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
             joint.range = (link.joint.lower, link.joint.upper)
-            joint.solref_limit = _CONTACT
+            joint.solref_limit = _LIMIT
         for name, shape in zip(_names(link), link.collision_shapes, strict=True):
             body.add_geom(name=name, **_geometry(spec, shape), **_BY_PAIRS)
     for one, other in _touching(character):

@@ -20,8 +20,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
 _FIRST_ROUNDS = 6  # of the first plan: nothing has moved yet
-_WIDE = 2.0  # every other round looks so much farther: it may find another way out
-_MORE = 2  # times the samples, in the rounds after the first
+_WIDE = 2.5  # every other round looks so much farther: it may find another way out
+_MORE = 3  # times the samples, in the rounds after the first
 _LARGEST = 0.9  # sigma, of an offset
 _PENALTY = 0.2  # of an offset, for each sigma
 _FEWEST_DRAWS = 6
@@ -67,7 +67,7 @@ class PlanSearch:
         for number in range(rounds):
             found = improve(problem, place, self._samples(seed, number, tick), sensitivities)
             place, sensitivities = found.place, found.sensitivities
-            if found.cost < enough:
+            if found.cost < (number + 1) * enough:
                 break
         rows = place.reshape(count, -1) * self._unit
         offsets = Offsets(settings.knots, start.desired.rollout.first_knot, rows)

@@ -10,7 +10,7 @@ from controller_node.planner import gauss_newton
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
-_DAMPINGS = (10.0, 1.0, 0.1)  # lambda of the steps
+_DAMPINGS = (3.0, 0.3)  # lambda of the steps
 _KEPT = 0.9  # of the samples; the worst say little of where it is good
 _FEWEST = 4  # samples that a step can be found from
 
