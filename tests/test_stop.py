@@ -24,6 +24,7 @@ PROJECT = Path(__file__).parents[1]
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
 SHARED_MEMORY = Path("/dev/shm")
 OF_NO_DOMAIN = re.compile(r"fastrtps_port7[0-3]\d\d(\D|$)")  # those of domains begin at 7400
+A_PORT = re.compile(r"fastrtps_port\d+")
 PROMPTLY = 1.0  # s
 BEHINDHAND = 20.0  # s; what had come before is still taken, up to 50,000 messages
 WHILE_STARTING = 3.0  # s; a library may have to finish something first
@@ -100,8 +101,18 @@ def living() -> list[int]:
 
 
 def left_behind(files: set[Path]) -> set[Path]:
-    """Those that are still there, and nobody's; some are shared by all on this machine."""
-    return {file for file in files if file.exists()}.difference(*map(belongings, living()))
+    """Those that are still there, and nobody's; some are shared by all on this machine.
+
+    Without ports whose lock is gone. Their reader has closed them in good order; Fast DDS removes
+    the file only where at the last close the port is well and its mutex free, which a busy machine
+    can spoil, and whoever opens the port next makes it anew.
+    """
+    there = {file for file in files if file.exists()}.difference(*map(belongings, living()))
+    return {
+        file
+        for file in there
+        if not A_PORT.fullmatch(file.name) or file.with_name(f"{file.name}_el").exists()
+    }
 
 
 class Ending:
