@@ -17,7 +17,7 @@ from msgs_config.last_resort import exit_after
 from msgs_config.shared_memory import remove_orphans
 
 EXIT_ERROR = 1
-_LEAVE_TIME = 2  # s that leaving the ROS graph may take
+LEAVE_TIME = 2  # s that leaving the ROS graph may take
 _FAST_DDS = "rmw_fastrtps"
 _ANYWHERE, _LOCALHOST = (
     Path(__file__).with_name(f"{name}.xml") for name in ("fastdds", "fastdds_localhost")
@@ -122,7 +122,7 @@ def _leave(node: RunnableNode | None, code: int) -> None:
     import rclpy
 
     sys.stdout.flush()
-    exit_after(_LEAVE_TIME, code)
+    exit_after(LEAVE_TIME, code)
     if node is not None:
         node.destroy_node()
     rclpy.try_shutdown()

@@ -17,6 +17,7 @@ from test_run import Run
 from experiment.bags.reader import read_messages
 from experiment.domain import own_domain
 from msgs_config import topics
+from msgs_config.process import LEAVE_TIME
 
 pytestmark = pytest.mark.slow
 
@@ -135,19 +136,26 @@ class Ending:
             self._took = time.monotonic() - self._begin
         return bool(self._took)
 
+    def was_the_last_resort(self) -> bool:
+        """Whether it is the end of a process that its middleware did not let leave."""
+        return self._took - self._others > LEAVE_TIME
+
+    @property
+    def _others(self) -> float:
+        return self._waited - self._waited_before
+
     def assert_took_less_than(self, within: float) -> None:
         """It took less than some seconds, without those in which others had the processors."""
-        others = self._waited - self._waited_before
-        took = self._took - others
-        assert took < within, f"took {took:.2f} s, {others:.2f} s of others not counted"
+        took = self._took - self._others
+        assert took < within, f"took {took:.2f} s, {self._others:.2f} s of others not counted"
 
 
-def end(process: Process, *numbers: signal.Signals, within: float = PROMPTLY) -> set[Path]:
-    """End a process by signals, in less than some seconds; what belonged to it."""
+def end(process: Process, *numbers: signal.Signals) -> Ending:
+    """End a process well by signals."""
     ending = Ending(process, *numbers)
-    wait_until(ending.is_over, f"the end after {numbers}", PATIENCE + within)
-    ending.assert_took_less_than(within)
-    return ending.files
+    wait_until(ending.is_over, f"the end after {numbers}", PATIENCE + BEHINDHAND)
+    assert_ended_well(process)
+    return ending
 
 
 def session_of(process: Process) -> list[int]:
@@ -227,7 +235,8 @@ def answering(processes: Processes, client: SimulatorClient) -> Process:
 
 
 def recording(processes: Processes, client: SimulatorClient) -> Process:
-    recorder = processes.node("recorder", fresh=True, directory="recording", progress_period=0.05)
+    told = {"directory": f"recording_{time.monotonic_ns()}", "progress_period": 0.05}
+    recorder = processes.node("recorder", fresh=True, **told)
     running(processes, client, fresh=False)
     client.spin_until(lambda: re.search(r"tick \d\d", recorder.stdout), "ticks")
     return recorder
@@ -247,33 +256,40 @@ SITUATIONS: list[Situation] = [
 ]
 
 
+def assert_ends_well(
+    processes: Processes, domain: int, situation: Situation, *numbers: signal.Signals
+) -> None:
+    """Promptly, and without a trace.
+
+    One in some hundred participants that leave waits in Fast DDS for itself, for ever (its issues
+    6193 and 6502), until our last resort. Twice in a row that is no chance any more, but ours.
+    """
+    for _ in range(2):
+        before = set(SHARED_MEMORY.iterdir())  # by others, some of whom may have been killed
+        with observer(domain) as client:
+            ending = end(situation(processes, client), *numbers)
+            processes.end()
+        if not ending.was_the_last_resort():
+            break
+    ending.assert_took_less_than(PROMPTLY)
+    assert ending.files - before
+    assert not left_behind(ending.files - before)
+
+
 @pytest.mark.parametrize("number", SIGNALS)
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_a_signal_ends_a_node_within_a_second_and_leaves_nothing_behind(
     forked: Processes, own_graph: int, situation: Situation, number: signal.Signals
 ) -> None:
-    before = set(SHARED_MEMORY.iterdir())  # by others, some of whom may have been killed
-    with observer(own_graph) as client:
-        node = situation(forked, client)
-
-        files = end(node, number) - before
-
-        assert_ended_well(node)
-        forked.end()
-    assert files
-    assert not left_behind(files)
+    assert_ends_well(forked, own_graph, situation, number)
 
 
 @pytest.mark.parametrize("situation", [running, recording])
 def test_more_signals_disturb_nothing(
     forked: Processes, own_graph: int, situation: Situation
 ) -> None:
-    with observer(own_graph) as client:
-        node = situation(forked, client)
-
-        end(node, signal.SIGINT, signal.SIGTERM, signal.SIGINT)
-
-        assert_ended_well(node)
+    signals = signal.SIGINT, signal.SIGTERM, signal.SIGINT
+    assert_ends_well(forked, own_graph, situation, *signals)
 
 
 FLOODS = 4
@@ -308,9 +324,7 @@ def test_a_signal_ends_a_recorder_to_whom_more_comes_than_it_can_take(
         before = flushes(recorder)
         client.spin_until(lambda: flushes(recorder) > before + 2, "flushes")
 
-        end(recorder, signal.SIGTERM, within=BEHINDHAND)
-
-        assert_ended_well(recorder)
+        end(recorder, signal.SIGTERM).assert_took_less_than(BEHINDHAND)
     kept = sum(1 for _ in read_messages(tmp_path / "recording" / "bag", ["/flood"]))
     assert kept > A_FEW_STATES
 
