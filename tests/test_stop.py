@@ -261,8 +261,8 @@ def assert_ends_well(
 ) -> None:
     """Promptly, and without a trace.
 
-    One in some hundred participants that leave waits in Fast DDS for itself, for ever (its issues
-    6193 and 6502), until our last resort. Twice in a row that is no chance any more, but ours.
+    Seldom a participant that leaves waits in Fast DDS for itself (its issues 6193 and 6502), until
+    our last resort. Twice in a row is taken for a fault of ours.
     """
     for _ in range(2):
         before = set(SHARED_MEMORY.iterdir())  # by others, some of whom may have been killed
