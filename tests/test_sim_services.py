@@ -43,10 +43,10 @@ def set_step_count(client: SimulatorClient, count: int) -> None:
     assert client.set_parameter(topics.SIM_NODE, "step_count", count) == (True, "")
 
 
-def until_reported(client: SimulatorClient, **expected: object) -> None:
-    """Wait for a report that is newer than all that have come."""
+def until_reported(client: SimulatorClient, **expected: object) -> dict[str, str]:
+    """Wait for a report that is newer than all that have come; its values."""
     client.diagnostics.messages.clear()
-    client.reported(**expected)
+    return {item.key: item.value for item in client.reported(**expected).values}
 
 
 # Single steps
@@ -91,8 +91,7 @@ def test_the_number_of_steps_is_a_live_parameter(
     processes.controller()
     client.first_state()
     client.pause(True)
-    until_reported(client, paused=True)
-    start = tick_of(client.states.last)
+    start = int(until_reported(client, paused=True)["tick"])
 
     first = response_of(client, client.step())
     set_step_count(client, 50)
@@ -100,6 +99,7 @@ def test_the_number_of_steps_is_a_live_parameter(
 
     assert (first, second) == ((True, "2 ticks done"), (True, "50 ticks done"))
     until_reported(client, paused=True, tick=start + 52)
+    client.state(start + 52)
     assert max(client.states.ticks()) == start + 52
 
 
