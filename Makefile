@@ -35,37 +35,39 @@ test: .venv/.installed-test ## Check style and types, run the tests
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
 quick: .venv/.installed-test ## Check style and types, run the tests that are not marked as slow
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow" --durations 5 --durations-min 5
 
 hashes: .venv/.installed-test ## Renew the golden hashes, after a change that is meant to alter states
-	$(BIN)/python tests/golden.py
+	$(BIN)/python tests/support/golden.py
 
 other-numpy: .venv/.installed-test ## Compare the golden runs with the oldest and the newest numpy allowed
 	for version in '==1.26.4' '>=2,<3'; do \
 	    rm -rf build/numpy && $(BIN)/python -m pip install -qq --no-deps --target build/numpy "numpy$$version" && \
-	    PYTHONPATH=build/numpy $(BIN)/python -m pytest -q -n auto tests/test_golden_hashes.py || exit 1; \
+	    PYTHONPATH=build/numpy $(BIN)/python -m pytest -q -n auto tests/project/test_golden_hashes.py || exit 1; \
 	done
 
 bench: .venv/.installed-test ## Measure speed; ratios that got worse are red
 	$(BIN)/python -m benchmarks
 
 soak: .venv/.installed ## Run 500,000 ticks with disturbances; no tick lost, no memory grown
-	$(BIN)/python -m benchmarks.soak
+	$(BIN)/python -m tests.endurance.soak
 
 kills: .venv/.installed-test ## Kill the recorder 100 times; every bag is recovered
-	$(BIN)/python -m benchmarks.kills
+	$(BIN)/python -m tests.endurance.kills
 
 noise: .venv/.installed ## Run among 20,000 mutated messages on each topic; same states, no memory grown
-	$(BIN)/python -m benchmarks.noise
+	$(BIN)/python -m tests.endurance.noise
 
 long-recording: .venv/.installed ## Record 5 minutes at 1 kHz; no message lost
-	$(BIN)/python -m benchmarks.long_recording
+	$(BIN)/python -m tests.endurance.long_recording
 
 format: .venv/.installed-test ## Format the code and fix what can be fixed
 	$(BIN)/ruff check --fix

@@ -5,7 +5,7 @@ from glob import glob
 from setuptools import find_packages, setup
 
 PACKAGE = "actuated_characters"
-ROOTS = ("msgs_config", "sim_node", "controller_node", "experiment")
+ROOTS = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
 SHARED = {"launch": "*.launch.py", "config": "*.yaml", "examples": "*.py"}
 
 setup(
@@ -17,8 +17,8 @@ setup(
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),
     package_data={
-        "msgs_config": ["fastdds*.xml", "characters/*.yaml", "characters/*.urdf"],
-        "controller_node": ["keyframes/*.yaml"],
+        "msgs_config": ["runtime/*.xml", "character/data/*"],
+        "controller_node": ["references/data/*.yaml"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
@@ -59,6 +59,7 @@ setup(
         "test": [
             "av>=14,<19",
             "hypothesis>=6.98,<7",
+            "import-linter>=2.9,<3",
             "mcap-ros2-support>=0.5.5,<0.7",
             "mypy>=2.4,<2.5",
             "numba>=0.61,<0.70",
@@ -74,8 +75,8 @@ setup(
         "console_scripts": [
             "sim_node = sim_node.main:main",
             "controller_node = controller_node.main:main",
-            "recorder = experiment.recorder.main:main",
-            "actuated_characters = experiment.cli:main",
+            "recorder = actuated_characters.recorder.main:main",
+            "actuated_characters = actuated_characters.cli:main",
         ],
     },
 )

@@ -4,23 +4,23 @@ import argparse
 import os
 import sys
 
-from msgs_config.process import limit_threads
+from msgs_config.runtime.process import limit_threads
 
 limit_threads()
 
 from rich.console import Console  # noqa: E402 - after the limit on threads
 
+from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
 from benchmarks.control_law import measure_control_laws  # noqa: E402
 from benchmarks.cost import measure_cost  # noqa: E402
 from benchmarks.lockstep import measure_lockstep  # noqa: E402
 from benchmarks.planning import measure_planning  # noqa: E402
-from benchmarks.ratios import compare, comparison_table, read_ratios, store_ratios  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
 from benchmarks.reconstruction import measure_reconstruction  # noqa: E402
 from benchmarks.recorder import measure_recorder  # noqa: E402
 from benchmarks.replay import measure_replay  # noqa: E402
 from benchmarks.search import measure_search  # noqa: E402
-from experiment.domain import own_domain  # noqa: E402
+from benchmarks.support.ratios import compare, comparison_table, read_ratios, store_ratios  # noqa: E402
 
 _WIDTH = 100  # characters; enough for every table
 _MEASUREMENTS = {

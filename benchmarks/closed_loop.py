@@ -4,11 +4,11 @@ import time
 
 import numpy as np
 
-from benchmarks.nodes import Nodes
-from experiment.loop import ticks_in_process
-from experiment.plan import Plan
-from msgs_config import topics
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import Plan
+from benchmarks.support.nodes import Nodes
 from msgs_config.arrays import FloatArray
+from msgs_config.messages import topics
 
 
 def in_process(plan: Plan) -> FloatArray:

@@ -7,14 +7,14 @@ from functools import lru_cache
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.deep_mimic import DeepMimicStablePd
-from benchmarks.ratios import Ratio
+from actuated_characters.metrics.run_metrics import Tick
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import make_plan
+from benchmarks.support.deep_mimic import DeepMimicStablePd
+from benchmarks.support.ratios import Ratio
 from controller_node.laws import LAWS
 from controller_node.parameters import make_controller
 from controller_node.references.base import Reference, ReferenceState
-from experiment.loop import ticks_in_process
-from experiment.metrics import Tick
-from experiment.plan import make_plan
 
 _DURATION = 5.0  # s of simulated time
 _ROUNDS = 7  # over all states; the best round counts, in which others disturbed the least

@@ -12,16 +12,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.chains import write_chain
-from benchmarks.nodes import Nodes
-from benchmarks.ratios import Ratio
-from msgs_config import topics
+from benchmarks.support.chains import write_chain
+from benchmarks.support.nodes import Nodes
+from benchmarks.support.ratios import Ratio
 from msgs_config.arrays import FloatArray
-from msgs_config.messages import JointStateDecoder, JointStateEncoder
-from msgs_config.polling import DirectSubscription, Spinner
+from msgs_config.messages import topics
+from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
+from msgs_config.runtime.polling import DirectSubscription, Spinner
 from sim_node.parameters import Cast, Part, make_cast, make_role, make_settings
-from sim_node.simulation import Simulation
-from sim_node.world import World
+from sim_node.physics.simulation import Simulation
+from sim_node.physics.world import World
 
 _CHAINS = (1, 8, 32, 100)  # hinges
 _HUMANOIDS = (1, 2, 4, 8)

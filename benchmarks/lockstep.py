@@ -4,10 +4,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from actuated_characters.runs.plan import Plan, make_plan
 from benchmarks.closed_loop import in_process, over_topics
-from benchmarks.ratios import Ratio
-from benchmarks.round_trip import round_trips
-from experiment.plan import Plan, make_plan
+from benchmarks.support.ratios import Ratio
+from benchmarks.support.round_trip import round_trips
 from msgs_config.arrays import FloatArray
 
 _COUNT = 5000  # round trips

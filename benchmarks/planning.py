@@ -8,22 +8,22 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.ratios import Ratio
-from benchmarks.yardstick import yardstick_us
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import Plan, make_plan
+from benchmarks.support.ratios import Ratio
+from benchmarks.support.yardstick import yardstick_us
 from controller_node.controller import Controller
 from controller_node.parameters import make_settings as make_control
 from controller_node.planner import settings as planner_settings
-from controller_node.planner.comparison import Comparison
 from controller_node.planner.compiled.rollout import Desired
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.rollouts import Rollouts
-from experiment.loop import ticks_in_process
-from experiment.plan import Plan, make_plan
+from controller_node.planner.search.cost import Comparison
+from controller_node.planner.search.rollouts import Rollouts
 from msgs_config.arrays import FloatArray
-from msgs_config.dynamics import DynamicsModel
-from msgs_config.tick_clock import TickClock
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.messages.clock import TickClock
 from sim_node.parameters import make_role, make_settings
-from sim_node.simulation import Simulation
+from sim_node.physics.simulation import Simulation
 
 _RATE = 240  # Hz
 _WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}

@@ -3,9 +3,9 @@
 from rich.console import Console
 from rich.table import Table
 
+from actuated_characters.runs.plan import make_plan
 from benchmarks.closed_loop import over_topics
-from benchmarks.ratios import Ratio
-from experiment.plan import make_plan
+from benchmarks.support.ratios import Ratio
 
 _CHARACTER, _RATE, _DURATION = "franka_panda", 1000, 20.0  # Hz, s
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.ratios import Ratio
-from experiment.reconstruction.problem import Problem
-from experiment.reconstruction.workers import Workers
-from experiment.reconstruction.world import Branch
+from actuated_characters.reconstruction.problem import Problem
+from actuated_characters.reconstruction.workers import Workers
+from actuated_characters.reconstruction.world import Branch
+from benchmarks.support.ratios import Ratio
 
 _WINDOW = 24  # ticks, 0.1 s
 _WORLDS = 8

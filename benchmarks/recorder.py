@@ -8,10 +8,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.nodes import Nodes, processor_time
-from benchmarks.ratios import Ratio
-from experiment.plan import Plan, make_plan
-from msgs_config import topics
+from actuated_characters.runs.plan import Plan, make_plan
+from benchmarks.support.nodes import Nodes, processor_time
+from benchmarks.support.ratios import Ratio
+from msgs_config.messages import topics
 
 CHARACTER, RATE = "humanoid", 1000  # Hz
 _DURATION = 6.0  # s of simulated time of one run

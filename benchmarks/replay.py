@@ -8,13 +8,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.ratios import Ratio
-from benchmarks.yardstick import yardstick_us
-from experiment.bags.recording import read_recordings
-from experiment.figures import prepare_directory
-from experiment.plan import make_plan
-from experiment.replay.replay import replay
-from experiment.run import run_over_topics
+from actuated_characters.bags.recording import read_recordings
+from actuated_characters.replay.replay import replay
+from actuated_characters.runs.execution import run_over_topics
+from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.run_directory import prepare_directory
+from benchmarks.support.ratios import Ratio
+from benchmarks.support.yardstick import yardstick_us
 from msgs_config.errors import ReplayError
 
 _DURATION = 20.0  # s of simulated time

@@ -9,12 +9,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.ratios import Ratio
-from benchmarks.yardstick import yardstick_us
-from controller_node.behaviours.library import MotionLibrary
+from benchmarks.support.ratios import Ratio
+from benchmarks.support.yardstick import yardstick_us
+from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.references.clip import ClipReference
-from controller_node.references.clip_file import read_clip
-from msgs_config.character_loading import load_character
+from controller_node.references.files.clip import read_clip
+from msgs_config.character.loading import load_character
 
 _STATES = 30  # of a walk, each looked for once
 _LASTING = 0.5  # s, the default of `blend.duration`

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.joint_layout import Configuration, JointLayout
+from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.geometry import rotations
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character, ShapeType
-from msgs_config.dynamics import DynamicsModel
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.model import Character, ShapeType
 from msgs_config.errors import CharacterError, one_of
-from msgs_config.geometry import fixed_order
+from msgs_config.geometry import fixed_order, rotations
 
 _ROOT_ENTRIES = 6  # of the floating base, the first ones
 _LEAST_LOAD = 1.0  # N on the feet together, where the law would have them pull

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.joint_layout import JointLayout
+from msgs_config.character.layout import JointLayout
 
 Solver: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
 """`(force, added) -> a`: the acceleration (n,) of `(M + diag(added)) a = force`."""

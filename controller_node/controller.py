@@ -5,26 +5,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from controller_node.agreement import check_agreement
 from controller_node.balance import Balance, BalanceGains
 from controller_node.behaviours.base import ModeReport, Observation, Phase
-from controller_node.behaviours.make import BehaviourChoice
-from controller_node.behaviours.ways import AS_IT_IS, Way
+from controller_node.behaviours.factory import BehaviourChoice
+from controller_node.behaviours.targets import AS_IT_IS, Way
 from controller_node.effort_series import EffortSeries
 from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
+from controller_node.model_check import check_agreement
 from controller_node.planner.base import Planner
 from controller_node.planner.outlook import Outlook
 from controller_node.references.base import Reference, ReferenceState
-from controller_node.references.moved import Carry, MovedReference
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
+from controller_node.references.transformed import Carry, MovedReference
 from controller_node.strength import Strengths, StrengthSchedule, weakened
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
-from msgs_config.dynamics import DynamicsModel
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError, ConfigurationError
-from msgs_config.probe import Probe
-from msgs_config.stamped import StampedReference, StampedState
-from msgs_config.tick_clock import TickClock
+from msgs_config.messages.clock import TickClock
+from msgs_config.messages.probe import Probe
+from msgs_config.messages.state import StampedReference, StampedState
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointLayout
 from msgs_config.errors import EffortSeriesError, LayoutError
 from msgs_config.files import read_text
-from msgs_config.joint_layout import JointLayout
 
 TIME_COLUMN = "time_s"
 

@@ -11,9 +11,9 @@ from controller_node.control_laws import pd_effort, pid_effort, stable_pd_effort
 from controller_node.effort_series import EffortSeries
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
-from msgs_config.dynamics import DynamicsModel
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.layout import JointLayout
 from msgs_config.errors import ConfigurationError
-from msgs_config.joint_layout import JointLayout
 
 
 @dataclass(frozen=True)

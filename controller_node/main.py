@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NoReturn
 
-from msgs_config.process import RunnableNode, limit_threads, run_node
+from msgs_config.runtime.process import RunnableNode, limit_threads, run_node
 
 
 def main() -> NoReturn:

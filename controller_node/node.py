@@ -9,9 +9,11 @@ from rclpy.node import Node
 
 from controller_node.actuation import Actuation
 from controller_node.behaviours.base import ModeReport
-from controller_node.contact_inbox import ContactInbox
-from controller_node.motion import make_motion
-from controller_node.outputs import Answer, Outputs
+from controller_node.interface.contact_subscription import ContactInbox
+from controller_node.interface.publishers import Answer, Outputs
+from controller_node.interface.simulators import Simulators
+from controller_node.interface.strengths_topic import StrengthTopic
+from controller_node.interface.trajectory_topic import Trajectories
 from controller_node.parameters import (
     PARAMETERS,
     character_parameters,
@@ -21,14 +23,8 @@ from controller_node.parameters import (
     make_settings,
 )
 from controller_node.planner.outlook import Outlook
-from controller_node.simulators import Simulators
-from controller_node.strengths_topic import StrengthTopic
-from controller_node.trajectories import Trajectories
-from msgs_config import configuration, topics
-from msgs_config.character_loading import load_character
-from msgs_config.configuration import RunConfiguration
-from msgs_config.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
-from msgs_config.durations import Durations
+from controller_node.references.factory import make_motion
+from msgs_config.character.loading import load_character
 from msgs_config.errors import (
     CharacterError,
     ClockError,
@@ -36,15 +32,19 @@ from msgs_config.errors import (
     LayoutError,
     MessageError,
 )
-from msgs_config.messages import JointStateDecoder, state_in_layout
-from msgs_config.node_parameters import LiveParameters, declare, given_parameters
+from msgs_config.messages import configuration, topics
+from msgs_config.messages.configuration import RunConfiguration
+from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
+from msgs_config.messages.session import ANONYMOUS, given_session
+from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
-from msgs_config.polling import DirectSubscription, Spinner
-from msgs_config.process import StopSignal
-from msgs_config.session import ANONYMOUS, given_session
+from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
+from msgs_config.runtime.durations import Durations
+from msgs_config.runtime.once_logger import UNLOGGED, Warnings
+from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
-from msgs_config.stamped import StampedState
-from msgs_config.warnings import UNLOGGED, Warnings
 
 _FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge the last messages
 

@@ -7,20 +7,20 @@ import numpy as np
 
 from controller_node.balance import BalanceGains
 from controller_node.behaviours import settings as behaviour_settings
-from controller_node.behaviours.make import choose_behaviour
+from controller_node.behaviours.factory import choose_behaviour
 from controller_node.controller import Controller, Settings
 from controller_node.effort_series import read_effort_series
 from controller_node.laws import LAWS, GainArrays
-from controller_node.motion import MOTION_PARAMETERS
 from controller_node.planner import settings as planner_settings
-from controller_node.planner.make import make_planner
+from controller_node.planner.factory import make_planner
 from controller_node.planner.settings import NO_PLANNER
 from controller_node.references.base import Reference
+from controller_node.references.factory import MOTION_PARAMETERS
 from msgs_config.arrays import FloatArray
-from msgs_config.character import ROOT_TORQUE, Character
-from msgs_config.joint_layout import ROOT
+from msgs_config.character.layout import ROOT
+from msgs_config.character.model import ROOT_TORQUE, Character
+from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter, Values
-from msgs_config.session import SESSION
 from msgs_config.shared_parameters import (
     CHARACTER,
     COMMAND_DELAY,

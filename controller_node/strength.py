@@ -6,8 +6,8 @@ import numpy as np
 
 from controller_node.laws import GainArrays
 from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointLayout
 from msgs_config.errors import MotionError, one_of
-from msgs_config.joint_layout import JointLayout
 
 _MOST_WAITING = 100  # messages
 

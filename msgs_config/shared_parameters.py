@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from msgs_config.character import Character, Placement
+from msgs_config.character.model import Character, Placement
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Parameter
 

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from msgs_config.arrays import BoolArray
-from msgs_config.character import Character
+from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, MessageError
+from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Parameter, Value, Values
-from msgs_config.stamped import StampedState
 
 GIVEN, REFERENCE = "given", "reference"
 INITIAL_STATE, POSITION, VELOCITY = "initial_state", "initial_position", "initial_velocity"

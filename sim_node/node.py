@@ -6,22 +6,30 @@ from collections.abc import Iterator
 import numpy as np
 from rclpy.node import Node
 
-from msgs_config import topics
-from msgs_config.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
 from msgs_config.errors import SimulationError
-from msgs_config.messages import encode_clock
-from msgs_config.node_parameters import LiveParameters, declare, given_parameters
+from msgs_config.messages import topics
+from msgs_config.messages.clock import FIRST_TICK
+from msgs_config.messages.joint_state import encode_clock
+from msgs_config.messages.session import given_session, make_session
+from msgs_config.messages.topics import Outgoing
 from msgs_config.parameters import Values
-from msgs_config.polling import Spinner
-from msgs_config.process import StopSignal
-from msgs_config.session import given_session, make_session
-from msgs_config.tick_clock import FIRST_TICK
-from msgs_config.topics import Outgoing
-from msgs_config.warnings import UNLOGGED, Warnings
-from sim_node.back_pressure import BackPressure
-from sim_node.initial_state_topic import InitialStates
-from sim_node.lockstep import LockstepBarrier, Verdict
-from sim_node.pace import Pace
+from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
+from msgs_config.runtime.once_logger import UNLOGGED, Warnings
+from msgs_config.runtime.polling import Spinner
+from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
+from sim_node.interface.character_interface import Port, open_ports, publish_configurations
+from sim_node.interface.initial_state_topic import InitialStates
+from sim_node.interface.other_publishers import RivalWatch
+from sim_node.interface.publisher_diagnosis import (
+    UNKNOWN_NODE,
+    describe_conflict,
+    describe_waiting,
+    publisher_names,
+)
+from sim_node.interface.services import Services
+from sim_node.interface.status import report
+from sim_node.interface.world_interface import WorldPort
 from sim_node.parameters import (
     command_timeout_ns,
     is_realtime,
@@ -31,22 +39,14 @@ from sim_node.parameters import (
     push_ticks,
     tick_period,
 )
-from sim_node.patience import Due, Patience
-from sim_node.port import Port, open_ports, publish_configurations
-from sim_node.realtime import CommandHold
-from sim_node.report import report
-from sim_node.rivals import RivalWatch
-from sim_node.run_control import RunControl
-from sim_node.services import Services
-from sim_node.simulation import Simulation
-from sim_node.tick_times import TickTimes
-from sim_node.waiting import (
-    UNKNOWN_NODE,
-    describe_conflict,
-    describe_waiting,
-    publisher_names,
-)
-from sim_node.world_port import WorldPort
+from sim_node.physics.simulation import Simulation
+from sim_node.timing.flow_control import BackPressure
+from sim_node.timing.lockstep import LockstepBarrier, Verdict
+from sim_node.timing.rate_limiter import Pace
+from sim_node.timing.run_state import RunControl
+from sim_node.timing.tick_times import TickTimes
+from sim_node.timing.watchdog import Due, Patience
+from sim_node.timing.zero_order_hold import CommandHold
 
 _EXPLAIN_AFTER = 2.0  # s without a complete command before the node says what is missing
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from msgs_config import files
-from msgs_config.character import Character, Loading
-from msgs_config.character_loading import load_character
+from msgs_config.character.loading import load_character
+from msgs_config.character.model import Character, Loading
+from msgs_config.character.urdf_check import check_urdf
 from msgs_config.errors import CharacterError, ConfigurationError, LayoutError
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter, Value, Values, resolve
-from msgs_config.session import SESSION
 from msgs_config.shared_parameters import (
     CHARACTER,
     COMMAND_DELAY,
@@ -21,12 +23,10 @@ from msgs_config.shared_parameters import (
     RATE,
     placed,
 )
-from msgs_config.tick_clock import NANOSECONDS_PER_SECOND
-from msgs_config.urdf_check import check_urdf
-from sim_node.actor import Role
 from sim_node.initial_state import POSITION, VELOCITY, check_given, initial_state_parameters
-from sim_node.simulation import SimulationSettings
-from sim_node.world import WorldSettings
+from sim_node.physics.simulated_character import Role
+from sim_node.physics.simulation import SimulationSettings
+from sim_node.physics.world import WorldSettings
 
 _LARGEST_COUNT = 2**62
 _BEFORE = (CHARACTER.name, PLACEMENT.name)  # what the other parameters depend on

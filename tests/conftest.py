@@ -7,12 +7,14 @@ from pathlib import Path
 import pytest
 import rclpy
 from rclpy.context import Context
-from ros import DDS_PROFILES, RANGE, ControllerClient, Processes, SimulatorClient
 
-from experiment.domain import own_domain
+from actuated_characters.runs.ros_domain import own_domain
+from tests.support.ros import DDS_PROFILES, RANGE, ControllerClient, Processes, SimulatorClient
 
 # It is read once, when a process makes its first node, which may be in any test.
-os.environ[DDS_PROFILES] = str(Path(__file__).parents[1] / "msgs_config/fastdds_localhost.xml")
+os.environ[DDS_PROFILES] = str(
+    Path(__file__).parents[1] / "msgs_config/runtime/fastdds_localhost.xml"
+)
 
 
 def pytest_xdist_auto_num_workers() -> int:

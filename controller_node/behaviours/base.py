@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol, TypeAlias
 
-from controller_node.behaviours.ways import AS_IT_IS, Way
+from controller_node.behaviours.targets import AS_IT_IS, Way
 from controller_node.laws import GainArrays
 from controller_node.references.base import ReferenceState
-from controller_node.references.moved import Carry
+from controller_node.references.transformed import Carry
 from msgs_config.arrays import FloatArray
 
 

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
+from msgs_config.character.layout import Configuration
+from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
-from msgs_config.geometry import fixed_order
-from msgs_config.joint_layout import Configuration
+from msgs_config.geometry import fixed_order, rotations
 
 _UP = np.array((0.0, 0.0, 1.0))
 _FORWARD = np.array((1.0, 0.0, 0.0))

@@ -13,21 +13,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.behaviours.base import Directive, Mode, Observation, Phase
-from controller_node.behaviours.give_way import GiveWay, softened
-from controller_node.behaviours.hits import WINDOW, Hit, HitDetector
-from controller_node.behaviours.library import Match, MotionLibrary
+from controller_node.behaviours.compliance import GiveWay, softened
+from controller_node.behaviours.hit_detection import WINDOW, Hit, HitDetector
+from controller_node.behaviours.motion_library import Match, MotionLibrary
 from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.settings import ReactionSettings
-from controller_node.behaviours.ways import BodyWay, ClipWay, OwnWay, Way
+from controller_node.behaviours.targets import BodyWay, ClipWay, OwnWay, Way
 from controller_node.laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertialisedReference, Offset
-from controller_node.references.moved import Carry, MovedReference
+from controller_node.references.transformed import Carry, MovedReference
 from controller_node.strength import weakened
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
-from msgs_config.dynamics import DynamicsModel
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.model import Character
+from msgs_config.geometry import rotations
 
 _SEVERE = 2.0 / 3.0  # of the threshold above which it goes limp: the full reaction
 _ONTO = 0.6  # of the blend's duration, until the motion that was found is reached

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
+from msgs_config.geometry import rotations
 
 _FAR = 0.28  # m of the centre of mass from the reference's: it is perturbed
 _FAST = 0.65  # m/s likewise; a walk that nobody pushes reaches 0.63

@@ -7,7 +7,7 @@ from controller_node.laws import GainArrays
 from controller_node.planner.outlook import Outlook
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
-from msgs_config.stamped import StampedState
+from msgs_config.messages.state import StampedState
 
 if TYPE_CHECKING:
     from controller_node.planner.late_commands import LateCommands  # needs numba

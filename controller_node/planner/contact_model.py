@@ -17,10 +17,10 @@ from controller_node.planner.compiled.law import Joints, Law
 from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
 from controller_node.planner.compiled.rollout import Body, Engine
 from controller_node.planner.compiled.soft_limits import SoftLimits
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character, Link, Shape, ShapeType
-from msgs_config.dynamics import add_links, compile_exactly, quaternion_starts
+from msgs_config.character.dynamics import add_links, compile_exactly, quaternion_starts
+from msgs_config.character.model import Character, Link, Shape, ShapeType
+from msgs_config.geometry import rotations
 
 _SOLVER_ITERATIONS = 6
 _CONTACT = (0.015, 3.0)  # time constant in s and damping ratio: what lands stays, as in the world

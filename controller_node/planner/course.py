@@ -8,7 +8,7 @@ import numpy as np
 from controller_node.planner.base import DesiredAt
 from controller_node.planner.compiled.rollout import Body, Desired
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.rollouts import Rollouts
+from controller_node.planner.search.rollouts import Rollouts
 from controller_node.planner.settings import PlannerSettings
 from msgs_config.arrays import FloatArray
 

@@ -14,7 +14,7 @@ from controller_node.laws import GainArrays
 from controller_node.planner.compiled.rollout import let_act
 from controller_node.planner.contact_model import ContactModel
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
+from msgs_config.character.model import Character
 
 
 class LateCommands:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.planner.offsets import Offsets
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.settings import PlannerSettings
+from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
 
 _FADING = 0.7  # of sensitivities, from plan to plan

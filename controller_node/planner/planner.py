@@ -19,20 +19,20 @@ import numpy as np
 from controller_node.laws import GainArrays
 from controller_node.planner.anchor import Anchor, Balance, balance_of
 from controller_node.planner.base import DesiredAt
-from controller_node.planner.comparison import Comparison
 from controller_node.planner.compiled.rollout import Body
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.course import Course, Target
 from controller_node.planner.late_commands import LateCommands
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.plan import Plan
-from controller_node.planner.plan_search import PlanSearch, Start
-from controller_node.planner.rollouts import Rollouts
+from controller_node.planner.search.cost import Comparison
+from controller_node.planner.search.plan_search import PlanSearch, Start
+from controller_node.planner.search.rollouts import Rollouts
 from controller_node.planner.settings import PlannerSettings
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
-from msgs_config.stamped import StampedState
+from msgs_config.character.model import Character
+from msgs_config.messages.state import StampedState
 
 _PATIENCE = 0.005  # s between two looks at what else there is to do
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from controller_node.laws import GainArrays
 from controller_node.planner.base import DesiredAt
-from controller_node.planner.offsets import RecordedPlan
 from controller_node.planner.outlook import Outlook
+from controller_node.references.offsets import RecordedPlan
 from msgs_config.arrays import FloatArray
-from msgs_config.stamped import StampedState
+from msgs_config.messages.state import StampedState
 
 if TYPE_CHECKING:
     from controller_node.planner.late_commands import LateCommands  # needs numba

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
+from msgs_config.character.layout import JointType
+from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
-from msgs_config.joint_layout import JointType
 from msgs_config.parameters import Parameter, Values
 from msgs_config.shared_parameters import COMMAND_DELAY, PLANE
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from msgs_config.arrays import FloatArray
-from msgs_config.joint_layout import Configuration
+from msgs_config.character.layout import Configuration
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from functools import lru_cache
 import numpy as np
 
 from controller_node.references.base import ReferenceState
-from controller_node.references.clip_file import ClipFrames
-from msgs_config import rotations
+from controller_node.references.files.clip import ClipFrames
 from msgs_config.arrays import FloatArray
-from msgs_config.joint_layout import Configuration, JointLayout
+from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.geometry import rotations
 
 _BLEND_TIME = 0.15  # s before the wrap, over which the gap to the first frame is closed
 

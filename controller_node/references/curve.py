@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.references.base import ReferenceState
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.geometry import fixed_order
-from msgs_config.joint_layout import Configuration, JointLayout
+from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.geometry import fixed_order, rotations
 
 # The coefficients of u, u^2, ... of a polynomial on 0 <= u <= 1 that begins at zero, a row each;
 # the columns are its end, its first derivatives at 0 and at 1, and its second ones.

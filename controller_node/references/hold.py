@@ -3,7 +3,7 @@
 import numpy as np
 
 from controller_node.references.base import ReferenceState
-from msgs_config.character import Character
+from msgs_config.character.model import Character
 
 
 class HoldReference:

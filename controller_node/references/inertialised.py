@@ -8,10 +8,9 @@ rotation vector do, so that the velocity is continuous whatever its direction.
 import numpy as np
 
 from controller_node.references.base import Reference, ReferenceState
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.geometry import fixed_order
-from msgs_config.joint_layout import Configuration, JointLayout
+from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.geometry import fixed_order, rotations
 
 # Coefficients of 1, u, ... u^5 of three quintics on 0 <= u <= 1 that end at rest at zero, a row
 # each: the first one begins at 1, the second with the slope 1, the third with the second slope 1.

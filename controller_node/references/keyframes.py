@@ -8,8 +8,8 @@ from controller_node.references.base import ReferenceState
 from controller_node.references.curve import Curve, Knots, segment_offsets
 from controller_node.references.limits import JointLimits
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
-from msgs_config.joint_layout import Configuration, JointLayout
+from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.model import Character
 
 _SHARES = np.linspace(0.0, 1.0, 65)  # of a segment, where its path is compared with the limits
 _NOTICED = 1e-6  # rad or m

@@ -3,8 +3,8 @@
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
-from msgs_config.joint_layout import JointType
+from msgs_config.character.layout import JointType
+from msgs_config.character.model import Character
 
 LARGEST_NUMBER = 1e6  # rad, m, s or their quotients; more is a mistake
 SHORTEST_TIME = 1e-6  # s between two points of a motion

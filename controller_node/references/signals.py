@@ -7,11 +7,11 @@ import numpy as np
 
 from controller_node.references.base import ReferenceState
 from controller_node.references.limits import LARGEST_NUMBER, JointLimits
-from msgs_config import rotations
 from msgs_config.arrays import FloatArray
-from msgs_config.character import Character
+from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.model import Character
 from msgs_config.errors import MotionError, one_of
-from msgs_config.joint_layout import Configuration, JointLayout
+from msgs_config.geometry import rotations
 
 
 class StepReference:

@@ -14,9 +14,9 @@ from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.curve import Curve, Knots
 from controller_node.references.limits import LARGEST_NUMBER, SHORTEST_TIME, JointLimits
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character import Character
+from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.model import Character
 from msgs_config.errors import LayoutError, MotionError
-from msgs_config.joint_layout import Configuration, JointLayout
 
 _SAME = 1e-3  # rad or m, of a first point at time 0 from where the reference is
 _MOST_WAITING = 100  # trajectories

@@ -2,7 +2,7 @@
 
 Quaternions are xyzw; axes are rows of a rotation matrix, which turn coordinates of the child frame
 into the parent frame. Sums have the order of `msgs_config.geometry.fixed_order`, so that a rotation
-of `msgs_config.rotations` gives the same doubles.
+of `msgs_config.geometry.rotations` gives the same doubles.
 """
 
 import math
@@ -74,7 +74,7 @@ def rotation_vector(q_xyzw: Sequence[float]) -> Triple:
 def right_jacobian_inverse(rotation_vector: Sequence[float]) -> Axes:
     """The matrix that turns an angular velocity in the child frame into a rotation vector's rate.
 
-    `msgs_config.rotations` has the equation, and the same for arrays.
+    `msgs_config.geometry.rotations` has the equation, and the same for arrays.
     """
     x, y, z = rotation_vector
     xx, yy, zz = x * x, y * y, z * z

@@ -16,7 +16,7 @@ from controller_node.planner.compiled.soft_limits import (
     SoftLimits,
     add_soft_limits,
 )
-from controller_node.planner.offsets import knot_before
+from controller_node.references.offsets import knot_before
 from msgs_config.arrays import FloatArray
 
 _knot_before = compiled(knot_before)

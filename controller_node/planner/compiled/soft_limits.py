@@ -1,4 +1,4 @@
-"""The simulator's soft limits of ball joints (`sim_node.passive`) in compiled code.
+"""The simulator's soft limits of ball joints (`sim_node.physics.passive_forces`) in compiled code.
 
 Forces f >= 0 against bounds that are passed, implicit in a step h: `f = max(0, e - i A f)` with
 `A = J M^-1 J^T`. The equations and their sources are there.

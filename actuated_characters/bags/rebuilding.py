@@ -1,0 +1,105 @@
+"""Builds the character of a recording from the texts in it, not from what is installed today."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from msgs_config.character.file import (
+    character_path,
+    read_character_file,
+    read_character_texts,
+)
+from msgs_config.character.loading import make_character
+from msgs_config.character.meshes import check_collision_meshes
+from msgs_config.character.model import Character, Loading
+from msgs_config.errors import ActuatedCharactersError, RecordingError
+from msgs_config.files import resolve
+from msgs_config.messages.configuration import (
+    RunConfiguration,
+    UrdfCopy,
+    WorldCopy,
+    parse,
+    parse_world,
+)
+from msgs_config.shared_parameters import CHARACTER, placed
+
+
+@dataclass(frozen=True)
+class RecordedWorld:
+    """The world that a character was in."""
+
+    namespace: str = ""  # of its simulator, without the leading slash
+    name: str = ""  # the character's in it, where there were several
+    characters: tuple[str, ...] = ()  # the names of all of them, in the order of their entry
+    terrain: Loading | None = None  # what lay there, beside the plane
+
+
+@dataclass(frozen=True)
+class Rebuilt:
+    """What a simulator's `~/configuration` says, made anew."""
+
+    character: Character
+    known: RunConfiguration
+    world: RecordedWorld
+
+
+def rebuild(text: str, namespace: str) -> Rebuilt:
+    """Build the character that a simulator's configuration describes.
+
+    Args:
+        text: The configuration, JSON.
+        namespace: Where its topics are, without the leading slash.
+
+    Raises:
+        RecordingError: the character cannot be built, or is not the one that it was.
+        MessageError: the text is no configuration.
+    """
+    known, copy = parse(text), parse_world(text)
+    try:
+        character = placed(_character(known, copy), known.parameters)
+        terrain = None if copy.terrain is None else _terrain(known, copy.terrain)
+    except ActuatedCharactersError as error:
+        raise RecordingError(f"cannot build character {known.character} anew: {error}") from error
+    same_joints = character.layout.joints == known.layout.joints
+    if not same_joints or not np.isclose(character.mass, known.mass, rtol=1e-9):
+        raise RecordingError(
+            f"character {known.character} is not the one that was recorded: from the texts in its "
+            f"configuration come {character.layout.size} degrees of freedom and "
+            f"{character.mass:g} kg, and there were {known.layout.size} and {known.mass:g} kg"
+        )
+    inner = f"/{namespace}".removesuffix(f"/{copy.name}") if copy.name else f"/{namespace}"
+    world = RecordedWorld(inner.removeprefix("/"), copy.name, copy.characters, terrain)
+    return Rebuilt(character, known, world)
+
+
+def _character(known: RunConfiguration, copy: WorldCopy) -> Character:
+    """From the texts, with the meshes that lie where they lay."""
+    path, urdf_path = copy.character_path, copy.urdf.path
+    if path is None or urdf_path is None:
+        path, urdf_path = _paths_of_today(known, copy)
+    file = read_character_texts(path, copy.character_text, urdf_path, copy.urdf.text)
+    check_collision_meshes(file.loading, copy.urdf.meshes)
+    return make_character(file)
+
+
+def _paths_of_today(known: RunConfiguration, copy: WorldCopy) -> tuple[Path, Path]:
+    """Where the files lie now, for an older recording that does not say where they lay."""
+    path = character_path(str(known.parameters.get(CHARACTER.name)))
+    file = read_character_file(str(path))
+    same = (file.text, file.loading.urdf_text) == (copy.character_text, copy.urdf.text)
+    if not same and "<mesh" in copy.urdf.text:
+        raise RecordingError(
+            f"the recording does not say where its meshes lay, and {path} or its URDF has another "
+            "text now"
+        )
+    return path, file.loading.urdf_path
+
+
+def _terrain(known: RunConfiguration, terrain: UrdfCopy) -> Loading:
+    path = terrain.path
+    if path is None:
+        path = resolve(str(known.parameters.get("terrain")), Path.cwd(), RecordingError)
+    loading = Loading(path, terrain.text, fixed_base=True)
+    check_collision_meshes(loading, terrain.meshes)
+    return loading

@@ -1,0 +1,1 @@
+"""Bags that their writer never closed, made whole."""

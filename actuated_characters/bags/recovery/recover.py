@@ -1,0 +1,176 @@
+"""Makes a complete recording of what a killed recorder, a full disk or a broken copy has left."""
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from std_msgs.msg import String
+
+from actuated_characters.bags.directory_lock import Claim, writer_of
+from actuated_characters.bags.metadata import METADATA
+from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.recovery.rewriting import Contents, Progress, rewrite, storage_files
+from actuated_characters.bags.storage import reason
+from actuated_characters.metrics.collector import CONFIGURATION, HEARD, RunListener
+from actuated_characters.runs.run_directory import BAG, SUMMARY, figures_directory, write_figures
+from msgs_config.errors import ActuatedCharactersError, RecordingError
+from msgs_config.messages import topics
+from msgs_config.messages.configuration import parse_world
+from msgs_config.messages.joint_state import decode
+
+_DAMAGED, _SCRATCH = ".damaged", ".recovering"
+_REPORT_PERIOD = 1000  # messages
+
+
+@dataclass
+class Recovered:
+    """What `recover` has found, and where it is."""
+
+    bag: Path
+    contents: Contents
+    damaged: Path | None  # the original; None where the bag was complete and nothing was done
+    measured: list[Path] = field(default_factory=list)  # directories with figures made anew
+    kept: list[Path] = field(default_factory=list)  # with the recorder's own, of the whole run
+    unmeasured: str = ""  # why there are none, in a run's directory
+
+
+def recover(path: Path, progress: Progress | None = None) -> Recovered:
+    """Make a bag complete that is not, in its place; the original stays beside it as `.damaged`.
+
+    Every message of a chunk that is whole is kept, with its type's definition and its publishers'
+    quality of service. A run's directory gets the figures that it lacks. A bag that is complete is
+    not touched. Being killed itself does no harm: the next call goes on.
+
+    Args:
+        path: A run's directory, or a bag: the directory that its files lie in.
+        progress: Told how far it is.
+
+    Raises:
+        RecordingError: there is nothing to recover, the recorder is still at work, the disk is
+            full, or the original of an earlier recovery is in the way.
+    """
+    report = progress or (lambda what, fraction: None)
+    try:
+        return _recover(path, report)
+    except OSError as error:
+        raise RecordingError(f"cannot recover {path}: {reason(error)}") from error
+
+
+def _recover(path: Path, report: Progress) -> Recovered:
+    is_run = any((path / f"{BAG}{end}").is_dir() for end in ("", _DAMAGED))
+    bag = path / BAG if is_run else path
+    if bag.name in ("", ".."):
+        bag = bag.resolve()
+    _finish_swap(bag)
+    recovered = _recover_bag(bag, report)
+    if is_run:
+        _measure(path, recovered, report)
+    return recovered
+
+
+def _recover_bag(bag: Path, report: Progress) -> Recovered:
+    if not bag.is_dir():
+        hint = "; give the directory that it lies in" if bag.is_file() else ""
+        raise RecordingError(f"nothing to recover: {bag} is no directory{hint}")
+    contents = _whole_contents(bag, report)
+    if contents is not None:
+        return Recovered(bag, contents, None)
+    damaged, scratch = bag.with_name(bag.name + _DAMAGED), _scratch(bag)
+    if damaged.exists():
+        raise RecordingError(f"{damaged} is in the way: what an earlier recovery kept; move it")
+    claim = _claim(bag)
+    try:
+        writer = writer_of(storage_files(bag))  # of another recorder, which makes no claim
+        if writer is not None:
+            raise RecordingError(f"process {writer} is still writing to {bag}; end it first")
+        shutil.rmtree(scratch, ignore_errors=True)  # of a recovery that was killed
+        contents = rewrite(bag, scratch / bag.name, report)
+        bag.rename(damaged)
+        _finish_swap(bag)
+    finally:
+        claim.release()
+        if bag.exists():
+            shutil.rmtree(scratch, ignore_errors=True)
+    return Recovered(bag, contents, damaged)
+
+
+def _claim(bag: Path) -> Claim:
+    try:
+        return Claim(bag)
+    except BlockingIOError as error:
+        raise RecordingError(f"a recorder is still at work on {bag}; end it first") from error
+
+
+def _scratch(bag: Path) -> Path:
+    return bag.with_name(bag.name + _SCRATCH)
+
+
+def _finish_swap(bag: Path) -> None:
+    """Put the new bag where the old one was; also for a recovery that was killed before that."""
+    new = _scratch(bag) / bag.name
+    if not bag.exists() and (new / METADATA).is_file():
+        new.rename(bag)
+        shutil.rmtree(new.parent, ignore_errors=True)
+
+
+def _whole_contents(bag: Path, report: Progress) -> Contents | None:
+    """What is in a bag that can be read to its end; None for any other."""
+    contents = Contents()
+    report("checking", None)
+    try:
+        for message in read_messages(bag):
+            contents.add(message.topic, message.log_time_ns)
+    except RecordingError:
+        return None
+    return contents
+
+
+def _measure(directory: Path, recovered: Recovered, report: Progress) -> None:
+    """Make the figures of each character in a bag, as its recorder would have made them.
+
+    Those that are there stay: a recorder whose disk is full measures on, to the run's end.
+    """
+    suffix = f"/{CONFIGURATION}"
+    namespaces = [
+        name.removesuffix(suffix) for name in recovered.contents.counts if name.endswith(suffix)
+    ]
+    try:
+        places = _places(directory, recovered.bag, namespaces)
+        made = {each: place for each, place in places.items() if not (place / SUMMARY).exists()}
+        if recovered.damaged is not None:
+            recovered.kept = [place for each, place in places.items() if each not in made]
+        listeners = {each: RunListener(f"{each}/{topics.SIM_NODE}"[1:]) for each in made}
+        if listeners:
+            _listen(recovered, listeners, report)
+        for namespace, listener in listeners.items():
+            write_figures(made[namespace], *listener.results())
+            recovered.measured.append(made[namespace])
+        if not namespaces and not (directory / SUMMARY).exists():
+            recovered.unmeasured = f"it has no '{CONFIGURATION}'"
+    except ActuatedCharactersError as error:
+        recovered.unmeasured = str(error)
+
+
+def _places(directory: Path, bag: Path, namespaces: Sequence[str]) -> dict[str, Path]:
+    """Where the figures of the characters in some namespaces are."""
+    names = dict.fromkeys(namespaces, "")
+    if len(namespaces) == 1:
+        message = next(read_messages(bag, [f"{namespaces[0]}/{CONFIGURATION}"]))
+        names[namespaces[0]] = parse_world(decode(message.raw, String).data).name
+    return {
+        each: figures_directory(directory, each, is_alone=len(namespaces) == 1 and not name)
+        for each, name in names.items()
+    }
+
+
+def _listen(recovered: Recovered, listeners: dict[str, RunListener], report: Progress) -> None:
+    total = recovered.contents.counts.total()
+    for count, message in enumerate(read_messages(recovered.bag)):
+        if count % _REPORT_PERIOD == 0:
+            report("measuring", count / total)
+        for namespace, listener in listeners.items():
+            shared = message.topic == topics.DIAGNOSTICS.name
+            name = message.topic if shared else message.topic.removeprefix(f"{namespace}/")
+            if name in HEARD:
+                listener.take(name, message.raw, message.log_time_ns)

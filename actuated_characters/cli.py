@@ -1,0 +1,150 @@
+"""The command `actuated_characters`: runs of simulator and controller, and what there is to run."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Sequence
+from types import FrameType
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from actuated_characters.commands.compare import add_compare
+from actuated_characters.commands.export import add_export
+from actuated_characters.commands.info import add_info
+from actuated_characters.commands.reconstruct import add_reconstruct
+from actuated_characters.commands.recover import add_recover
+from actuated_characters.commands.render import add_render
+from actuated_characters.commands.replay import add_replay
+from actuated_characters.commands.report import add_report
+from actuated_characters.commands.run import add_run
+from actuated_characters.commands.study import add_study
+from msgs_config.errors import ActuatedCharactersError
+from msgs_config.parameters import Parameter
+from msgs_config.runtime.process import EXIT_ERROR, limit_threads
+
+_NODES = ("sim_node", "controller_node")
+_interrupted = False
+_EXIT_INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    limit_threads()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
+    try:
+        options = _parser().parse_args(arguments)
+        code = options.command(options)
+    except (ActuatedCharactersError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_ERROR
+    except BaseException:  # a module that was being imported may have turned it into its own
+        if not _interrupted:
+            raise
+        print("interrupted", file=sys.stderr)
+        return _EXIT_INTERRUPTED
+    return int(code or 0)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    global _interrupted
+    del number, frame
+    _interrupted = True
+    raise _Interrupted
+
+
+class _Interrupted(KeyboardInterrupt):
+    """Not KeyboardInterrupt itself: where that goes through code that was made from a text, such
+    as a dataclass's, Python remembers it, and in the end kills a module that was run by `-m`.
+    """
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="actuated_characters",
+        description="Simulated characters, actuated by torques over ROS 2 topics.",
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    add_run(commands)
+    add_reconstruct(commands)
+    add_render(commands)
+    add_replay(commands)
+    add_info(commands)
+    add_report(commands)
+    add_compare(commands)
+    add_export(commands)
+    add_recover(commands)
+    add_study(commands)
+    listing = commands.add_parser("list", help="list the characters and their clips")
+    listing.set_defaults(command=_list)
+    parameters = commands.add_parser(
+        "parameters", help="list a node's parameters", description="List a node's parameters."
+    )
+    parameters.set_defaults(command=_parameters)
+    parameters.add_argument("node", choices=(*_NODES, "recorder"))
+    parameters.add_argument(
+        "--character", default="humanoid", help="name, or path of a .yaml or .urdf file"
+    )
+    return parser
+
+
+def _list(options: argparse.Namespace) -> None:
+    del options
+    from controller_node.references.files.clip import available_clips
+    from msgs_config.character.file import shipped_characters
+    from msgs_config.character.loading import load_character
+
+    table = Table(title="characters", title_justify="left")
+    for column in ("name", "degrees of freedom", "mass", "clips"):
+        table.add_column(column)
+    for name in shipped_characters():
+        character = load_character(name)
+        clips = ", ".join(available_clips(character)) or "-"
+        base = "floating" if character.layout.has_floating_base else "fixed"
+        freedom = f"{character.layout.size}, {base} base"
+        table.add_row(name, freedom, f"{character.mass:.3g} kg", clips)
+    Console().print(table)
+
+
+def _parameters(options: argparse.Namespace) -> None:
+    listed = _parameters_of(options.node, options.character)
+    table = Table(title=f"parameters of {options.node}", title_justify="left")
+    for column in ("name", "default", "unit", "description"):
+        table.add_column(column, overflow="fold")
+    for parameter in listed:
+        choices = f": {' | '.join(parameter.choices)}" if parameter.choices else ""
+        live = " (live)" if parameter.live else ""
+        default = _shortened(parameter.default)
+        table.add_row(
+            parameter.name, escape(default), parameter.unit, parameter.description + choices + live
+        )
+    Console().print(table)
+
+
+def _parameters_of(node: str, character_name: str) -> list[Parameter]:
+    from actuated_characters.recorder import node as recorder
+    from controller_node import parameters as controller
+    from msgs_config.character.loading import load_character
+    from sim_node import parameters as simulator
+
+    if node == "recorder":
+        return recorder.PARAMETERS
+    character = load_character(character_name)
+    if node == "sim_node":
+        own = simulator.character_parameters(character)
+        return [simulator.CHARACTERS, *simulator.PARAMETERS, *own]
+    return controller.PARAMETERS + controller.character_parameters(character)
+
+
+def _shortened(value: object) -> str:
+    """A default as a table shows it; a long list by its first entries."""
+    if isinstance(value, list):
+        shown = ", ".join(f"{item:g}" if isinstance(item, float) else item for item in value[:3])
+        return f"[{shown}, ... {len(value)} in all]" if len(value) > 3 else f"[{shown}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,47 @@
+"""The command `actuated_characters report`: a page about a recorded run."""
+
+import argparse
+from pathlib import Path
+
+from msgs_config.errors import ConfigurationError
+
+_STILLS = 8
+_MOST_STILLS = 100
+
+
+def add_report(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters`."""
+    report = commands.add_parser(
+        "report",
+        help="draw a recorded run's figures as a page",
+        description=(
+            "Draw the tracking error of each joint, the torques against their limits, the root's "
+            "path against the reference, contacts, and tick times, with pushes, resets and "
+            "changed parameters marked: an HTML page that needs nothing beside itself, and its "
+            "pictures as PNG files."
+        ),
+        epilog="example: actuated_characters report runs/demo",
+    )
+    report.set_defaults(command=_report)
+    report.add_argument("bag", type=Path, metavar="BAG", help="a run's directory, or a bag")
+    report.add_argument(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="where page and pictures go (RUN/report, or BAG-report); an old report is replaced",
+    )
+    report.add_argument(
+        "--stills",
+        type=int,
+        default=_STILLS,
+        metavar="N",
+        help="pictures of the character, side by side (%(default)s); 0: none",
+    )
+
+
+def _report(options: argparse.Namespace) -> None:
+    if not 0 <= options.stills <= _MOST_STILLS:
+        raise ConfigurationError(f"--stills is {options.stills}; it must be 0 to {_MOST_STILLS}")
+    from actuated_characters.report.writing import write_report
+
+    print(write_report(options.bag, options.output, stills=options.stills))

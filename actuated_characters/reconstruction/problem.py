@@ -1,0 +1,70 @@
+"""What is to be reconstructed: a motion over some time, under a run's parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.planned_wrenches import PlannedPush, parsed_push
+from controller_node.planner.settings import PREDICTIVE, RECORDED
+from controller_node.references.files.clip import read_clip
+from msgs_config.character.loading import load_character
+from msgs_config.errors import ConfigurationError
+
+_PLANNING = {
+    "planner": PREDICTIVE,
+    "plan.knots": 0.2,  # s
+    "plan.samples": 48,
+    "plan.rounds": 1,  # other worlds look further
+}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A motion and how it is run; small, so that every process can make its own plan of it."""
+
+    character: str
+    clip: str
+    duration: float  # s
+    simulator: Mapping[str, object] = field(default_factory=dict)
+    controller: Mapping[str, object] = field(default_factory=dict)
+    pushes: tuple[str, ...] = ()  # LINK:FX,FY,FZ@S, which come in the search, too
+
+    def planned_pushes(self, plan: Plan) -> tuple[PlannedPush, ...]:
+        """The pushes of its plan. Raises ConfigurationError if one is wrong."""
+        return tuple(parsed_push(text, plan) for text in self.pushes)
+
+    def plan(self) -> Plan:
+        """The run in which the motion is planned, with one thread.
+
+        Raises:
+            ActuatedCharactersError: a name or value is wrong.
+        """
+        return self._plan(self.clip, {**_PLANNING, **self.controller, "plan.workers": 1})
+
+    def plan_of(self, file: Path) -> Plan:
+        """The run in which a file's plan is played. Raises ActuatedCharactersError likewise."""
+        return self._plan(str(file), self.played_with)
+
+    @property
+    def played_with(self) -> dict[str, object]:
+        """The controller's parameters with which a file is played."""
+        return {**self.controller, "planner": RECORDED}
+
+    def _plan(self, clip: str, controller: Mapping[str, object]) -> Plan:
+        reference = {"reference": "clip", "clip": clip}
+        return make_plan(self.character, self.duration, reference, self.simulator, controller)
+
+
+def duration_of(character: str, clip: str, cycles: int) -> float:
+    """How long some cycles of a clip last, s.
+
+    Raises:
+        ActuatedCharactersError: there is no such clip, or it does not go on from its end.
+    """
+    frames = read_clip(load_character(character), clip)
+    if cycles < 1:
+        raise ConfigurationError(f"--cycles is {cycles}; it must be 1 or more")
+    if cycles > 1 and not frames.wraps:
+        raise ConfigurationError(f"--cycles is {cycles}; the clip '{clip}' ends, it must be 1")
+    return cycles * float(frames.times[-1])

@@ -1,0 +1,124 @@
+"""A reconstruction from its beginning, or its checkpoint, to a file that is verified."""
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from actuated_characters.reconstruction.checkpoint import (
+    checkpoint_path,
+    read_checkpoint,
+    write_checkpoint,
+)
+from actuated_characters.reconstruction.problem import Problem
+from actuated_characters.reconstruction.search import Progress, Settings, result, search
+from actuated_characters.reconstruction.tree import Node
+from actuated_characters.reconstruction.verification import Figures, verified
+from actuated_characters.reconstruction.workers import Workers
+from actuated_characters.runs.plan import Plan
+from actuated_characters.whole_files import write_whole
+from controller_node.references.files.clip import clip_path
+from controller_node.references.files.reconstructed import PLAN, RECONSTRUCTION
+from controller_node.references.offsets import RecordedPlan
+from msgs_config.errors import RunError
+from msgs_config.shared_parameters import COMMAND_DELAY
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """What has been reconstructed."""
+
+    figures: Figures
+    windows: int
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be reconstructed, how, and into which file."""
+
+    problem: Problem
+    settings: Settings
+    output: Path
+    workers: int = 1
+    resume: bool = False
+
+    @property
+    def key(self) -> dict[str, Any]:
+        """What a checkpoint must agree on."""
+        return {**asdict(self.problem), **self.settings.content()}
+
+
+def reconstruct(
+    job: Job, report: Callable[[Progress, int], None] = lambda *_: None
+) -> Reconstruction:
+    """Search, write the file, and run it from a fresh world.
+
+    `report` is told the progress and the number of windows. The checkpoint is removed when all is
+    done, and stays in any other case.
+
+    Raises:
+        RunError: it failed too often without getting any further; the file has what was found
+            until there.
+        SimulationError: the file's run is not what was found.
+        ActuatedCharactersError: a name or value is wrong.
+    """
+    checkpoint, plan = checkpoint_path(job.output), job.problem.plan()
+    window = max(round(job.settings.window * plan.simulator.integer("rate")), 1)
+    windows = -(-plan.ticks // window)
+    progress = read_checkpoint(checkpoint, job.key) if job.resume else Progress([])
+
+    def after_window(progress: Progress) -> None:
+        write_checkpoint(checkpoint, job.key, progress)
+        report(progress, windows)
+
+    report(progress, windows)
+    with Workers(job.problem, window, job.workers) as workers:
+        stuck_at = search(workers, windows, job.settings, progress, after_window)
+    best = result(progress)
+    if best is None:
+        raise RunError("all worlds were lost in the first window; nothing was written")
+    _write(job, plan, best, None)
+    if stuck_at is not None:
+        raise RunError(
+            f"{job.settings.tries} failures without getting any further, at last at window "
+            f"{stuck_at + 1} of {windows}; {job.output} has the best attempt, "
+            f"{best.tick / plan.simulator.integer('rate'):.2f} s long; --resume tries again"
+        )
+    figures = verified(job.problem, job.output, best)
+    _write(job, plan, best, figures)
+    checkpoint.unlink(missing_ok=True)
+    return Reconstruction(figures, windows)
+
+
+def _write(job: Job, plan: Plan, best: Node, figures: Figures | None) -> None:
+    """Write the file: the clip, the plan that keeps it, and what they are of."""
+    problem, rate = job.problem, plan.simulator.integer("rate")
+    delay = plan.simulator.integer(COMMAND_DELAY.name)
+    made, last = [part for node in best.path for part in node.plans], best.tick + delay
+    following = [*(tick for tick, _ in made[1:]), last]
+    parts = tuple(
+        (tick, offsets.during(tick, then - tick))
+        for (tick, offsets), then in zip(made, following, strict=True)
+    )
+    found = RecordedPlan(rate, last, parts)
+    clip = json.loads(clip_path(plan.character, problem.clip).read_text(encoding="utf-8"))
+    content = {
+        "Loop": clip["Loop"],
+        PLAN: found.content(plan.character.layout.dof_names[6:]),
+        RECONSTRUCTION: {
+            "character": problem.character,
+            "clip": problem.clip,
+            "duration": problem.duration if best.tick == plan.ticks else best.tick / rate,
+            "parameters": {
+                "sim_node": dict(problem.simulator),
+                "controller_node": problem.played_with,
+            },
+            "pushes": list(problem.pushes),
+            "settings": job.settings.content(),
+            "costs": [node.cost for node in best.path],
+            "figures": None if figures is None else asdict(figures),
+        },
+        "Frames": clip["Frames"],
+    }
+    write_whole(job.output, json.dumps(content, allow_nan=False) + "\n")

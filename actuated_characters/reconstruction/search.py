@@ -1,0 +1,166 @@
+"""Sampling-based motion control whose samples plan ahead: window by window, the best worlds stay.
+
+Some worlds go on from the states that were kept, each with plans of its own. After a window the
+best of them are kept, by what the last windows cost and by what going on as planned will cost, and
+the others go on from these.
+
+Source: Liu, Yin, van de Panne, Shao and Xu 2010, "Sampling-based Contact-rich Motion Control"
+(windows, samples, survivors). There a sample is an offset drawn at random; here it is a plan.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from actuated_characters.reconstruction.tree import Node
+from actuated_characters.reconstruction.world import Branch, Grown
+from msgs_config.errors import ConfigurationError, SimulationError
+
+_RECENT = 4  # windows whose costs count beside what is ahead
+_FURTHEST_BACK = 16  # windows
+_PLACES = _FURTHEST_BACK + 1  # windows of which places are kept
+_MOST_WORLDS, _MOST_FAILURES = 2**10, 2**10  # each has seeds of its own
+_LARGEST_SEED = 2**32
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A search's settings: the same ones give the same result on any number of processes."""
+
+    worlds: int = 8
+    kept: int = 2  # of them, after each window
+    window: float = 0.1  # s
+    seed: int = 1
+    tries: int = 4  # failures without getting any further, going back further each time
+
+    def check(self) -> None:
+        """Raise ConfigurationError where a number cannot be used."""
+        for name, value, least, most in (
+            ("worlds", self.worlds, 1, _MOST_WORLDS),
+            ("kept", self.kept, 1, self.worlds),
+            ("window", self.window, 0.01, 10.0),
+            ("seed", self.seed, 0, _LARGEST_SEED),
+        ):
+            if not least <= value <= most:
+                raise ConfigurationError(f"--{name} is {value:g}; it must be {least:g} to {most:g}")
+
+    def content(self) -> dict[str, Any]:
+        """The settings as JSON has them."""
+        return asdict(self)
+
+
+@dataclass
+class Progress:
+    """Where a search is; all that it needs to go on, beside its problem and settings."""
+
+    levels: list[list[Node]]  # of each window's kept nodes
+    failures: int = 0  # windows in which all worlds were lost
+    stuck: int = 0  # of these, since the furthest window was reached
+    best: Node | None = None  # of the furthest window that was reached
+
+    @property
+    def window(self) -> int:
+        """The window that comes next."""
+        return len(self.levels)
+
+
+class Worlds(Protocol):
+    """Grow branches."""
+
+    def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | None]:
+        """What becomes of branches, in their order."""
+
+
+def search(
+    worlds: Worlds,
+    windows: int,
+    settings: Settings,
+    progress: Progress,
+    report: Callable[[Progress], None],
+) -> int | None:
+    """Go on to the last window; returns None, or the number of a window where it is stuck.
+
+    Where all worlds are lost it goes back, twice as far each time (at most 16 windows) until it
+    gets further than ever: who is going to fall has long been beyond help when it does.
+
+    Raises:
+        SimulationError: what was found before is not repeated.
+        ActuatedCharactersError: a process failed.
+    """
+    while progress.window < windows:
+        furthest = 0 if progress.best is None else len(progress.best.path)
+        nodes = _next_level(worlds, settings, progress)
+        if nodes:
+            progress.levels.append(nodes)
+            if progress.window > furthest:
+                progress.stuck = 0
+            if progress.window >= furthest:
+                progress.best = nodes[0]
+            for node in [node for level in progress.levels[:-_PLACES] for node in level]:
+                node.place = None
+        else:
+            failed = progress.window
+            progress.failures += 1
+            progress.stuck += 1
+            del progress.levels[max(failed - min(2**progress.stuck, _FURTHEST_BACK), 0) :]
+            if progress.stuck >= settings.tries:
+                progress.stuck = 0  # who resumes it wants it to try again
+                report(progress)
+                return failed
+        report(progress)
+    return None
+
+
+def result(progress: Progress) -> Node | None:
+    """The best path that was found, to the last level or to the furthest window that was reached.
+
+    Of the last level it is that of the least mean cost; None where even the first window failed.
+    """
+    if progress.best is None or len(progress.best.path) > progress.window:
+        return progress.best
+    return min(progress.levels[-1], key=lambda node: float(np.mean([n.cost for n in node.path])))
+
+
+def _next_level(worlds: Worlds, settings: Settings, progress: Progress) -> list[Node]:
+    """The nodes that are kept of the next window, the best first; none if all are lost."""
+    parents: list[Node | None] = list(progress.levels[-1]) if progress.levels else [None]
+    _come_again(worlds, [node for node in parents if node is not None and node.place is None])
+    count = settings.worlds
+    owners = [parents[index * len(parents) // count] for index in range(count)]
+    seeds = [_seed(settings, progress, index) for index in range(count)]
+    branches = [
+        Branch(None if parent is None else parent.place, (seed,))
+        for parent, seed in zip(owners, seeds, strict=True)
+    ]
+    nodes = [
+        _node(parent, seed, grown)
+        for parent, seed, grown in zip(owners, seeds, worlds.grow(branches), strict=True)
+        if grown is not None
+    ]
+    return sorted(nodes, key=_value)[: settings.kept]  # equal ones stay in their order
+
+
+def _come_again(worlds: Worlds, nodes: Sequence[Node]) -> None:
+    """Have places of nodes, after a search was resumed."""
+    for node, grown in zip(nodes, worlds.grow([node.again() for node in nodes]), strict=True):
+        if grown is None or grown.end.tobytes() != node.end.tobytes():
+            raise SimulationError(
+                "what the checkpoint says is not repeated; it is of another version or machine"
+            )
+        node.place = grown.place
+
+
+def _value(node: Node) -> float:
+    recent = [each.cost for each in node.path[-_RECENT:]]
+    return float(np.mean(recent)) + node.ahead
+
+
+def _seed(settings: Settings, progress: Progress, world: int) -> int:
+    return (settings.seed * _MOST_FAILURES + progress.failures) * _MOST_WORLDS + world
+
+
+def _node(parent: Node | None, seed: int, grown: Grown) -> Node:
+    place = grown.place
+    return Node(parent, place.tick, seed, grown.plans, grown.end, grown.cost, grown.ahead, place)

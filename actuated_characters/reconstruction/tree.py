@@ -1,0 +1,37 @@
+"""The tree of what was kept: each node is a window of a world, from the one before it on."""
+
+from dataclasses import dataclass
+
+from actuated_characters.reconstruction.world import Branch, Place
+from controller_node.references.offsets import Offsets
+from msgs_config.arrays import FloatArray
+
+
+@dataclass(eq=False)
+class Node:
+    """A world at the end of a window, from its parent on."""
+
+    parent: "Node | None"  # None: it began in the first state
+    tick: int  # at its end, since the first state
+    seed: int  # of the samples of its plans
+    plans: tuple[tuple[int, Offsets], ...]  # that were made in it, by the tick at which they begin
+    end: FloatArray  # (2 n,) position and velocity
+    cost: float  # of the window
+    ahead: float  # of going on as planned
+    place: Place | None = None  # as long as it is kept
+
+    @property
+    def path(self) -> "list[Node]":
+        """The nodes from the first window's to this one."""
+        nodes = [self]
+        while nodes[-1].parent is not None:
+            nodes.append(nodes[-1].parent)
+        return nodes[::-1]
+
+    def again(self) -> Branch:
+        """What a world needs to come here once more, from the last place before that is kept."""
+        seeds, node = [self.seed], self.parent
+        while node is not None and node.place is None:
+            seeds.append(node.seed)
+            node = node.parent
+        return Branch(None if node is None else node.place, tuple(seeds[::-1]))

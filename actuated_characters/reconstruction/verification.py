@@ -1,0 +1,101 @@
+"""Simulates a reconstruction again, from a fresh world, as a run of its file does."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from actuated_characters.metrics.run_metrics import Measurement
+from actuated_characters.reconstruction.problem import Problem
+from actuated_characters.reconstruction.tree import Node
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import Plan
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.layout import JointLayout, JointType
+from msgs_config.errors import SimulationError
+from msgs_config.messages import configuration
+from msgs_config.messages.clock import TickClock
+from msgs_config.messages.state import StampedState
+
+
+@dataclass(frozen=True)
+class Figures:
+    """How well a reconstruction follows its motion."""
+
+    ticks: int
+    fell: bool
+    centre_error_mean_m: float
+    joint_error_mean_rad: float
+    least_root_height_m: float
+    state_hash: str
+
+
+def verified(problem: Problem, file: Path, best: Node) -> Figures:
+    """Run a reconstruction's file from a fresh world, and measure it.
+
+    Raises:
+        SimulationError: the states are not those of the search, to the bit.
+    """
+    plan, motion = problem.plan_of(file), problem.plan().reference
+    clock = TickClock(plan.simulator.integer("rate"))
+    ends = {node.tick: node for node in best.path}
+    known = configuration.parse(configuration.describe(plan.character, plan.simulator))
+    measurement = Measurement(known)
+    positions: list[FloatArray] = []
+    motions: list[FloatArray] = []
+    for count, tick in enumerate(ticks_in_process(plan, problem.planned_pushes(plan)), start=1):
+        if count == 1:
+            measurement.add_state(tick.state)
+        measurement.add_state(tick.following)
+        measurement.add_tick(tick)
+        time = clock.time_after(count)
+        positions.append(tick.following.position)
+        motions.append(motion.sample(time).configuration.position)
+        if count in ends:
+            _check_equal(tick.following, ends[count], time)
+        if count == best.tick:
+            break
+    summary = measurement.summary(wall_time=0.0)
+    return Figures(
+        ticks=len(positions),
+        fell=bool(summary["fell"]),
+        centre_error_mean_m=centre_error(plan, positions, motions),
+        joint_error_mean_rad=joint_error(plan.character.layout, positions, motions),
+        least_root_height_m=float(min(position[2] for position in positions)),
+        state_hash=measurement.state_hash,
+    )
+
+
+def _check_equal(state: StampedState, node: Node, time: float) -> None:
+    found = np.concatenate((state.position, state.velocity))
+    if found.tobytes() != node.end.tobytes():
+        raise SimulationError(
+            f"the search's states are not repeated: at {time:g} s "
+            f"{np.abs(found - node.end).max():.3g} away"
+        )
+
+
+def centre_error(
+    plan: Plan, positions: Sequence[FloatArray], motions: Sequence[FloatArray]
+) -> float:
+    """Mean distance in m of the centre of mass from the motion's, over states (n,) each."""
+    centre = DynamicsModel(plan.character).centre_of_mass_at
+    pairs = zip(positions, motions, strict=True)
+    return float(np.mean([np.linalg.norm(centre(here) - centre(there)) for here, there in pairs]))
+
+
+def joint_error(
+    layout: JointLayout, positions: Sequence[FloatArray], motions: Sequence[FloatArray]
+) -> float:
+    """Mean angle in rad between the joints' rotations and the motion's, over states (n,) each."""
+    rotates = [
+        joint.type in (JointType.REVOLUTE, JointType.SPHERICAL)
+        for joint in layout.joints
+        for _ in joint.vectors
+    ]
+    difference = layout.difference(
+        layout.configuration(np.array(motions)), layout.configuration(np.array(positions))
+    )
+    return float(layout.norms(difference)[:, rotates].mean())

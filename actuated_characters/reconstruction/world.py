@@ -1,0 +1,143 @@
+"""A world in which a motion is tried: the simulation and the planning controller of a run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuated_characters.reconstruction.problem import Problem
+from actuated_characters.runs.planned_wrenches import push_schedule
+from controller_node.parameters import make_controller
+from controller_node.planner.planner import PlannerMemory, PredictivePlanner
+from controller_node.references.base import ReferenceState
+from controller_node.references.offsets import Offsets
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.errors import SimulationError
+from sim_node.parameters import make_role, make_settings
+from sim_node.physics.simulation import Simulation, Snapshot
+
+_FARTHEST = 0.6  # m, of the centre of mass from the motion's
+_LOWEST = 0.5  # of the height of the motion's centre of mass
+
+
+@dataclass(frozen=True)
+class Place:
+    """A state of a world, from which any other world can go on."""
+
+    tick: int  # since the first state
+    snapshot: Snapshot
+    memory: PlannerMemory
+
+
+@dataclass(frozen=True)
+class Branch:
+    """What a world is to do: go on from a place, window after window."""
+
+    place: Place | None  # None: the first state
+    seeds: tuple[int, ...]  # of the samples of each window's plans
+
+
+@dataclass(frozen=True)
+class Grown:
+    """What has become of a branch, in its last window."""
+
+    place: Place
+    plans: tuple[tuple[int, Offsets], ...]  # that were made in it, by the tick at which they begin
+    end: FloatArray  # (2 n,) position and velocity
+    cost: float  # of the window's states, mean
+    ahead: float  # of going on as planned
+
+
+def is_lost(centre: FloatArray, wanted: FloatArray) -> bool:
+    """Whether a centre of mass (3,) is so far from the motion's that the motion is lost."""
+    return bool(np.linalg.norm(centre - wanted) > _FARTHEST or centre[2] < _LOWEST * wanted[2])
+
+
+class TrialWorld:
+    """One process's engine for a problem."""
+
+    def __init__(self, problem: Problem, window_ticks: int) -> None:
+        """Build world, controller and planner.
+
+        Raises:
+            ActuatedCharactersError: a name or value is wrong.
+        """
+        self.plan, self._window_ticks = problem.plan(), window_ticks
+        self._pushes = problem.planned_pushes(self.plan)
+        self._controller = make_controller(
+            self.plan.character, self.plan.reference, self.plan.controller
+        )
+        planner = self._controller.planner
+        assert isinstance(planner, PredictivePlanner)
+        self._planner = planner
+        self._period = planner.settings.period
+        self._centre_at = DynamicsModel(self.plan.character).centre_of_mass_at
+        self._simulation = self._fresh()
+        self._episode_ns = self._simulation.actors[0].state.stamp_ns
+
+    def close(self) -> None:
+        """End the engine."""
+        self._simulation.close()
+
+    def grow(self, branch: Branch) -> Grown | None:
+        """Simulate a branch's windows; None if it is lost."""
+        place = branch.place
+        if place is None:
+            self._simulation.close()  # only a new world returns to a state without a step
+            self._simulation = self._fresh()
+        else:
+            self._simulation.take_over(place.snapshot)
+        self._controller.begin_episode(self._episode_ns)  # it forgets what it planned before
+        tick = 0 if place is None else place.tick
+        memory = self._planner.memory() if place is None else place.memory
+        grown = None
+        for seed in branch.seeds:
+            self._planner.recall(memory, seed)
+            grown = self._window(tick, min(tick + self._window_ticks, self.plan.ticks))
+            if grown is None:
+                return None
+            tick, memory = grown.place.tick, grown.place.memory
+        return grown
+
+    def _window(self, first: int, last: int) -> Grown | None:
+        """Simulate the ticks of a window."""
+        plans: list[tuple[int, Offsets]] = []
+        costs: list[float] = []
+        before, gains = self._planner.plan, self._controller.settings.gains
+        (actor,) = self._simulation.actors
+        pushes = push_schedule(self.plan, self._pushes)
+        for tick in range(first, last):
+            effort, _ = self._controller.answer(actor.state, self._episode_ns)
+            made = self._planner.plan
+            if made is not None and made is not before:
+                plans.append((made.tick, made.offsets.during(made.tick, self._period)))
+                before = made
+            try:
+                self._simulation.step(
+                    [np.where(actor.commanded, effort, 0.0)], [pushes.take(self._simulation.tick)]
+                )
+            except SimulationError:
+                return None
+            if (tick + 1) % self._period == 0 or tick + 1 == last:
+                costs.append(self._planner.cost(tick + 1, actor.state, gains, self._desired))
+        if self._is_lost(last):
+            return None
+        state = actor.state
+        return Grown(
+            Place(last, self._simulation.snapshot(), self._planner.memory()),
+            tuple(plans),
+            np.concatenate((state.position, state.velocity)),
+            float(np.mean(costs)),
+            self._planner.cost_ahead(last, state, gains, self._desired),
+        )
+
+    def _desired(self, tick: int) -> ReferenceState:
+        return self.plan.reference.sample(self._controller.clock.time_after(tick))
+
+    def _is_lost(self, tick: int) -> bool:
+        here = self._centre_at(self._simulation.actors[0].state.position)
+        return is_lost(here, self._centre_at(self._desired(tick).configuration.position))
+
+    def _fresh(self) -> Simulation:
+        role = make_role(self.plan.character, self.plan.simulator)
+        return Simulation([role], make_settings(self.plan.simulator))

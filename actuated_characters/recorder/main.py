@@ -1,0 +1,23 @@
+"""The executable `recorder`."""
+
+from collections.abc import Callable
+from typing import NoReturn
+
+from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, stand_back
+
+
+def main() -> NoReturn:
+    """Run the recorder until a signal."""
+    limit_threads()
+    stand_back()
+    run_node(_load)
+
+
+def _load() -> Callable[[], RunnableNode]:
+    from actuated_characters.recorder.node import RecorderNode
+
+    return RecorderNode
+
+
+if __name__ == "__main__":
+    main()

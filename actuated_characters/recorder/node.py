@@ -1,0 +1,278 @@
+"""`recorder`: writes what goes over the topics into a bag, and measures it."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from actuated_characters.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
+from actuated_characters.bags.writer import BagWriter
+from actuated_characters.metrics.collector import HEARD, RunListener
+from actuated_characters.recorder.session_filter import Heard, SessionFilter, session_in
+from actuated_characters.recorder.topic_reader import Inbox
+from actuated_characters.recorder.topics import (
+    NamedTopics,
+    RecordedTopic,
+    contract_topics,
+    simulator_name,
+)
+from actuated_characters.runs.run_directory import BAG, figures_directory, write_figures
+from msgs_config.errors import ActuatedCharactersError, RecordingError
+from msgs_config.messages import topics
+from msgs_config.messages.clock import FIRST_TICK
+from msgs_config.messages.session import REMEDY, SESSION, given_session, named
+from msgs_config.parameters import Parameter, Values, resolve
+from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.polling import Spinner
+from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.ros_parameters import declare, given_parameters
+
+PARAMETERS = [
+    Parameter(
+        "directory",
+        "recording",
+        "where bag, summary.json and measurements.csv go; the figures of each of the parameter "
+        "characters go to a folder of its name in there",
+    ),
+    Parameter(
+        "characters",
+        [],
+        "characters that are recorded, each in a namespace of its own below the recorder's; none: "
+        "the one in the recorder's own namespace",
+        texts=True,
+    ),
+    Parameter("write_bag", True, "write the bag; without it the recorder only measures"),
+    Parameter("storage", MCAP, "how the bag is stored", choices=STORAGES),
+    Parameter("compression", NONE, "how the bag is compressed", choices=COMPRESSIONS),
+    Parameter("topics", [], "names of topics to record beside those of the contract", texts=True),
+    Parameter("exclude", [], "names of topics of the contract not to record", texts=True),
+    SESSION,
+    Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
+]
+_DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
+_LONGEST_END = 20.0  # s that what is on its way at the stop may take
+_AT_ONCE = 1000  # messages of a topic, between flushes and answers to services
+_SERVICE_PERIOD = 0.1  # s between turns of the executor, which looks at each of many topics
+_FLUSH_PERIOD = 0.5  # s: what was published longer ago outlives even a kill of the recorder
+_SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
+
+
+class RecorderNode(Node):
+    """Listens to everything and says nothing, so that it is never in the way of the loop."""
+
+    def __init__(self, **options: Any) -> None:
+        """Open the bag and the subscriptions; `options` are rclpy's own of every node.
+
+        Raises:
+            ActuatedCharactersError: a parameter is wrong, or the directory cannot be written to.
+        """
+        super().__init__(topics.RECORDER_NODE, **options)
+        values = resolve(PARAMETERS, given_parameters(self))
+        declare(self, PARAMETERS, values)
+        self._directory = Path(values.text("directory"))
+        self._progress_period = values.number("progress_period")
+        self._failure: str | None = None
+        self._warnings = Warnings(self)
+        self._filter = SessionFilter(given_session(values), self._warnings.say_once)
+        self._inboxes: list[Inbox] = []
+        characters = values.texts("characters") or ("",)
+        wanted = contract_topics(
+            self, characters, values.texts("exclude"), measured_only=not values.flag("write_bag")
+        )
+        names = values.texts("topics")
+        self._named = NamedTopics(self, names, {recorded.name for recorded in wanted})
+        self._listeners = {name: RunListener(simulator_name(self, name)) for name in characters}
+        self._bag = self._open_bag(values)
+        for recorded in wanted:
+            self._add(recorded, recorded.topic.qos)
+        self.get_logger().info(f"recording to {self._directory}")
+
+    def _open_bag(self, values: Values) -> BagWriter | None:
+        if not values.flag("write_bag"):
+            return None
+        storage, compression = values.text("storage"), values.text("compression")
+        return BagWriter(self._directory / BAG, storage=storage, compression=compression)
+
+    def _add(self, recorded: RecordedTopic, offered: QoSProfile) -> None:
+        """Record a topic from now on, whose publishers offer this."""
+        if self._bag is not None:
+            self._bag.add_topic(recorded.name, recorded.topic.message_type, offered)
+        self._inboxes.append(Inbox(self, recorded))
+
+    def run(self, stop: StopSignal) -> None:
+        """Record until `stop`, then take what is still on its way and write the figures.
+
+        Raises:
+            RecordingError: ticks were missing, or the bag could not be written.
+        """
+        spinner = Spinner(self, _SERVICE_PERIOD)
+        due = {self._search: 0.0, self._flush: 0.0, self._tell_progress: 0.0}
+        try:
+            while not stop:
+                self._drain()
+                spinner.serve()
+                now = time.monotonic()
+                for act, at in due.items():
+                    if at <= now:
+                        due[act] = now + act()
+                time.sleep(_DRAIN_PERIOD)
+            self._drain_rest()
+        finally:
+            spinner.close()
+            self._keep_all(self._filter.finish())
+            self._close_bag()
+        self._conclude()
+
+    def _drain_rest(self) -> None:
+        """Take what was there at the stop, as far as that is done in a reasonable time."""
+        deadline = time.monotonic() + _LONGEST_END
+        for _ in range(topics.LISTENING_DEPTH // _AT_ONCE):  # no more was there
+            if not self._drain(gives_way=False):
+                return
+            if time.monotonic() > deadline:
+                break
+        self.get_logger().warning("messages still came at the end; the last ones are not recorded")
+
+    def _search(self) -> float:
+        """Record topics whose first publisher has come; returns when to look again, s."""
+        for recorded, offered in self._named.look():
+            try:
+                self._add(recorded, offered)
+            except RecordingError as error:
+                self._fail(str(error))
+        return _SEARCH_PERIOD if self._named.missing else float("inf")
+
+    def _flush(self) -> float:
+        if self._bag is not None:
+            try:
+                self._bag.flush()
+            except RecordingError as error:
+                self._lose_bag(error)
+            else:
+                if self._progress_period > 0.0:
+                    print(f"flushed {self._last_tick}", flush=True)
+        return _FLUSH_PERIOD
+
+    def _tell_progress(self) -> float:
+        if self._progress_period == 0.0:
+            return float("inf")
+        print(f"tick {self._last_tick}", flush=True)
+        return self._progress_period
+
+    @property
+    def _last_tick(self) -> int:
+        """The last tick of which every character's state has come."""
+        return min(listener.last_tick for listener in self._listeners.values())
+
+    def _drain(self, *, gives_way: bool = True) -> int:
+        """Take some of each topic's messages, all of them if it keeps up, in the order of time.
+
+        While the loop runs the nodes in it go first; at the end the recorder does not give way,
+        or a flood from others would hold it up.
+        """
+        batch = [
+            Heard(inbox.recorded, raw, published_ns)
+            for inbox in self._inboxes
+            for published_ns, raw in inbox.take(_AT_ONCE)
+        ]
+        batch.sort(key=lambda message: message.published_ns)
+        for message in batch:
+            if kept := self._filter.take(message):
+                self._keep_all(kept)
+                if gives_way:
+                    os.sched_yield()
+        return len(batch)
+
+    def _keep_all(self, messages: list[Heard]) -> None:
+        for message in messages:
+            self._keep(message)
+
+    def _keep(self, message: Heard) -> None:
+        recorded, raw, published_ns = message
+        try:
+            if self._bag is not None:
+                self._bag.write(recorded.name, raw, published_ns)
+        except RecordingError as error:  # the run goes on, and is measured, without its bag
+            self._lose_bag(error)
+        if recorded.own_name not in HEARD:
+            return
+        for name, listener in self._listeners.items():
+            if recorded.character not in (None, name):
+                continue
+            try:
+                listener.take(recorded.own_name, raw, published_ns)
+            except ActuatedCharactersError as error:
+                sentence = f"cannot measure '{recorded.name}': {error}"
+                if self._filter.bound and session_in(message) is None:  # it may be from any node
+                    self._warnings.say_once(sentence)
+                else:
+                    self._fail(sentence)
+
+    def _lose_bag(self, error: RecordingError) -> None:
+        self._fail(str(error))
+        self._bag = None
+
+    def _close_bag(self) -> None:
+        try:
+            if self._bag is not None:
+                self._bag.close()
+        except RecordingError as error:
+            self._fail(str(error))
+
+    def _conclude(self) -> None:
+        """Write the figures and say what was lost.
+
+        Raises:
+            RecordingError: something failed, or states are missing.
+        """
+        for inbox in self._inboxes:
+            if inbox.lost:
+                self.get_logger().warning(f"'{inbox.recorded.name}': {inbox.lost} messages lost")
+        for name in sorted(self._named.missing):
+            self.get_logger().warning(f"nobody published on '{name}'")
+        for name, listener in self._listeners.items():
+            of_it = f" of '{name}'" if name else ""
+            try:
+                figures, series = listener.results()
+                if dropped := figures["dropped_references"]:
+                    self.get_logger().warning(f"{dropped} references{of_it} belong to no state")
+                lost = {
+                    "lost_messages": self._counts(name, lambda inbox: inbox.lost),
+                    "foreign_messages": self._counts(name, self._dropped),
+                }
+                directory = figures_directory(self._directory, name, is_alone=not name)
+                write_figures(directory, figures | lost, series)
+            except RecordingError as error:
+                self._fail(f"{error}{of_it}")
+            if listener.last_tick <= FIRST_TICK and self._filter.dropped(self._states_of(name)):
+                self._fail(
+                    f"session {named(self._filter.bound)}{of_it} was recorded and never answered, "
+                    f"while others published states, too; {REMEDY}, or set '{SESSION.name}'"
+                )
+            if listener.missing_ticks:
+                self._fail(f"{listener.missing_ticks} ticks{of_it} were missed")
+        if self._failure is not None:
+            raise RecordingError(self._failure)
+
+    def _states_of(self, character: str) -> str:
+        return self.resolve_topic_name(topics.JOINT_STATES.under(character).name)
+
+    def _dropped(self, inbox: Inbox) -> int:
+        return self._filter.dropped(inbox.recorded.name)
+
+    def _counts(self, character: str, count: Callable[[Inbox], int]) -> dict[str, int]:
+        """By topic of a character, how many messages were lost or dropped, where any were."""
+        return {
+            inbox.recorded.name: count(inbox)
+            for inbox in self._inboxes
+            if count(inbox) and inbox.recorded.character in (None, character)
+        }
+
+    def _fail(self, sentence: str) -> None:
+        if self._failure is None:
+            self._failure = sentence
+            self.get_logger().error(sentence)

@@ -1,0 +1,111 @@
+"""Lets the messages of one simulator through to a recording, and drops those of others."""
+
+import json
+from collections import deque
+from collections.abc import Callable
+from typing import NamedTuple
+
+from std_msgs.msg import String
+
+from actuated_characters.recorder.topics import RecordedTopic
+from msgs_config.errors import MessageError
+from msgs_config.messages import topics
+from msgs_config.messages.joint_state import decode, frame_id_of
+from msgs_config.messages.session import ForeignSessions, episode_session, session_of
+
+_MOST_HELD = 1000  # messages before the first state: few topics speak then
+
+_ALWAYS_NAMED = {
+    topic.name
+    for topic in (
+        topics.JOINT_STATES,
+        topics.CONTACTS,
+        topics.APPLIED_WRENCH,
+        topics.APPLIED_THROW,
+        topics.THROWN,
+    )
+}
+_SOMETIMES_NAMED = {
+    topics.JOINT_TORQUES.name,
+    topics.REFERENCE.of(topics.CONTROLLER_NODE).name,
+    topics.EXTERNAL_WRENCH.name,
+    topics.THROW.name,
+}
+_CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
+
+
+class Heard(NamedTuple):
+    """A message as the recorder has taken it."""
+
+    recorded: RecordedTopic
+    raw: bytes
+    published_ns: int
+
+
+def session_in(message: Heard) -> str | None:
+    """The session that a message is of; None if it may be of any."""
+    name = message.recorded.own_name
+    try:
+        if name in _ALWAYS_NAMED:
+            return session_of(frame_id_of(message.raw))
+        if name in _SOMETIMES_NAMED:
+            return session_of(frame_id_of(message.raw)) or None
+        if name == topics.EPISODE.name:
+            return episode_session(frame_id_of(message.raw))
+        if name == _CONFIGURATION:
+            return session_of(str(json.loads(decode(message.raw, String).data)["session"]))
+    except (MessageError, ValueError, KeyError, TypeError, RecursionError):
+        return None if name in _SOMETIMES_NAMED else session_of("")
+    return None
+
+
+class SessionFilter:
+    """Belongs to the session that is given, or to the first whose state comes, and to no other.
+
+    What others say is dropped and counted. What comes before the first state is held until then.
+    """
+
+    def __init__(self, given: str, tell: Callable[[str], None]) -> None:
+        """`tell` is told a line for each session that is dropped."""
+        self.bound: str | None = given or None
+        self._foreign = ForeignSessions()
+        self._tell = tell
+        self._held: deque[tuple[str, Heard]] = deque(maxlen=_MOST_HELD)
+
+    def dropped(self, topic: str) -> int:
+        """How many messages of a topic, by its name in the bag, were dropped."""
+        return self._foreign.counts[topic]
+
+    def take(self, message: Heard) -> list[Heard]:
+        """The messages to record now that this one has come, in their order."""
+        session = session_in(message)
+        if session is None:
+            return [message]
+        if self.bound is None and message.recorded.own_name == topics.JOINT_STATES.name:
+            return [*self._bind(session), message]
+        if self.bound is None:
+            self._held.append((session, message))
+            return []
+        if session != self.bound:
+            self._drop(session, message)
+            return []
+        return [message]
+
+    def finish(self) -> list[Heard]:
+        """What is left to record at the end: that of the only simulator, if it had no state yet."""
+        sessions = {session for session, _ in self._held}
+        return self._bind(sessions.pop()) if len(sessions) == 1 else []
+
+    def _bind(self, session: str) -> list[Heard]:
+        self.bound = session
+        own = [message for of, message in self._held if of == session]
+        for of, message in self._held:
+            if of != session:
+                self._drop(of, message)
+        self._held.clear()
+        return own
+
+    def _drop(self, session: str, message: Heard) -> None:
+        line = self._foreign.reject(message.recorded.name, session, self.bound)
+        if line is not None:
+            self._tell(line)

@@ -1,0 +1,54 @@
+"""One topic as the recorder hears it: every message once, in order, and how many never came."""
+
+from collections.abc import Iterator
+
+from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
+from rclpy.node import Node
+
+from actuated_characters.recorder.loss_count import LossCount
+from actuated_characters.recorder.topics import RecordedTopic
+from msgs_config.runtime.polling import DirectSubscription
+
+
+class Inbox:
+    """Takes all messages of a topic, with a queue that outlasts long pauses."""
+
+    def __init__(self, node: Node, recorded: RecordedTopic) -> None:
+        """Subscribe. Publishers whose quality of service does not fit are said, once."""
+        self._node = node
+        self.recorded = recorded
+        self._loss = LossCount(lambda: int(node.count_publishers(recorded.name)))
+        self._last_ns = 0
+        self._is_refused = False
+        self._subscription = DirectSubscription(
+            node,
+            recorded.topic.for_listener(),
+            SubscriptionEventCallbacks(incompatible_qos=self._refuse, use_default_callbacks=False),
+        )
+
+    @property
+    def lost(self) -> int:
+        """How many messages never came, between those that did."""
+        return self._loss.lost
+
+    def take(self, most: int) -> Iterator[tuple[int, bytes]]:
+        """What is there: wall time in ns at which it was published, and the message.
+
+        No more than `most`: who publishes faster than this can take would otherwise never let it
+        end. The wall clock may be set back; the times of a topic are not.
+        """
+        for _ in range(most):
+            received = self._subscription.take_received()
+            if received is None:
+                break
+            self._loss.take(received.number)
+            self._last_ns = max(received.published_ns, self._last_ns)
+            yield self._last_ns, received.raw
+
+    def _refuse(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
+        if not self._is_refused:
+            self._is_refused = True
+            self._node.get_logger().warning(
+                f"a publisher of '{self.recorded.name}' is not recorded: its QoS does not fit "
+                f"({info.last_policy_kind.name})"
+            )

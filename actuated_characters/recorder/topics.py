@@ -1,0 +1,174 @@
+"""Which topics are recorded: those of the contract, and others that are asked for by name."""
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.validate_topic_name import validate_topic_name
+
+from actuated_characters.metrics.collector import HEARD
+from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.messages import topics
+from msgs_config.messages.topics import Topic
+
+_OF_ALL = [topics.CLOCK, topics.DIAGNOSTICS]
+_OF_WORLD = [topics.THROW, topics.APPLIED_THROW, topics.THROWN]
+# The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
+_OF_EACH = [
+    topics.EPISODE,
+    topics.ROBOT_DESCRIPTION,
+    topics.CONFIGURATION.of(topics.SIM_NODE),
+    topics.CONFIGURATION.of(topics.CONTROLLER_NODE),
+    topics.INITIAL_STATE.of(topics.CONTROLLER_NODE),
+    topics.EXTERNAL_WRENCH,
+    topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE),
+    topics.ACTIVE_TRAJECTORY.of(topics.CONTROLLER_NODE),
+    topics.STRENGTH.of(topics.CONTROLLER_NODE),
+    topics.ACTIVE_STRENGTH.of(topics.CONTROLLER_NODE),
+    topics.MODE.of(topics.CONTROLLER_NODE),
+    topics.PLAN.of(topics.CONTROLLER_NODE),
+    topics.CONTACTS,
+    topics.APPLIED_WRENCH,
+    topics.ODOM,
+    topics.VISUALIZATION,
+    topics.REFERENCE.of(topics.CONTROLLER_NODE),
+    topics.NET_WRENCH.of(topics.CONTROLLER_NODE),
+    topics.JOINT_TORQUES,
+    topics.JOINT_STATES,
+]
+EXCLUDABLE = sorted(
+    {topic.name for topic in (*_OF_ALL, *_OF_WORLD, *_OF_EACH)}
+    - {
+        topics.JOINT_STATES.name,  # without them nothing can be measured or repeated,
+        topics.JOINT_TORQUES.name,  # and controllers wait for who listens
+        topics.CONFIGURATION.of(topics.SIM_NODE).name,
+    }
+)
+"""Topics that a recording may do without."""
+
+
+@dataclass(frozen=True)
+class RecordedTopic:
+    """A topic that the recorder listens to."""
+
+    topic: Topic  # its name below the recorder's namespace
+    name: str  # in the bag, absolute
+    own_name: str  # below its character
+    character: str | None  # whose it is; None if it is of all, or of nobody
+
+
+def contract_topics(
+    node: Node, characters: Sequence[str], exclude: Sequence[str], *, measured_only: bool
+) -> list[RecordedTopic]:
+    """The contract's topics of these characters but the excluded ones, in the order to subscribe.
+
+    Args:
+        node: The recorder, in whose namespace the characters are.
+        characters: Their names; that of a character alone in its namespace is empty.
+        exclude: Names of topics, below each character or resolved.
+        measured_only: Take only what the figures are made of.
+
+    Raises:
+        ConfigurationError: a name is of no topic that can be left out, or of no character.
+    """
+    twice = [name for name, count in Counter(characters).items() if count > 1]
+    if twice:
+        raise ConfigurationError(f"parameter 'characters' has '{twice[0]}' twice")
+    _check_names("characters", characters)
+    found = [_recorded(node, topic, None) for topic in (*_OF_ALL, *_OF_WORLD)]
+    found += [_recorded(node, topic, name) for topic in _OF_EACH for name in characters]
+    left_out: list[RecordedTopic] = []
+    for name in exclude:
+        matching = [each for each in found if name in (each.own_name, each.name)]
+        if not matching or any(each.own_name not in EXCLUDABLE for each in matching):
+            wrong = one_of("topic to exclude:", name, EXCLUDABLE)
+            raise ConfigurationError(f"parameter 'exclude': {wrong}")
+        left_out += matching
+    return [
+        each
+        for each in found
+        if each not in left_out and (each.own_name in HEARD or not measured_only)
+    ]
+
+
+def simulator_name(node: Node, character: str) -> str:
+    """The name of the simulator's status on `/diagnostics` that is about a character."""
+    below = f"{character}/" if character else ""
+    return node.resolve_topic_name(f"{below}{topics.SIM_NODE}").lstrip("/")
+
+
+def _recorded(node: Node, topic: Topic, character: str | None) -> RecordedTopic:
+    below = topic.under(character or "")
+    return RecordedTopic(below, node.resolve_topic_name(below.name), topic.name, character)
+
+
+class NamedTopics:
+    """Looks for topics by their names alone: the publishers say type and quality of service."""
+
+    def __init__(self, node: Node, names: Sequence[str], known: Collection[str]) -> None:
+        """Look for all names, resolved, but those that are known.
+
+        Raises:
+            ConfigurationError: a name is not one that a topic can have.
+        """
+        self._node = node
+        _check_names("topics", names)
+        resolved = [node.resolve_topic_name(name) for name in names]
+        self.missing = {name for name in resolved if name not in known}
+        """Names of which no publisher was seen so far."""
+
+    def look(self) -> Iterator[tuple[RecordedTopic, QoSProfile]]:
+        """Those that have a publisher now, each once, with what the first one offers.
+
+        A type that is not installed is said, and the topic not looked for any more.
+        """
+        for name in sorted(self.missing):
+            offers = self._node.get_publishers_info_by_topic(name)
+            if not offers:
+                continue
+            self.missing.discard(name)
+            message_type = _message_type(offers[0].topic_type)
+            if message_type is None:
+                self._node.get_logger().error(
+                    f"'{name}' is not recorded: its type {offers[0].topic_type} is not installed"
+                )
+                continue
+            profiles = [offer.qos_profile for offer in offers]
+            topic = Topic(name, message_type, fitting_qos(profiles))
+            yield RecordedTopic(topic, name, name, None), profiles[0]
+
+
+def fitting_qos(offers: Sequence[QoSProfile]) -> QoSProfile:
+    """The most that a subscription can ask for and still hear all of these publishers."""
+    reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in offers)
+    latched = all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=1,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _check_names(parameter: str, names: Sequence[str]) -> None:
+    """Raise ConfigurationError if one of a parameter's names is none for ROS."""
+    for name in filter(None, names):
+        try:
+            validate_topic_name(name)
+        except InvalidTopicNameException as error:
+            reason = str(error).removeprefix("Invalid topic name: ").partition(":\n")[0]
+            raise ConfigurationError(f"parameter '{parameter}' has {name!r}: {reason}") from error
+
+
+def _message_type(name: str) -> Any:
+    """The class of a type such as `std_msgs/msg/String`; None if it is not installed."""
+    *namespace, last = name.split("/")
+    try:
+        return getattr(import_module(".".join(namespace)), last)
+    except (ImportError, AttributeError, ValueError):
+        return None

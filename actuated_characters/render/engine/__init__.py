@@ -1,0 +1,1 @@
+"""Pictures of posed characters: camera, shapes, ground and compositing."""

@@ -1,0 +1,143 @@
+"""The plane z = 0 as a chequerboard: what a view sees of it, by geometry. No engine.
+
+It always has one grid, that of the world, so that it shows how far a character has gone. Upright
+pictures see one row of pixels of it in one distance along the camera's axis.
+"""
+
+from math import tan
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuated_characters.render.engine.camera_pose import View
+from msgs_config.arrays import FloatArray
+
+Samples: TypeAlias = NDArray[np.float32]
+"""Colours, 0 to 255, and shares of them; single precision is enough and twice as fast."""
+
+BACKGROUND: Samples = 255.0 * np.array((0.93, 0.95, 0.98), dtype=np.float32)
+
+_HAZE = (1.6, 2.9)  # of the view's distance: where the background's colour begins, and is all
+_COLORS: Samples = 255.0 * np.array(((0.88, 0.90, 0.92), (0.70, 0.74, 0.79)), dtype=np.float32)
+_LEAST_FOOTPRINT = np.float32(1e-4)  # of a pixel, in tiles: what single precision can tell
+_TILES_A_VIEW = 6  # or up to 2.5 times as many, along the view's distance
+
+
+def depths(view: View, height: int, rows: FloatArray) -> FloatArray:
+    """How far away along the camera's axis the ground is (m,), m; infinite above the horizon.
+
+    Args:
+        view: Where from.
+        height: Of the picture, in pixels.
+        rows: Places in the picture (m,), in pixels from its upper edge.
+    """
+    falls = -_slopes(view, height, rows)
+    eye = float(view.eye()[2])
+    with np.errstate(divide="ignore"):
+        depth: FloatArray = np.where((falls > 0.0) & (eye > 0.0), eye / falls, np.inf)
+    return depth
+
+
+def places(
+    view: View, size: tuple[int, int], rows: FloatArray, columns: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """x and y (m, k) in m of the ground at rows (m,) and columns (k,), pixels from the corner.
+
+    Where there is no ground, they are not finite.
+    """
+    width, height = size
+    scale = _scale(view, height)
+    depth = depths(view, height, rows)[:, np.newaxis]
+    across = scale * (columns - 0.5 * width)
+    upwards = scale * (0.5 * height - rows)[:, np.newaxis]
+    right, up, back = view.axes()
+    eye = view.eye()
+    with np.errstate(invalid="ignore"):
+        x, y = (
+            eye[axis] + depth * (across * right[axis] + upwards * up[axis] - back[axis])
+            for axis in (0, 1)
+        )
+    return x, y
+
+
+def colors(view: View, size: tuple[int, int]) -> Samples:
+    """What is seen of ground and sky (h, w, 3), 0 to 255, each pixel the mean of what it covers."""
+    width, height = size
+    rows, columns = np.arange(0.5, height), np.arange(0.5, width)
+    picture = np.empty((height, width, 3), dtype=np.float32)
+    picture[:] = BACKGROUND
+    share = 1.0 - haze(depths(view, height, rows) / view.distance)
+    seen = share > 0.0
+    if seen.any():
+        dark, step = _COLORS[1], _COLORS[0] - _COLORS[1]
+        light = _share_of_light(view, size, rows[seen], columns)
+        clear = share[seen, np.newaxis].astype(np.float32)
+        for channel in range(3):
+            own = (dark - BACKGROUND)[channel] + light * step[channel]
+            picture[seen, :, channel] += clear * own
+    return picture
+
+
+def haze(distance: FloatArray | Samples) -> Samples:
+    """The background's share of the colour at distances, in those of the view."""
+    begin, end = _HAZE
+    share: Samples = np.clip((distance - begin) / (end - begin), 0.0, 1.0).astype(np.float32)
+    return share
+
+
+def tile_length(view: View) -> float:
+    """Edge of a tile, m: 1, 2 or 5 times a power of ten."""
+    length = view.distance / _TILES_A_VIEW
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length))
+
+
+def _share_of_light(
+    view: View, size: tuple[int, int], rows: FloatArray, columns: FloatArray
+) -> Samples:
+    """The share (m, k) of light tiles in what pixels with these centres cover.
+
+    A pixel's footprint is taken as a rectangle along the grid: then the mean of the product of two
+    square waves is the product of their means.
+    """
+    tile = tile_length(view)
+    right = view.axes()[0]
+    depth = depths(view, size[1], rows)
+    middles = places(view, size, rows, columns)
+    ends = places(view, size, rows + 0.5, columns)  # nearer than the middles, so always there
+    product = np.ones((len(rows), len(columns)), dtype=np.float32)
+    for axis in (0, 1):
+        middle = (middles[axis] / tile).astype(np.float32)
+        along = 2.0 * np.abs((ends[axis] / tile).astype(np.float32) - middle)
+        across = _scale(view, size[1]) / tile * abs(float(right[axis])) * depth
+        width = along + across[:, np.newaxis].astype(np.float32)
+        product *= _mean_of_square_wave(middle, np.maximum(width, _LEAST_FOOTPRINT))
+    share: Samples = 0.5 + 0.5 * product
+    return share
+
+
+def _mean_of_square_wave(place: Samples, width: Samples) -> Samples:
+    """Mean over an interval around a place of what is 1 from 0 to 1, -1 from 1 to 2, and so on."""
+    half = 0.5 * width
+    mean: Samples = (_triangle_wave(place + half) - _triangle_wave(place - half)) / width
+    return mean
+
+
+def _triangle_wave(place: Samples) -> Samples:
+    """The square wave's integral from 0 on."""
+    whole: Samples = np.floor(0.5 * place)
+    distance: Samples = np.abs(place - 2.0 * whole - 1.0)
+    return 1.0 - distance
+
+
+def _scale(view: View, height: int) -> float:
+    """How far a pixel goes sideways for each metre along the camera's axis."""
+    return 2.0 * tan(0.5 * view.field_of_view) / height
+
+
+def _slopes(view: View, height: int, rows: FloatArray) -> FloatArray:
+    """How far the ray of a row rises for each metre along the camera's axis."""
+    _, up, back = view.axes()
+    upwards: FloatArray = _scale(view, height) * (0.5 * height - rows)
+    return upwards * float(up[2]) - float(back[2])

@@ -1,0 +1,144 @@
+"""How a character looks: the shapes that the renderer can draw, their extents and colours.
+
+What is seen of a link may be a mesh in a format that the engine does not read; then the shapes
+that it collides with are drawn in its place.
+"""
+
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from msgs_config import files
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointType
+from msgs_config.character.mesh_check import check_mesh
+from msgs_config.character.meshes import resolve_meshes
+from msgs_config.character.model import Character, Quadruple, Shape, ShapeType
+from msgs_config.character.shapes import read_shapes
+from msgs_config.errors import CharacterError
+from msgs_config.geometry import rotations
+
+_SHADE = 0.86  # of every second link along a branch
+_BRANCH_COLORS = (
+    (0.93, 0.82, 0.62),
+    (0.96, 0.72, 0.66),
+    (0.98, 0.62, 0.30),
+    (0.45, 0.74, 0.95),
+    (0.93, 0.42, 0.36),
+    (0.30, 0.55, 0.90),
+)
+_POINT = Shape(ShapeType.SPHERE, (0.05,))  # stands for each link where there is nothing to see
+_TRUNK_COLOR = (0.88, 0.86, 0.83)
+
+
+def drawn_shapes(character: Character) -> list[tuple[Shape, ...]]:
+    """The shapes of each link that the renderer draws, in the order of `Character.links`.
+
+    A character all of one colour gets others, by which its branches can be told apart.
+    """
+    seen = [tuple(_solid(link.shapes)) for link in character.links]
+    if not all(map(_is_readable, seen)):
+        collided = _collision_shapes(character)
+        seen = [
+            shapes if _is_readable(shapes) else collided[link.name]
+            for link, shapes in zip(character.links, seen, strict=True)
+        ]
+    if not any(seen):
+        seen = [(_POINT,) for _ in seen]
+    if len({shape.color_rgba for shapes in seen for shape in shapes}) > 1:
+        return seen
+    colors = branch_colors(character)
+    return [
+        tuple(replace(shape, color_rgba=color) for shape in shapes)
+        for shapes, color in zip(seen, colors, strict=True)
+    ]
+
+
+def branch_colors(character: Character) -> list[Quadruple]:
+    """A colour rgba for each link: one for each branch of the tree, in two shades by turns.
+
+    A branch begins where a link has several children that move.
+    """
+    children = [0] * len(character.links)
+    for link in character.links[1:]:
+        children[link.parent] += link.joint.type is not JointType.FIXED
+    branches, depths = [-1], [0]
+    count = 0
+    for link in character.links[1:]:
+        moves = link.joint.type is not JointType.FIXED
+        if moves and children[link.parent] > 1:
+            branches.append(count % len(_BRANCH_COLORS))
+            count += 1
+        else:
+            branches.append(branches[link.parent])
+        depths.append(depths[link.parent] + moves)
+    palette = [*_BRANCH_COLORS, _TRUNK_COLOR]
+    return [_shaded(palette[b], depth) for b, depth in zip(branches, depths, strict=True)]
+
+
+def _shaded(color: tuple[float, float, float], depth: int) -> Quadruple:
+    red, green, blue = (part * (_SHADE if depth % 2 else 1.0) for part in color)
+    return (red, green, blue, 1.0)
+
+
+def outline(shape: Shape) -> tuple[FloatArray, FloatArray]:
+    """Spheres whose hull holds a shape: centres (m, 3) and radii (m,), in m, link frame."""
+    points, radius = _own_outline(shape)
+    turned = rotations.rotate(np.array(shape.pose.orientation_xyzw), points)
+    return turned + np.array(shape.pose.position), np.full(len(points), radius)
+
+
+def _own_outline(shape: Shape) -> tuple[FloatArray, float]:
+    """Centres (m, 3) in the shape's own frame, and their radius."""
+    if shape.type is ShapeType.SPHERE:
+        return np.zeros((1, 3)), shape.size[0]
+    if shape.type in (ShapeType.CYLINDER, ShapeType.CAPSULE):
+        radius, length = shape.size
+        return np.array([(0.0, 0.0, -0.5 * length), (0.0, 0.0, 0.5 * length)]), radius
+    if shape.type is ShapeType.BOX:
+        corners = 0.5 * np.array(shape.size) * np.array(list(product((-1.0, 1.0), repeat=3)))
+        return corners, 0.0
+    vertices = _vertices(Path(shape.mesh)) * np.array(shape.size)
+    bounds = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+    return np.array(list(product(*bounds.T))), 0.0
+
+
+def _vertices(mesh: Path) -> FloatArray:
+    """The vertices (m, 3) of a mesh that was checked."""
+    if mesh.suffix.lower() == ".stl":  # 80 bytes, a count, and a normal, 3 vertices, 2 bytes each
+        triangle = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+        corners = np.fromfile(mesh, triangle, offset=84)["corners"]
+        return corners.reshape(-1, 3).astype(float)
+    lines = mesh.read_text(encoding="latin-1").split("\n")
+    rows = [line.split() for line in lines if line.lstrip().startswith("v")]
+    return np.array([row[1:4] for row in rows if row[0] == "v"], dtype=float)
+
+
+def _solid(shapes: tuple[Shape, ...]) -> list[Shape]:
+    """Without those of no size, which the engine refuses and nobody sees."""
+    return [shape for shape in shapes if shape.type is ShapeType.MESH or min(shape.size) > 0.0]
+
+
+def _is_readable(shapes: tuple[Shape, ...]) -> bool:
+    """Whether the engine reads all the meshes."""
+    try:
+        for shape in shapes:
+            if shape.type is ShapeType.MESH:
+                check_mesh(Path(shape.mesh))
+    except CharacterError:
+        return False
+    return True
+
+
+def _collision_shapes(character: Character) -> dict[str, tuple[Shape, ...]]:
+    """What each link collides with, by its name; all of it was checked when it was loaded."""
+    loading = character.loading
+    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
+    for link in robot.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    resolve_meshes(robot, loading.urdf_path)
+    shapes = read_shapes(robot, loading.urdf_path, loading.scale)
+    return {name: tuple(_solid(own)) for name, own in shapes.items()}

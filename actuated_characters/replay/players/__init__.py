@@ -1,0 +1,1 @@
+"""Nodes that play a bag in the place of the simulator or of the controller."""

@@ -1,0 +1,65 @@
+"""A recorded character as files again, for nodes that load it by its path."""
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import yaml
+
+from msgs_config import files
+from msgs_config.character.layout import JointType
+from msgs_config.character.meshes import resolve_meshes
+from msgs_config.character.model import Character, Loading
+from msgs_config.errors import CharacterError
+
+_NO_LIMIT = 1e300  # N m or N; a file cannot say infinity
+
+
+def write_character(directory: Path, character: Character, *, lift_limits: bool = False) -> Path:
+    """Write a character's YAML file and URDF from its texts; the YAML file's path.
+
+    Meshes and clips are named by absolute paths, as they are found from where the files stood.
+    With `lift_limits` no effort is clipped.
+
+    Raises:
+        CharacterError: a mesh does not exist any more.
+    """
+    urdf = write_urdf(directory / f"{character.name}.urdf", character.loading)
+    content = _content(character)
+    content["urdf"] = urdf.name
+    if lift_limits:
+        content["joints"] = _without_limits(character, content.get("joints") or {})
+    file = directory / f"{character.name}.yaml"
+    file.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return file
+
+
+def write_urdf(file: Path, loading: Loading) -> Path:
+    """Write a URDF from its text, its meshes named by absolute paths; the file.
+
+    Raises:
+        CharacterError: a mesh does not exist any more.
+    """
+    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
+    resolve_meshes(robot, loading.urdf_path)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(ElementTree.tostring(robot, encoding="utf-8"))
+    return file
+
+
+def _content(character: Character) -> dict[str, Any]:
+    """What the character's file says; nothing if it is a URDF alone."""
+    if not character.file_text:
+        return {}
+    content = files.parse_yaml_mapping(character.file, character.file_text, CharacterError)
+    if character.clips.pattern:
+        content["clips"] = {**content["clips"], "files": character.clips.pattern}
+    return content
+
+
+def _without_limits(character: Character, joints: dict[str, Any]) -> dict[str, Any]:
+    names = [
+        joint.name for joint in character.moving_joints if joint.type is not JointType.FLOATING
+    ]
+    lifted = {name: {**(joints.get(name) or {}), "effort_limit": _NO_LIMIT} for name in names}
+    return {**joints, **lifted}

@@ -1,0 +1,59 @@
+"""How a recorded controller was steered: its parameters at the start, and their changes."""
+
+import math
+from collections.abc import Collection
+from typing import Any
+
+from actuated_characters.bags.recording import Recording
+from msgs_config.errors import RecordingError
+
+_WITHOUT_LIMIT = "effort_limit."  # infinite ones are null in a configuration
+
+
+def first_parameters(recording: Recording) -> dict[str, Any]:
+    """The parameters of a recording's controller before its first answer.
+
+    Raises:
+        RecordingError: the bag does not say them.
+    """
+    if not recording.controller:
+        raise RecordingError(
+            "the recording has nothing on 'controller_node/configuration', so its controller "
+            "cannot be started; start one yourself, and use --no-start"
+        )
+    first_ns = int(recording.stamps_ns[0])
+    before = [
+        settings
+        for number, settings in enumerate(recording.controller)
+        if number == 0 or settings.after_stamp_ns is None or settings.after_stamp_ns < first_ns
+    ]
+    return _known(before[-1].parameters)
+
+
+def parameter_changes(
+    recording: Recording, fixed: Collection[str] = ()
+) -> dict[int, list[dict[str, Any]]]:
+    """What was changed after the answer to each state, one change after another, by its row.
+
+    The parameters that are `fixed` stay as they are.
+    """
+    rows = {stamp: row for row, stamp in enumerate(recording.stamps_ns.tolist())}
+    changes: dict[int, list[dict[str, Any]]] = {}
+    before = _known(recording.controller[0].parameters) if recording.controller else {}
+    for settings in recording.controller[1:]:
+        now = _known(settings.parameters)
+        changed = {name: now[name] for name in now if now[name] != before.get(name)}
+        before = now
+        row = rows.get(settings.after_stamp_ns or 0)
+        changed = {name: value for name, value in changed.items() if name not in fixed}
+        if row is not None and changed:
+            changes.setdefault(row, []).append(changed)
+    return changes
+
+
+def _known(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Parameters as a node takes them."""
+    return {
+        name: math.inf if value is None and name.startswith(_WITHOUT_LIMIT) else value
+        for name, value in parameters.items()
+    }

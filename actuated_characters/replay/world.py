@@ -1,0 +1,171 @@
+"""Builds the world of a recording again, from what the recording says of it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from actuated_characters.bags.recording import Recording
+from msgs_config.arrays import IntArray
+from msgs_config.character.model import Character
+from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
+from msgs_config.messages.clock import TickClock
+from msgs_config.messages.wrenches import WrenchArrays
+from msgs_config.parameters import Values, resolve
+from msgs_config.shared_parameters import RATE
+from msgs_config.versions import describe_changes, installed_versions
+from sim_node.parameters import PARAMETERS, character_parameters, make_role, make_settings
+from sim_node.physics.simulated_character import Role
+from sim_node.physics.simulation import Simulation, SimulationSettings
+from sim_node.physics.wrenches import Push
+
+_GROUNDS = ("plane", "none")
+_MOST_BEHIND = 1  # states by which a recorder that is stopped may have more of one than of another
+
+
+def worlds(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
+    """The recordings of each world; simulators in different namespaces have different ones.
+
+    Raises:
+        RecordingError: a world is not complete: a character that was in it was not recorded.
+    """
+    found: dict[tuple[str, ...], list[Recording]] = {}
+    for recording in recordings:
+        world = recording.world
+        key = (world.namespace, *world.characters) if world.characters else (recording.name,)
+        found.setdefault(key, []).append(recording)
+    for together in found.values():
+        world = together[0].world
+        recorded = {recording.world.name for recording in together}
+        missing = [name for name in world.characters if name not in recorded]
+        if missing:
+            raise RecordingError(
+                f"the recording lacks {', '.join(missing)}, in whose world "
+                f"{', '.join(sorted(recorded))} was; record all of them"
+            )
+    return [tuple(together) for together in found.values()]
+
+
+def simulator_values(recording: Recording) -> Values:
+    """All parameters of the simulator, as if the character were alone.
+
+    Raises:
+        RecordingError: this simulator has no such parameters.
+    """
+    given = {name: value for name, value in recording.parameters.items() if value is not None}
+    try:
+        return resolve(PARAMETERS + character_parameters(recording.character), given)
+    except ActuatedCharactersError as error:
+        changes = describe_changes(recording.versions, installed_versions())
+        raise RecordingError(
+            "; ".join(
+                filter(None, [f"the recording's simulator cannot be built again: {error}", changes])
+            )
+        ) from error
+
+
+def make_simulation(together: Sequence[Recording], first_stamp_ns: int) -> Simulation:
+    """The world of some recordings, its first states of that stamp, for efforts as really applied.
+
+    What clips or delays an effort on its way is left out: it was done when they were recorded.
+
+    Raises:
+        RecordingError: the recording does not fit this simulator.
+        ActuatedCharactersError: the engine refuses a file.
+    """
+    values = [simulator_values(recording) for recording in together]
+    roles = [
+        _unlimited(make_role(recording.character, own, recording.world.name))
+        for recording, own in zip(together, values, strict=True)
+    ]
+    settings = _settings(together[0], values[0])
+    first_tick = TickClock(settings.rate_hz).tick(first_stamp_ns)
+    return Simulation(roles, settings, first_tick)
+
+
+def _settings(recording: Recording, values: Values) -> SimulationSettings:
+    """The settings, with the terrain from the recording's text."""
+    terrain = recording.world.terrain
+    if terrain is not None:
+        values = Values(values | {"terrain": "none"})
+    elif values.text("terrain") not in _GROUNDS:
+        raise RecordingError(f"the recording lacks its terrain, {values.text('terrain')}")
+    settings = make_settings(values)
+    world = replace(settings.world, terrain=terrain)
+    return replace(settings, world=world, command_delay_ticks=0)
+
+
+def _unlimited(role: Role) -> Role:
+    links = tuple(
+        replace(link, joint=replace(link.joint, effort_limit=inf)) for link in role.character.links
+    )
+    return replace(role, character=replace(role.character, links=links))
+
+
+def pushes_of(character: Character, applied: WrenchArrays, tick: int) -> list[Push]:
+    """The pushes that acted during the tick that begins at `tick`, in their order.
+
+    Raises:
+        RecordingError: a link does not exist.
+    """
+    rows = {link.name: row for row, link in enumerate(character.links)}
+    pushes = []
+    for number, name in enumerate(applied.links):
+        if name not in rows:
+            raise RecordingError(f"a push of tick {tick}: {one_of('link', name, list(rows))}")
+        centre = character.links[rows[name]].inertial_pose.position
+        point = applied.points[number] if len(applied.points) else np.array(centre)
+        pushes.append(Push(rows[name], applied.wrenches[number], point, tick, 1))
+    return pushes
+
+
+def common_rows(together: Sequence[Recording]) -> tuple[list[int], int]:
+    """Where the characters of a world begin in their recordings, and the number of states in all.
+
+    They begin with the first state of an episode that all have. A recorder that was stopped may
+    have one state more of one than of another.
+
+    Raises:
+        RecordingError: there is no episode whose first state all have, the resets differ, or one
+            of them ends before the others.
+    """
+    begins = [set(_begin_stamps(recording).tolist()) for recording in together]
+    common = set.intersection(*begins)
+    if not common:
+        raise RecordingError("the characters of one world have no episode in common")
+    first_ns = min(common)
+    rows = [int(np.searchsorted(recording.stamps_ns, first_ns)) for recording in together]
+    counts = [len(each.stamps_ns) - row for each, row in zip(together, rows, strict=True)]
+    count = min(counts)
+    if max(counts) - count > _MOST_BEHIND:
+        short, whole = together[counts.index(count)], together[counts.index(max(counts))]
+        raise RecordingError(
+            f"the recording of {short.name} ends at {_last_tick(short)}, that of {whole.name}, in "
+            f"the same world, at {_last_tick(whole)}: they cannot be simulated together"
+        )
+    last_ns = int(together[0].stamps_ns[rows[0] + count - 1])
+    resets = [{stamp for stamp in each if first_ns <= stamp <= last_ns} for each in begins]
+    if any(each != resets[0] for each in resets):
+        raise RecordingError("the characters of one world were reset at different ticks")
+    return rows, count
+
+
+def _last_tick(recording: Recording) -> str:
+    last_ns = int(recording.stamps_ns[-1])
+    return f"tick {TickClock(int(recording.parameters[RATE.name])).tick(last_ns)}"
+
+
+def left_out(together: Sequence[Recording], rows: Sequence[int]) -> list[str]:
+    """Notes on the first states of characters that begin later; see `common_rows`."""
+    return [
+        f"the first {row} states of {recording.name} were left out: the others of its world have "
+        "no episode that begins so early"
+        for recording, row in zip(together, rows, strict=True)
+        if row
+    ]
+
+
+def _begin_stamps(recording: Recording) -> IntArray:
+    stamps: IntArray = recording.stamps_ns[recording.episode_rows]
+    return stamps

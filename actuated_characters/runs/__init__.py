@@ -1,0 +1,1 @@
+"""Runs of simulator and controller: planned, started, measured, ended."""

@@ -1,0 +1,106 @@
+"""`pusher`: sends pushes and throws that were planned before a run, each for its tick."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+from actuated_characters.runs.planned_throws import read_throws
+from actuated_characters.runs.planned_wrenches import read_pushes
+from msgs_config.messages import topics
+from msgs_config.messages.projectiles import ThrowCodec
+from msgs_config.messages.session import SESSION, given_session
+from msgs_config.messages.topics import Topic
+from msgs_config.messages.wrenches import encode_wrenches
+from msgs_config.parameters import Parameter, resolve
+from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.ros_parameters import declare, given_parameters
+
+PARAMETERS = [
+    Parameter("file", "pushes.json", "the pushes, as a run writes them"),
+    Parameter("throws", "", "the throws, as a run writes them; empty: none"),
+    Parameter(
+        "wait_for_subscribers", 1, "send when this many subscribe to external_wrench", maximum=1000
+    ),
+    Parameter("throw_subscribers", 1, "likewise to throw", maximum=1000),
+    SESSION,
+]
+
+_PATIENCE = Duration(seconds=10)  # until the simulator has what was sent
+
+
+class PusherNode(Node):
+    """Sends what was planned, and only then subscribes to the torques.
+
+    A controller that waits for that subscription answers no state before all of it is there.
+    """
+
+    def __init__(self) -> None:
+        """Read the pushes and the throws.
+
+        Raises:
+            ActuatedCharactersError: a parameter is wrong, or a file cannot be read.
+        """
+        super().__init__("pusher")
+        values = resolve(PARAMETERS, given_parameters(self))
+        declare(self, PARAMETERS, values)
+        session = given_session(values)
+        pushes = read_pushes(Path(values.text("file")))
+        self._outboxes = [
+            _Outbox(
+                self,
+                topics.EXTERNAL_WRENCH,
+                [encode_wrenches(replace(push.arrays(), frame_id=session)) for push in pushes],
+                values.integer("wait_for_subscribers"),
+            )
+        ]
+        if values.text("throws"):
+            throws, codec = read_throws(Path(values.text("throws"))), ThrowCodec(session)
+            self._outboxes.append(
+                _Outbox(
+                    self,
+                    topics.THROW,
+                    [codec.encode(each.stamp_ns, each.throw) for each in throws],
+                    values.integer("throw_subscribers"),
+                )
+            )
+        self._torques: DirectSubscription | None = None
+
+    def run(self, stop: StopSignal) -> None:
+        """Send as soon as all is heard, then be there until `stop`."""
+        spinner = Spinner(self)
+        try:
+            while not stop:
+                if self._torques is None and all(outbox.is_heard for outbox in self._outboxes):
+                    for outbox in self._outboxes:
+                        outbox.send()
+                    self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
+                if self._torques is None or self._torques.take() is None:
+                    spinner.rest()
+                else:
+                    spinner.received()
+        finally:
+            spinner.close()
+
+
+class _Outbox:
+    """Serialised messages for one topic, and how many are to hear them."""
+
+    def __init__(self, node: Node, topic: Topic, messages: Sequence[bytes], wanted: int) -> None:
+        self._publisher = topics.create_publisher(node, topic)
+        self._messages = messages
+        self._wanted = wanted
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether all are there, or there is nothing to be heard."""
+        return not self._messages or self._publisher.get_subscription_count() >= self._wanted
+
+    def send(self) -> None:
+        """Send all; they have arrived when this returns."""
+        for message in self._messages:
+            self._publisher.publish(message)
+        self._publisher.wait_for_all_acked(_PATIENCE)

@@ -1,0 +1,161 @@
+"""What a run is made of, checked before anything is started."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from controller_node import parameters as controller_parameters
+from controller_node.behaviours.factory import choose_behaviour
+from controller_node.model_check import check_agreement
+from controller_node.planner.factory import check_planning
+from controller_node.references.base import Reference
+from controller_node.references.factory import make_motion
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.layout import ROOT
+from msgs_config.character.loading import load_character
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
+from msgs_config.parameters import Values, resolve
+from msgs_config.shared_parameters import placed
+from sim_node import parameters as simulator_parameters
+from sim_node.initial_state import INITIAL_STATE, as_values
+from sim_node.physics.probe import measure_probe
+
+SHARED = ("rate", "gravity", "placement", "command_delay_ticks")
+"""The same on both sides; set on one, they count on both."""
+_LARGEST_DURATION = 1e9  # s
+_SET_BY_RUN = {
+    "character": "--character, for both nodes",
+    "characters": "nobody: a run has one character; start sim_node itself for several",
+    INITIAL_STATE: "the run itself: where the reference begins, unless initial_position says it",
+    "max_ticks": "--duration",
+    "session": "the run itself, which makes one for all its nodes",
+    "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",
+}
+_LOCKSTEP_TIMEOUT = 60.0  # s that one answer may take, on a machine that may be busy
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run's character, reference and parameters; both sides agree with each other."""
+
+    character: Character
+    reference: Reference
+    simulator: Values
+    controller: Values
+    notes: tuple[str, ...]  # what the user should know
+
+    @property
+    def ticks(self) -> int:
+        """Length of the run in ticks."""
+        return self.simulator.integer("max_ticks")
+
+
+def make_plan(
+    character_name: str,
+    duration: float,
+    reference: Mapping[str, object],
+    simulator_settings: Mapping[str, object],
+    controller_settings: Mapping[str, object],
+) -> Plan:
+    """Resolve all parameters of both sides, and the initial state that the reference begins with.
+
+    Args:
+        character_name: A shipped character, or the path of a YAML file.
+        duration: Length of the run in s.
+        reference: The controller's parameters that say what is tracked.
+        simulator_settings: Parameters of `sim_node` that the user set, by name.
+        controller_settings: Parameters of `controller_node` that the user set, by name.
+
+    Raises:
+        ActuatedCharactersError: a name or value is wrong; says which, and what there is.
+    """
+    simulator_given, controller_given = _shared(simulator_settings, controller_settings)
+    for name, option in _SET_BY_RUN.items():
+        if name in simulator_given or name in controller_given:
+            raise ConfigurationError(f"parameter '{name}' is set by {option}")
+    for given in (simulator_given, controller_given):
+        given["character"] = character_name
+    character = placed(load_character(character_name), simulator_given)
+    controller_given = {**reference, **controller_given}
+    _keep_assistance_in_step(character, simulator_given, controller_given)
+    controller = resolve(
+        controller_parameters.PARAMETERS
+        + controller_parameters.character_parameters(character, controller_given),
+        controller_given,
+    )
+    motion = make_motion(character, controller)
+    choose_behaviour(character, controller)
+    check_planning(character, controller)
+    commanded = controller_parameters.commanded_joints(character, controller)
+    defaults = {
+        "commanded_joints": commanded,
+        **as_values(motion.first_state()),
+    }
+    simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
+    controller_parameters.check_world(controller, simulator)
+    _check_engines(character, simulator.number("gravity"))
+    _check_commanded(simulator, commanded)
+    notes = character.notes + motion.notes
+    return Plan(character, motion.reference, simulator, controller, notes)
+
+
+def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:
+    # nobody is there to resume what has paused, or to wait for ever
+    defaults = {"on_fault": "abort", "lockstep_timeout": _LOCKSTEP_TIMEOUT}
+    parameters = simulator_parameters.PARAMETERS
+    own = simulator_parameters.character_parameters(character)
+    values = resolve(parameters + own, {**defaults, **given})
+    values["max_ticks"] = _ticks(duration, values.integer("rate"))
+    character.layout.mask(values.texts("commanded_joints"))  # they exist
+    return values
+
+
+def _check_engines(character: Character, gravity: float) -> None:
+    model, probe = DynamicsModel(character, gravity), measure_probe(character, gravity)
+    check_agreement(model, character.layout, probe)
+
+
+def _shared(
+    simulator: Mapping[str, object], controller: Mapping[str, object]
+) -> tuple[dict[str, object], dict[str, object]]:
+    both = {name: side[name] for side in (controller, simulator) for name in SHARED if name in side}
+    for name, value in both.items():
+        for side in (simulator, controller):
+            if side.get(name, value) != value:
+                raise ConfigurationError(
+                    f"parameter '{name}' is {simulator[name]} for sim_node and {controller[name]} "
+                    "for controller_node; it must be the same"
+                )
+    return {**both, **simulator}, {**both, **controller}
+
+
+def _keep_assistance_in_step(
+    character: Character, simulator: dict[str, object], controller: dict[str, object]
+) -> None:
+    """Without `root` among the commanded joints there can be no root assistance."""
+    commanded = simulator.get("commanded_joints")
+    if isinstance(commanded, list) and character.layout.has_floating_base:
+        controller.setdefault("root_assistance", ROOT in commanded)
+
+
+def _check_commanded(simulator: Values, commanded: list[str]) -> None:
+    """Both sides must mean the same joints, or the simulator would wait for ever."""
+    required = set(simulator.texts("commanded_joints"))
+    if required != set(commanded):
+        raise ConfigurationError(
+            f"sim_node's commanded_joints are {_listed(required)}; controller_node commands "
+            f"{_listed(set(commanded))} (its root_assistance decides on 'root')"
+        )
+
+
+def _listed(names: set[str]) -> str:
+    return ", ".join(sorted(names)) or "none"
+
+
+def _ticks(duration: float, rate_hz: int) -> int:
+    if not 1.0 / rate_hz <= duration <= _LARGEST_DURATION:
+        raise ConfigurationError(
+            f"duration is {duration} s; it must be {1.0 / rate_hz:g} s (one tick) to "
+            f"{_LARGEST_DURATION:g} s"
+        )
+    return round(duration * rate_hz)

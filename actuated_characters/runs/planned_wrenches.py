@@ -1,0 +1,126 @@
+"""Pushes that are planned before a run, each with the stamp of the tick that it begins with."""
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from actuated_characters.runs.plan import Plan
+from actuated_characters.whole_files import write_whole
+from msgs_config.errors import ConfigurationError, RecordingError, one_of
+from msgs_config.messages.clock import TickClock
+from msgs_config.messages.wrenches import WrenchArrays
+from sim_node.parameters import push_ticks
+from sim_node.physics.wrenches import PushSchedule
+
+
+@dataclass(frozen=True)
+class PlannedPush:
+    """A force and a torque on a link from a stamp on, for the simulator's `wrench_duration`."""
+
+    stamp_ns: int
+    link: str
+    wrench: tuple[float, ...]  # (6,): force N, torque N m; world axes
+    point: tuple[float, float, float] | None = None  # m, link frame; None: the centre of mass
+
+    def arrays(self) -> WrenchArrays:
+        """The push as a message's content."""
+        points = [] if self.point is None else [self.point]
+        return WrenchArrays.of_rows(self.stamp_ns, [self.link], [self.wrench], points)
+
+
+def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> PushSchedule:
+    """The pushes of a plan as its simulator takes them, without topics."""
+    schedule, clock = PushSchedule(plan.character), TickClock(plan.simulator.integer("rate"))
+    for push in pushes:
+        content = push.arrays()
+        schedule.add(
+            content.links,
+            content.wrenches,
+            content.points,
+            first_tick=clock.first_tick_from(push.stamp_ns),
+            ticks=push_ticks(plan.simulator),
+        )
+    return schedule
+
+
+def parsed_push(text: str, plan: Plan) -> PlannedPush:
+    """The push that a text `LINK:FX,FY,FZ@S` says: N, world axes, and s since the first state.
+
+    Raises:
+        ConfigurationError: the text is not of that form, or see `planned_push`.
+    """
+    return planned_push(plan, *_parts(text))
+
+
+def pushes_within(texts: Sequence[str], plan: Plan) -> list[PlannedPush]:
+    """The pushes that texts say, but for those that would begin after the run.
+
+    Raises:
+        ConfigurationError: as `parsed_push`.
+    """
+    rate = plan.simulator.integer("rate")
+    return [
+        planned_push(plan, link, force, time)
+        for link, force, time in map(_parts, texts)
+        if not (math.isfinite(time) and round(time * rate) >= plan.ticks)
+    ]
+
+
+def _parts(text: str) -> tuple[str, tuple[float, float, float], float]:
+    """Link, force and time of a text. Raises ConfigurationError if it is of another form."""
+    found = re.fullmatch(r"(.+):([^,@]+),([^,@]+),([^,@]+)@([^,@]+)", text)
+    try:
+        if found is None:
+            raise ValueError
+        x, y, z, time = (float(number) for number in found.groups()[1:])
+    except ValueError:
+        raise ConfigurationError(
+            f"push {text}: write it as LINK:FX,FY,FZ@S, such as chest:100,0,0@1.5"
+        ) from None
+    return found[1], (x, y, z), time
+
+
+def write_pushes(file: Path, pushes: Sequence[PlannedPush]) -> None:
+    """Write pushes for the node to send, the first one first."""
+    in_order = sorted(pushes, key=lambda push: push.stamp_ns)
+    write_whole(file, json.dumps([asdict(push) for push in in_order], indent=1))
+
+
+def read_pushes(file: Path) -> list[PlannedPush]:
+    """Read what `write_pushes` wrote.
+
+    Raises:
+        RecordingError: the file does not exist or holds something else.
+    """
+    try:
+        return [PlannedPush(**push) for push in json.loads(file.read_text("utf-8"))]
+    except (OSError, ValueError, TypeError) as error:
+        raise RecordingError(f"{file} holds no pushes: {error}") from error
+
+
+def planned_push(
+    plan: Plan, link: str, force: tuple[float, float, float], time: float
+) -> PlannedPush:
+    """A force (N, world axes) on a link's centre of mass, at a time in s since the first state.
+
+    Raises:
+        ConfigurationError: the link does not exist, a number is not finite, or the time is beyond
+            the run.
+    """
+    links = [link.name for link in plan.character.links]
+    rate = plan.simulator.integer("rate")
+    if link not in links:
+        raise ConfigurationError(f"push: {one_of('link', link, links)}")
+    if not all(math.isfinite(value) for value in force):
+        raise ConfigurationError(f"push on '{link}': force is {force}; it must be finite")
+    end = plan.ticks / rate
+    tick = round(time * rate) if math.isfinite(time) else -1
+    if not 0 <= tick < plan.ticks:
+        raise ConfigurationError(
+            f"push on '{link}': time is {time} s; it must be 0 s to less than {end:g} s"
+        )
+    stamp_ns = TickClock(rate).stamp_ns(1 + tick)
+    return PlannedPush(stamp_ns, link, (*force, 0.0, 0.0, 0.0))

@@ -1,0 +1,183 @@
+"""What the lecture's root force and torque do: the walk with less and less of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuated_characters.bags.recording import Recording
+from actuated_characters.render.engine.renderer import Picture
+from actuated_characters.render.stills import strip
+from actuated_characters.studies.framework.plots import label, make_panels, show_pictures
+from actuated_characters.studies.framework.study import Case, Findings, Laboratory
+from actuated_characters.studies.framework.tracking import errors_by_joint, fall_time
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import ROOT
+from msgs_config.character.loading import load_character
+from msgs_config.character.model import ROOT_TORQUE, Character
+
+if TYPE_CHECKING:  # it takes a second to import
+    from matplotlib.figure import Figure
+
+_CHARACTER = "humanoid"
+_STRENGTHS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)  # of root force and torque
+_DURATION = 5.0  # s
+_SMALLEST = 0.003  # where no assistance is drawn on an axis that has no zero
+_PICTURES, _SIZE = 8, (190, 240)
+
+
+@dataclass(frozen=True)
+class _Walk:
+    """What became of the walk with assistance of one strength."""
+
+    name: str
+    strength: float  # share of the character's own stiffness
+    run: Recording
+    fall: float | None  # s
+    joint_error: float  # rad, mean until the fall
+    root_error: float  # m, mean until the fall
+    force_share: float  # mean root force over the weight until the fall
+
+
+class AssistanceStudy:
+    """The humanoid walks; root force and torque get weaker, down to none."""
+
+    name = "assistance"
+    title = "the walk by strength of root force and torque"
+    runs = len(_STRENGTHS) + 1
+
+    def conduct(self, laboratory: Laboratory) -> Findings:
+        """Walk with each strength, and with a root that nobody may command."""
+        character = load_character(_CHARACTER)
+        walks = [
+            _walk(laboratory, f"x {strength:g}", strength, weakened(character, strength))
+            for strength in _STRENGTHS
+        ]
+        walks.append(_walk(laboratory, "none", 0.0, {"root_assistance": False}))
+        return Findings(
+            columns=(
+                "root stiffness",
+                "falls at (s)",
+                "mean joint error until then (rad)",
+                "mean root error until then (m)",
+                "root force / weight until then",
+            ),
+            rows=[
+                (walk.name, walk.fall, walk.joint_error, walk.root_error, walk.force_share)
+                for walk in walks
+            ],
+            figures={
+                self.name: _draw(walks[:-1]),
+                "assistance_poses": show_pictures(_pictures(walks)),
+            },
+            curves={"assistance_height": _heights(walks)},
+            notes=_notes(walks),
+        )
+
+
+def weakened(character: Character, strength: float) -> dict[str, object]:
+    """Gains of the root with a share of the stiffness, and the same damping ratio.
+
+    The ratio is `kd / (2 sqrt(kp m))`: damping goes with the root of the stiffness.
+    """
+    given: dict[str, object] = {}
+    for name in (ROOT, ROOT_TORQUE):
+        gains = character.gains[name]
+        given[f"gains.{name}.p"] = strength * gains.stiffness
+        given[f"gains.{name}.d"] = strength**0.5 * gains.damping
+    return given
+
+
+def _walk(
+    laboratory: Laboratory, name: str, strength: float, controller: dict[str, object]
+) -> _Walk:
+    reference = {"reference": "clip", "clip": "walk"}
+    label = name.replace(" ", "")
+    case = Case(label, _CHARACTER, _DURATION, reference, controller=controller)
+    run = laboratory.run(case).recording
+    position, desired = run.position[:-1], run.reference_position[:-1]
+    fall = fall_time(run.times[:-1], position[:, 2], desired[:, 2])
+    until = len(position) if fall is None else int(np.searchsorted(run.times, fall))
+    weight = run.character.mass * float(run.parameters["gravity"])
+    return _Walk(
+        name,
+        strength,
+        run,
+        fall,
+        float(errors_by_joint(run.layout, position[:until], desired[:until]).mean()),
+        float(np.linalg.norm(position[:until, :3] - desired[:until, :3], axis=1).mean()),
+        float(np.linalg.norm(run.effort[:until, :3], axis=1).mean()) / weight,
+    )
+
+
+def _notes(walks: Sequence[_Walk]) -> Sequence[str]:
+    none, zero = walks[-1], walks[-2]
+    same = np.array_equal(none.run.position, zero.run.position)
+    return (
+        f"without assistance it falls at {none.fall:.3g} s: 28 motors cannot hold 34 degrees of "
+        "freedom on a path that was not planned for them (underactuation)"
+        if none.fall is not None
+        else "without assistance it does not fall",
+        f"root gains of zero and a root that may not be commanded: "
+        f"{'the same states' if same else 'other states'}",
+    )
+
+
+def _draw(walks: Sequence[_Walk]) -> "Figure":
+    figure, panels = make_panels(2, 2, (12.0, 7.5))
+    strengths = [max(walk.strength, _SMALLEST) for walk in walks]
+    falls, errors, forces, heights = panels
+    for walk, place in zip(walks, strengths, strict=True):
+        held = walk.fall is None
+        falls.plot(place, walk.fall or _DURATION, "^" if held else "o", color="tab:blue")
+    falls.plot(strengths, [walk.fall or _DURATION for walk in walks], color="tab:blue")
+    falls.plot([], [], "^", color="tab:blue", label=f"does not fall within {_DURATION:g} s")
+    label(falls, "strength of assistance", "time of the fall (s)")
+    joints = [walk.joint_error for walk in walks]
+    errors.plot(strengths, joints, "o-", label="joints (rad)")
+    errors.plot(strengths, [walk.root_error for walk in walks], "s-", label="root (m)")
+    label(errors, "strength of assistance", "mean error until the fall")
+    forces.plot(strengths, [walk.force_share for walk in walks], "o-", color="tab:green")
+    label(forces, "strength of assistance", "root force / weight until the fall", legend=None)
+    for panel in (falls, errors, forces):
+        panel.set_xscale("log")
+        ticks = [f"{walk.strength:g}" for walk in walks]
+        panel.set_xticks(strengths, ticks)
+        panel.set_xticks([], minor=True)
+        panel.set_ylim(bottom=0.0)
+    for walk in walks:
+        heights.plot(walk.run.times, walk.run.position[:, 2], label=walk.name)
+    heights.plot(
+        walks[0].run.times, walks[0].run.reference_position[:, 2], "k--", label="reference"
+    )
+    label(heights, "time (s)", "root height (m)", legend="center right")
+    heights.set_xlim(right=1.3 * _DURATION)  # for the legend
+    figure.suptitle("the walk needs a force that no motor gives")
+    return figure
+
+
+def _pictures(walks: Sequence[_Walk]) -> dict[str, Picture]:
+    """The fall without assistance, and the same times with all of it."""
+    none, full = walks[-1], walks[0]
+    end = min(1.5 * (none.fall or _DURATION), float(none.run.times[-2]))
+    times = np.linspace(0.0, end, _PICTURES).tolist()
+    return {
+        f"{named}; the reference in green": strip(walk.run, times, ghost=True, size=_SIZE)
+        for named, walk in (("without assistance", none), ("with root force and torque", full))
+    }
+
+
+def _heights(walks: Sequence[_Walk]) -> tuple[Sequence[str], FloatArray]:
+    """Height of the root over time; NaN after an end before the time."""
+    ticks = max(len(walk.run.times) for walk in walks)
+    longest = next(walk.run for walk in walks if len(walk.run.times) == ticks)
+    columns = [longest.times, longest.reference_position[:, 2]]
+    for walk in walks:
+        height = walk.run.position[:, 2]
+        columns.append(np.pad(height, (0, ticks - len(height)), constant_values=np.nan))
+    names = [f"{walk.name.replace(' ', '')}_m" for walk in walks]
+    return ["time_s", "reference_m", *names], np.column_stack(columns)
+
+
+STUDY = AssistanceStudy()

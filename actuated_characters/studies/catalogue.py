@@ -1,0 +1,28 @@
+"""The studies by name, in the lecture's order; each is imported when it is asked for."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # it takes a second to import
+    from actuated_characters.studies.framework.study import Study
+
+NAMES = (
+    "rigid_body",
+    "joint_torque",
+    "equation",
+    "lift",
+    "gains",
+    "feedforward",
+    "delay",
+    "assistance",
+    "forward_inverse",
+    "clips",
+    "balance",
+    "reactions",
+)
+
+
+def load_study(name: str) -> "Study":
+    """The study of a name; `STUDY` of the module of that name."""
+    study: Study = import_module(f"actuated_characters.studies.{name}").STUDY
+    return study

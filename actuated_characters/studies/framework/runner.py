@@ -1,0 +1,108 @@
+"""Makes a study's runs, over topics, and keeps what it found."""
+
+import csv
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from actuated_characters.bags.recording import Recording, read_recording
+from actuated_characters.runs.execution import run_over_topics
+from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned_throws import plan_throws
+from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.runs.run_directory import prepare_directory, read_figures
+from actuated_characters.studies.framework.study import Case, Findings, Outcome
+from msgs_config.errors import RunError
+
+Report = Callable[[str, float], None]
+"""Is told a run's label, and which share of it is done."""
+
+_DIVERGED = "diverged at tick"
+_UNREAD = ["odom", "visualization", "controller_node/net_wrench"]  # topics, at a cost each tick
+_DPI = 110
+
+
+class TopicLaboratory:
+    """Runs cases as processes that speak over topics."""
+
+    def __init__(self, directory: Path, *, keep_runs: bool, report: Report) -> None:
+        """Files go below `directory`; a run's are removed once they were read, or kept."""
+        self._directory = directory
+        self._keep_runs = keep_runs
+        self._report = report
+
+    def run(self, case: Case) -> Outcome:
+        """Run a case; one that diverges ends there."""
+        plan = make_plan(
+            case.character, case.duration, case.reference, case.simulator, case.controller
+        )
+        throws, _ = plan_throws(plan, case.throws)
+        directory = self._directory / "runs" / case.label
+        prepare_directory(directory, overwrite=True)
+        diverged = ""
+        self._report(case.label, 0.0)
+        try:
+            run_over_topics(
+                plan,
+                directory,
+                write_bag=True,
+                progress=lambda ticks: self._report(case.label, min(ticks / plan.ticks, 1.0)),
+                recording={"exclude": _UNREAD if case.contacts else [*_UNREAD, "contacts"]},
+                pushes=case.pushes,
+                throws=throws,
+            )
+        except RunError as error:
+            if _DIVERGED not in str(error):
+                raise
+            diverged = str(error).partition(": ")[2]
+        self._report(case.label, 1.0)
+        recording, (summary, _) = read_recording(directory), read_figures(directory)
+        _check_pushes(case.pushes, recording)
+        if not self._keep_runs:
+            shutil.rmtree(directory)
+            with suppress(OSError):  # others are kept there
+                directory.parent.rmdir()
+        return Outcome(recording, summary, diverged)
+
+    def write(self, name: str, text: str) -> str:
+        """Write a file below the study."""
+        self._directory.mkdir(parents=True, exist_ok=True)
+        path = self._directory / name
+        path.write_text(text, encoding="utf-8")
+        return str(path)
+
+
+def _check_pushes(pushes: Sequence[PlannedPush], run: Recording) -> None:
+    """Raise RunError unless each push that was planned within the run has really acted."""
+    for push in pushes:
+        tick = int(np.searchsorted(run.stamps_ns, push.stamp_ns))
+        if tick >= len(run.stamps_ns) - 1:
+            continue
+        applied = run.applied_wrench[tick] if run.applied_wrench else None
+        if applied is None or push.link not in applied.links:
+            raise RunError(f"the push on '{push.link}' at {push.stamp_ns} ns did not act")
+
+
+def write_findings(directory: Path, name: str, findings: Findings) -> list[Path]:
+    """Write table (CSV), curves (CSV) and pictures (PNG and SVG); returns the files."""
+    directory.mkdir(parents=True, exist_ok=True)
+    assert name not in findings.curves, "the table has that file's name"
+    table = directory / f"{name}.csv"
+    with table.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(findings.columns)
+        writer.writerows(findings.rows)
+    files = [table]
+    for stem, (columns, values) in findings.curves.items():
+        path = directory / f"{stem}.csv"
+        np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+        files.append(path)
+    for stem, figure in findings.figures.items():
+        for suffix in ("png", "svg"):
+            path = directory / f"{stem}.{suffix}"
+            figure.savefig(path, dpi=_DPI)
+            files.append(path)
+    return files

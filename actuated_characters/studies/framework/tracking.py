@@ -1,0 +1,140 @@
+"""How well a motion is tracked: errors, overshoot, lag, time of a fall, and what theory says."""
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointLayout, JointType
+
+_FALL_FRACTION = 0.5  # of the reference's root height, as `fell` of a run's summary has it ...
+_LEAST_HEIGHT = 0.5  # m; ... where the reference is not lying itself
+
+
+def errors_by_joint(layout: JointLayout, position: FloatArray, desired: FloatArray) -> FloatArray:
+    """Angle (t, j) in rad between positions and desired ones (t, n), for each of j joints.
+
+    The joints are the layout's hinges and balls, in its order; NaN where nothing was desired.
+    """
+    difference = layout.difference(layout.configuration(position), layout.configuration(desired))
+    kinds = [joint.type for joint in layout.joints for _ in joint.vectors]
+    rotate = [kind in (JointType.REVOLUTE, JointType.SPHERICAL) for kind in kinds]
+    errors: FloatArray = layout.norms(difference)[:, rotate]
+    return errors
+
+
+def overshoot(angle: FloatArray, reference: FloatArray) -> float:
+    """How far an angle (t,) goes beyond the extremes of its reference (t,), over their distance.
+
+    Negative where it stays within both. Of a step it is the overshoot of the step's response.
+    """
+    beyond = max(float(angle.max() - reference.max()), float(reference.min() - angle.min()))
+    return beyond / float(np.ptp(reference))
+
+
+def lag(angle: FloatArray, reference: FloatArray, period: float, longest: float) -> float:
+    """Time in s by which an angle (t,) comes after its reference (t,); negative if before it.
+
+    It is where their correlation is largest, between two samples by the parabola through three.
+
+    Args:
+        angle: What was reached, one sample each `period`.
+        reference: What was desired at the same times.
+        period: Time from sample to sample, s.
+        longest: Lags up to this one, s, are looked at; less than half a cycle of a cyclic motion.
+    """
+    most = min(round(longest / period), (len(reference) - 2) // 2)
+    middle = reference[most : len(reference) - most]
+    shifted = np.lib.stride_tricks.sliding_window_view(angle, len(middle))  # by -most, ..., most
+    shifted = shifted - shifted.mean(axis=1, keepdims=True)
+    lengths = np.linalg.norm(shifted, axis=1)
+    products = shifted @ (middle - middle.mean())
+    correlation = np.divide(products, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    best = int(correlation.argmax())
+    between = 0.0
+    if 0 < best < 2 * most:
+        before, at, after = correlation[best - 1 : best + 2].tolist()
+        curvature = before - 2.0 * at + after
+        between = 0.5 * (before - after) / curvature if curvature else 0.0
+    return (best - most + between) * period
+
+
+def inertialess_response(
+    reference: FloatArray, velocity: FloatArray, stiffness: float, damping: float, period: float
+) -> FloatArray:
+    """Angle (t,) in rad of a joint without inertia that stable PD leads along a reference.
+
+    The law (Tan, Liu, Turk 2011) is then `kp (r - q - h v) + kd (s - v) = 0`, the reference r and
+    its velocity s taken at t + h: a first-order filter. With s = 0 a slow motion lags by `kd / kp`.
+
+    Args:
+        reference: r (t,), rad, one sample each `period`.
+        velocity: s (t,), rad/s; zero where it is not followed.
+        stiffness: kp, N m/rad.
+        damping: kd, N m s/rad.
+        period: h, of control, s.
+    """
+    held = damping + stiffness * period
+    angle = reference.copy()
+    for k, (desired, speed) in enumerate(zip(reference[1:], velocity[1:], strict=True)):
+        angle[k + 1] = angle[k] + period * (
+            (stiffness * (desired - angle[k]) + damping * speed) / held
+        )
+    return angle
+
+
+def fall_time(times: FloatArray, height: FloatArray, desired: FloatArray) -> float | None:
+    """When the root first is below half of its desired height; None if it never is.
+
+    Args:
+        times: Of the states (t,), s.
+        height: Of the root (t,), m.
+        desired: Its reference (t,), m; below 0.5 m it lies by intention, which is no fall.
+    """
+    fallen = (desired > _LEAST_HEIGHT) & (height < _FALL_FRACTION * desired)
+    return float(times[int(fallen.argmax())]) if fallen.any() else None
+
+
+def delayed_spectral_radius(
+    mass_matrix: FloatArray,
+    stiffness: FloatArray,
+    damping: FloatArray,
+    period: float,
+    *,
+    delay_ticks: int,
+    substeps: int = 1,
+) -> float:
+    """Growth a tick of small deviations from rest under stable PD whose efforts come late.
+
+    Below 1 the loop is stable. In stable PD (Tan, Liu, Turk 2011) the effort of a tick is
+    `M a(k)` with `(M + Kd h) a(k) = -Kp x(k) - (Kd + Kp h) v(k)`, where the engine has not the
+    inertia `Kd h`. Late by d ticks it leads to `v(k + 1) = v(k) + h a(k - d)`; the engine takes s
+    semi-implicit steps a tick, so `x(k + 1) = x(k) + h v(k) + h^2 (s + 1) / (2 s) a(k - d)`.
+
+    Args:
+        mass_matrix: M (n, n): kg, kg m^2.
+        stiffness: Diagonal of Kp (n,): N m/rad or N/m.
+        damping: Diagonal of Kd (n,): N m s/rad or N s/m.
+        period: h, of control, s.
+        delay_ticks: d.
+        substeps: s.
+    """
+    size, blocks = len(stiffness), 2 + delay_ticks
+    implicit = mass_matrix + np.diag(damping * period)
+    by_position = -np.linalg.solve(implicit, np.diag(stiffness))
+    by_velocity = -np.linalg.solve(implicit, np.diag(damping + stiffness * period))
+    one, moved = np.eye(size), period * period * (substeps + 1) / (2 * substeps)
+    # of position, velocity, and what was asked for a tick ago, two ticks ago, ...
+    step = np.zeros((blocks, size, blocks, size))
+    step[0, :, 0], step[0, :, 1], step[1, :, 1] = one, period * one, one
+    asked = np.zeros((size, blocks, size))
+    asked[:, 0], asked[:, 1] = by_position, by_velocity
+    acting = asked
+    if delay_ticks:
+        acting = np.zeros_like(asked)
+        acting[:, blocks - 1] = one
+        step[2] = asked
+    for block in range(3, blocks):
+        step[block, :, block - 1] = one
+    step[0] += moved * acting
+    step[1] += period * acting
+    matrix = step.reshape(blocks * size, blocks * size)
+    return float(np.abs(np.linalg.eigvals(matrix)).max())

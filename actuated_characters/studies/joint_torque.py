@@ -1,0 +1,277 @@
+"""What a joint torque is: the sum of forces between two bodies, and nothing to both together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuated_characters.bags.recording import Recording
+from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.studies.framework.bodies import (
+    HINGE,
+    IN_SPACE,
+    Box,
+    Momenta,
+    momenta,
+    write_hinged_boxes,
+)
+from actuated_characters.studies.framework.plots import THEORY, label, make_panels
+from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory
+from controller_node.effort_series import write_effort_series
+from msgs_config.arrays import FloatArray
+from msgs_config.character.loading import load_character
+from msgs_config.geometry import rotations
+
+if TYPE_CHECKING:  # it takes a second to import
+    from matplotlib.figure import Figure
+
+_RATE, _FINE_RATE = 240, 1920  # Hz
+_DURATION = 2.0  # s
+_SMALLEST = 1e-18  # that is drawn where there is nothing
+_TORQUE = 0.15  # N m, largest
+_FORCE = 0.5  # N, of the root in the run with assistance
+_PARENT = Box("parent", 2.0, (0.15, 0.1, 0.6), (0.0, 0.0, 0.3))
+_CHILD = Box("child", 1.0, (0.1, 0.1, 0.5), (0.05, 0.0, -0.25))
+_POINTS = np.array([[0.1, 0.0, -0.1], [-0.05, 0.08, -0.3], [0.0, -0.08, -0.2]])  # m, child frame
+_FORCES = np.array([[1.0, 2.0, 1.0], [-2.0, 0.5, 1.5]])  # N, child frame; the third balances them
+_SPIN = (0.0, 0.0, 0.0, 0.4, 0.2, 0.3, 0.5)  # m/s, rad/s at the beginning
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One run, and the momentum of both bodies together."""
+
+    recording: Recording
+    momenta: Momenta
+
+
+class JointTorqueStudy:
+    """Two boxes on a hinge, floating: driven by a torque, by forces between them, and as a whole.
+
+    The torque is prescribed over time. The forces that do the same depend on how the boxes lie, so
+    they are worked out from the states that the torque has led to.
+    """
+
+    name = "joint_torque"
+    title = "joint torque: forces between two bodies that sum to zero"
+    runs = 5
+
+    def conduct(self, laboratory: Laboratory) -> Findings:
+        """Run the torque at two rates, then the forces, a root force, and nothing at all."""
+        boxes = write_hinged_boxes(
+            laboratory, "hinged", _PARENT, _CHILD, joint_in_parent=(0.0, 0.0, 0.0)
+        )
+        by_torque = _run(laboratory, boxes, "torque")
+        at_fine_rate = _run(laboratory, boxes, "torque_fine", rate=_FINE_RATE)
+        pushes = balanced_pushes(by_torque.recording, _profile(_times(_RATE)))
+        by_forces = _run(laboratory, boxes, "forces", torque=0.0, pushes=pushes)
+        by_root = _run(laboratory, boxes, "root_force", force=_FORCE, rate=_FINE_RATE)
+        passive = _run(laboratory, boxes, "nothing", torque=0.0)
+        runs = {
+            f"joint torque, {_RATE} Hz": by_torque,
+            f"joint torque, {_FINE_RATE} Hz": at_fine_rate,
+            "forces between the bodies": by_forces,
+            f"and a root force of {_FORCE:g} N, {_FINE_RATE} Hz": by_root,
+            "neither": passive,
+        }
+        apart = np.abs(by_torque.recording.position - by_forces.recording.position).max()
+        return Findings(
+            columns=(
+                "driven by",
+                "hinge at the end (rad)",
+                "state off that of the torque (rad, m)",
+                "P changed by (kg m/s)",
+                "L changed by (kg m^2/s)",
+                "centre of mass off its line (m)",
+            ),
+            rows=[_row(name, run, by_torque) for name, run in runs.items()],
+            figures={self.name: _draw(by_torque, by_forces, at_fine_rate, by_root, passive)},
+            curves={
+                "joint_torque_hinge": (
+                    ("time_s", "hinge_by_torque_rad", "hinge_by_forces_rad"),
+                    np.column_stack(
+                        (
+                            by_torque.recording.times,
+                            _angle(by_torque.recording),
+                            _angle(by_forces.recording),
+                        )
+                    ),
+                )
+            },
+            notes=(
+                f"three pairs of forces move the boxes as the torque sum r x f does: positions "
+                f"agree within {apart:.1e}; what of it is not along the hinge's axis the hinge "
+                "holds",
+                "a joint torque changes neither P nor L; what is left falls with the step. "
+                "A root force does",
+            ),
+        )
+
+
+def _times(rate: int) -> FloatArray:
+    times: FloatArray = np.arange(round(_DURATION * rate)) / rate
+    return times
+
+
+def _profile(times: FloatArray) -> FloatArray:
+    """The torque (t,) in N m at times in s: one way, and back."""
+    torque: FloatArray = _TORQUE * np.sin(2.0 * np.pi * times / _DURATION)
+    return torque
+
+
+def _run(
+    laboratory: Laboratory,
+    boxes: str,
+    name: str,
+    *,
+    torque: float = 1.0,  # times the profile
+    force: float = 0.0,  # N, of the root along x
+    rate: int = _RATE,
+    pushes: Sequence[PlannedPush] = (),
+) -> _Run:
+    times = _times(rate)
+    series = _write_series(laboratory, boxes, name, torque * _profile(times), times, force)
+    case = Case(
+        label=name,
+        character=boxes,
+        duration=_DURATION,
+        reference={"reference": "hold"},
+        simulator={
+            **IN_SPACE,
+            "rate": rate,
+            "initial_velocity": list(_SPIN),
+            "wrench_duration": 1.0 / rate,  # each push is for one tick
+        },
+        controller={
+            "law": "feedforward",
+            "feedforward": series,
+            "root_assistance": bool(force),
+        },
+        pushes=pushes,
+    )
+    recording = laboratory.run(case).recording
+    return _Run(recording, momenta(recording.character, recording.position, recording.velocity))
+
+
+def _write_series(
+    laboratory: Laboratory,
+    boxes: str,
+    name: str,
+    torques: FloatArray,
+    times: FloatArray,
+    force: float,
+) -> str:
+    """Write the law's file: torques (t,) of the hinge in N m, force of the root along x in N."""
+    layout = load_character(boxes).layout
+    efforts = np.zeros((len(times), layout.size))
+    efforts[:, layout.dof_names.index(HINGE)] = torques
+    efforts[:, 0] = force
+    path = laboratory.write(f"{name}.csv", "")
+    write_effort_series(Path(path), layout, times, efforts)
+    return path
+
+
+def forces_of_torque(points: FloatArray, forces: FloatArray, axis: FloatArray) -> FloatArray:
+    """Forces (k, 3) that sum to zero and whose torque `sum r x f` has 1 N m along an axis (3,).
+
+    `forces` (k - 1, 3) say their directions, at `points` (k, 3) in m from any origin: as they sum
+    to zero, the torque does not depend on it.
+    """
+    balanced: FloatArray = np.vstack((forces, -forces.sum(axis=0)))
+    return balanced / float(np.cross(points, balanced).sum(axis=0) @ axis)
+
+
+def balanced_pushes(recording: Recording, torques: FloatArray) -> list[PlannedPush]:
+    """Pushes for each tick that are to the hinge what its torques (t,) in N m were in a recording.
+
+    Forces at points of the child, and their opposites on the parent at the same points in space.
+    """
+    axis = np.array(recording.character.links[1].joint.axis_in_child)
+    unit = forces_of_torque(_POINTS, _FORCES, axis)
+    parent, child = (link.name for link in recording.character.links)
+    pushes = []
+    for tick, torque in enumerate(torques.tolist()):
+        position = recording.position[tick]
+        turn = rotations.matrix(rotations.exp(position[3:6]))  # of the parent, in the world
+        bend = rotations.matrix(rotations.exp(position[6] * axis))  # of the child, in the parent
+        stamp = int(recording.stamps_ns[tick])
+        for point, force in zip(_POINTS, torque * unit, strict=True):
+            in_world = turn @ bend @ force
+            where = bend @ point  # the hinge is at the origin of both
+            pushes += [_push(stamp, child, in_world, point), _push(stamp, parent, -in_world, where)]
+    return pushes
+
+
+def _push(stamp_ns: int, link: str, force: FloatArray, point: FloatArray) -> PlannedPush:
+    x, y, z = point.tolist()
+    return PlannedPush(stamp_ns, link, (*force.tolist(), 0.0, 0.0, 0.0), (x, y, z))
+
+
+def _angle(recording: Recording) -> FloatArray:
+    """The hinge's angle (t,) in rad."""
+    return recording.position[:, recording.layout.dof_names.index(HINGE)]
+
+
+def off_line(run: Momenta, times: FloatArray) -> FloatArray:
+    """How far (t,) the centre of mass is off where its first velocity would have it, m."""
+    mass_velocity = np.diff(run.centre[:2], axis=0)[0] / (times[1] - times[0])
+    straight = run.centre[0] + times[:, np.newaxis] * mass_velocity
+    off: FloatArray = np.linalg.norm(run.centre - straight, axis=1)
+    return off
+
+
+def _row(name: str, run: _Run, other: _Run) -> tuple[Cell, ...]:
+    recording, momentum = run.recording, run.momenta
+    same_ticks = len(recording.times) == len(other.recording.times)
+    apart = np.abs(recording.position - other.recording.position).max() if same_ticks else None
+    return (
+        name,
+        float(_angle(recording)[-1]),
+        None if apart is None else float(apart),
+        float(np.linalg.norm(momentum.linear - momentum.linear[0], axis=1).max()),
+        float(np.linalg.norm(momentum.angular - momentum.angular[0], axis=1).max()),
+        float(off_line(momentum, recording.times).max()),
+    )
+
+
+def _draw(
+    by_torque: _Run, by_forces: _Run, at_fine_rate: _Run, by_root: _Run, passive: _Run
+) -> "Figure":
+    """The hinge by torque and by forces; the centre of mass; the momentum of both boxes."""
+    figure, (hinge, apart, centre, momentum) = make_panels(2, 2, (11.0, 7.0))
+    times = by_torque.recording.times
+    hinge.plot(
+        times, _angle(by_torque.recording), linewidth=2.5, alpha=0.7, label="by a joint torque"
+    )
+    hinge.plot(times, _angle(by_forces.recording), "k--", label="by 3 pairs of forces")
+    hinge.plot(times, _angle(passive.recording), color="tab:gray", label="by neither")
+    label(hinge, "time (s)", "angle of the hinge (rad)", "the same motion: τ = Σ r × f, Σ f = 0")
+    off = np.abs(by_torque.recording.position - by_forces.recording.position).max(axis=1)
+    apart.semilogy(times, np.maximum(off, _SMALLEST), label="largest entry")
+    label(apart, "time (s)", "position apart (rad, m)", "the two runs differ by rounding")
+    mass = by_root.recording.character.mass
+    runs = (
+        (by_torque, f"joint torque, {_RATE} Hz", "tab:blue"),
+        (at_fine_rate, f"joint torque, {_FINE_RATE} Hz", "tab:orange"),
+        (by_root, f"and a root force, {_FINE_RATE} Hz", "tab:green"),
+    )
+    for run, name, color in runs:
+        clock = run.recording.times
+        centre.semilogy(
+            clock, np.maximum(off_line(run.momenta, clock), _SMALLEST), color=color, label=name
+        )
+        change = run.momenta.linear - run.momenta.linear[0]
+        momentum.plot(clock, np.linalg.norm(change, axis=1), color=color, label=f"P, {name}")
+        turn = run.momenta.angular - run.momenta.angular[0]
+        momentum.plot(clock, np.linalg.norm(turn, axis=1), ":", color=color, label=f"L, {name}")
+    centre.semilogy(times[1:], 0.5 * _FORCE / mass * times[1:] ** 2, label="f t² / 2 m", **THEORY)
+    centre.set_ylim(1e-7, 10.0)
+    momentum.plot(times, _FORCE * times, label="f t", **THEORY)
+    label(centre, "time (s)", "centre of mass off its line (m)", "only the root force moves it")
+    label(momentum, "time (s)", "change of P (kg m/s), L (kg m²/s)", "and only that adds momentum")
+    return figure
+
+
+STUDY = JointTorqueStudy()

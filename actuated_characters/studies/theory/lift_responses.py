@@ -1,0 +1,127 @@
+"""How the mass of `lift` answers to a law, what theory says of that, and where it is unstable."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from actuated_characters.studies.theory import second_order
+from msgs_config.arrays import FloatArray
+
+MASS, GRAVITY, TARGET, RATE = 1.0, 9.81, 1.0, 240  # kg, m/s^2, m, Hz
+PERIOD, WEIGHT = 1.0 / RATE, MASS * GRAVITY  # s, N
+STIFFNESS, CRITICAL = 100.0, 20.0  # N/m, N s/m: the character's own
+
+_RESOLUTION = 1.05  # of a bound: one that is stable and one that is not are this near
+_BRACKET = (0.7, 1.4)  # of the bound by theory, where the search begins
+_TAIL = RATE // 2  # states that a steady state is the mean of, where nothing swings
+_SECOND_ORDER = ("p", "pd", "stable_pd", "pd_gravity")
+
+
+@dataclass(frozen=True)
+class Gains:
+    """A law and its gains."""
+
+    law: str
+    stiffness: float  # N/m
+    damping: float  # N s/m
+    integral: float = 0.0  # N/(m s)
+
+    @classmethod
+    def critical(cls, law: str, stiffness: float) -> "Gains":
+        """Critically damped, in continuous time."""
+        return cls(law, stiffness, second_order.critical_damping(stiffness, MASS))
+
+
+@dataclass(frozen=True)
+class Response:
+    """How the mass went, from rest at 0 towards the target, and what that was like."""
+
+    gains: Gains
+    times: FloatArray  # (t,) s
+    height: FloatArray  # (t,) m
+    diverged: bool
+
+    @property
+    def stable(self) -> bool:
+        """Whether it came nearer to its rest rather than farther from it."""
+        wider = second_order.swings_wider(self.height, TARGET - error_by_theory(self.gains))
+        return not (self.diverged or wider)
+
+    @property
+    def rest(self) -> float:
+        """Where it came to rest (m), or what it swings about."""
+        if self.gains.law in _SECOND_ORDER:
+            return second_order.identify(self.height, PERIOD).rest
+        return float(self.height[-_TAIL:].mean())
+
+    @property
+    def ratio(self) -> float | None:
+        """Its damping ratio; a PID is not of second order."""
+        if self.gains.law not in _SECOND_ORDER:
+            return None
+        return second_order.identify(self.height, PERIOD).damping_ratio
+
+
+def error_by_theory(gains: Gains) -> float:
+    """The steady-state error, m."""
+    if gains.law in ("pd_gravity", "pid"):
+        return 0.0
+    return second_order.steady_state_error(WEIGHT, gains.stiffness)
+
+
+def ratio_by_theory(gains: Gains) -> float | None:
+    """The damping ratio: of stable PD in its own closed form, else of continuous time."""
+    if gains.law not in _SECOND_ORDER:
+        return None
+    if gains.law == "stable_pd":
+        return second_order.stable_pd_damping_ratio(gains.stiffness, gains.damping, MASS, PERIOD)
+    return second_order.damping_ratio(gains.stiffness, gains.damping, MASS)
+
+
+def stable_by_theory(gains: Gains) -> bool:
+    """Whether a law with these gains is stable; PID by its bound in continuous time."""
+    if gains.law == "pid":
+        limit = second_order.largest_integral_gain(gains.stiffness, gains.damping, MASS)
+        return gains.integral < limit
+    known = (
+        second_order.stable_pd_is_stable
+        if gains.law == "stable_pd"
+        else second_order.explicit_is_stable
+    )
+    return known(gains.stiffness, gains.damping, MASS, PERIOD)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The stiffness at which critically damped PD ceases to be stable."""
+
+    law: str
+    theory: float  # N/m
+    tried: tuple[Response, ...]  # in rising order of stiffness
+
+    @property
+    def below(self) -> Response:
+        """The stiffest that was stable."""
+        return [response for response in self.tried if response.stable][-1]
+
+    @property
+    def above(self) -> Response:
+        """The softest that was not."""
+        return next(response for response in self.tried if not response.stable)
+
+    @property
+    def found(self) -> float:
+        """Between the two, N/m."""
+        return math.sqrt(self.below.gains.stiffness * self.above.gains.stiffness)
+
+
+def find_bound(respond: Callable[[Gains], Response], law: str, theory: float) -> Bound:
+    """Bisect for the bound of a law between stiffnesses (N/m) around that of theory."""
+    low, high = (share * theory for share in _BRACKET)
+    tried = [respond(Gains.critical(law, stiffness)) for stiffness in (low, high)]
+    while high / low > _RESOLUTION:
+        middle = math.sqrt(low * high)
+        tried.append(respond(Gains.critical(law, middle)))
+        low, high = (middle, high) if tried[-1].stable else (low, middle)
+    tried.sort(key=lambda response: response.gains.stiffness)
+    return Bound(law, theory, tuple(tried))

@@ -1,0 +1,102 @@
+"""Nodes of this package as child processes, and what the simulator reports of itself."""
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+from actuated_characters.runs.processes import Child, Children
+from actuated_characters.runs.run_directory import PARAMETERS, write_parameters
+from msgs_config.messages import topics
+
+_PATIENCE = 120.0  # s for a whole run
+_MODULES = {topics.RECORDER_NODE: "actuated_characters.recorder.main"}
+
+
+class Nodes:
+    """Child processes in a `with` block, and a node of this process that hears their reports."""
+
+    def __init__(self) -> None:
+        self.reports: list[dict[str, str]] = []  # those of the simulator, oldest first
+        self._simulator: Child | None = None
+
+    def __enter__(self) -> "Nodes":
+        self._stack = ExitStack()
+        rclpy.init()
+        self._stack.callback(rclpy.try_shutdown)
+        self.node = Node("benchmark")
+        self._stack.callback(self.node.destroy_node)
+        self._directory = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+        self._children = self._stack.enter_context(Children())
+        topic = topics.DIAGNOSTICS
+        self.node.create_subscription(topic.message_type, topic.name, self._listen, topic.qos)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.close()
+
+    def start(self, name: str, parameters: Mapping[str, object]) -> Child:
+        """Start one of the package's nodes."""
+        child = start_node(self._children, self._directory, name, parameters)
+        if name == topics.SIM_NODE:
+            self._simulator = child
+        return child
+
+    def wait_until(
+        self,
+        done: Callable[[], object],
+        step: Callable[[], object] | None = None,
+        patience: float = _PATIENCE,
+    ) -> None:
+        """Take reports, or what else a step takes, until it is done.
+
+        Raises:
+            RuntimeError: the simulator failed, or it takes longer than `patience`, s.
+        """
+        deadline = time.monotonic() + patience
+        while not done():
+            if step is None:
+                rclpy.spin_once(self.node, timeout_sec=0.05)
+            else:
+                step()
+            failed = self._simulator is not None and self._simulator.exit_code
+            if failed or time.monotonic() > deadline:
+                words = self._simulator.last_words() if self._simulator else "not started"
+                raise RuntimeError(f"the simulator does not report what is waited for: {words}")
+
+    def _listen(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name.endswith(topics.SIM_NODE):
+                self.reports.append({item.key: item.value for item in status.values})
+
+
+def start_node(
+    children: Children, directory: Path, name: str, parameters: Mapping[str, object]
+) -> Child:
+    """Start one of the package's nodes as a child; parameters and log go to a directory."""
+    (directory / PARAMETERS).mkdir(exist_ok=True)
+    file = write_parameters(directory, name, parameters)
+    arguments = ["--ros-args", "--params-file", str(file)]
+    log = directory / f"{name}.log"
+    module = _MODULES.get(name, f"{name}.main")
+    return children.start(lambda: Child(name, module, arguments, log, dict(os.environ)))
+
+
+def private_memory(child: Child) -> float:
+    """Memory in MB that a child shares with nobody and no file holds."""
+    lines = Path(f"/proc/{child.pid}/smaps_rollup").read_text().splitlines()
+    (anonymous,) = (line.split()[1] for line in lines if line.startswith("Pss_Anon:"))
+    return 1e-3 * float(anonymous)
+
+
+def processor_time(child: Child) -> float:
+    """How long a child has kept a processor busy so far, s."""
+    fields = Path(f"/proc/{child.pid}/stat").read_text().rpartition(")")[2].split()
+    user, system = (int(field) for field in fields[11:13])  # utime and stime of proc(5)
+    return (user + system) / os.sysconf("SC_CLK_TCK")

@@ -1,0 +1,1 @@
+"""The controller's ROS interface: subscribers and publishers."""

@@ -1,0 +1,97 @@
+"""The contacts that go with each state, as they come over a topic."""
+
+import numpy as np
+from rclpy.node import Node
+
+from controller_node.interface.simulators import Simulators
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Character
+from msgs_config.errors import MessageError
+from msgs_config.messages import topics
+from msgs_config.messages.joint_state import frame_id_of
+from msgs_config.messages.wrenches import decode_wrenches
+from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.polling import DirectSubscription
+
+_LARGEST = 1e9  # N and N m
+_MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the states waiting
+_MOST_KEPT = 5000  # ticks whose states are yet to come, as many as the queue of states holds
+
+
+class ContactInbox:
+    """Takes `contacts` of the bound simulator, and has those of each state ready."""
+
+    def __init__(
+        self, node: Node, character: Character, simulators: Simulators, warnings: Warnings
+    ) -> None:
+        self._simulators = simulators
+        self._inbox = DirectSubscription(node, topics.CONTACTS)
+        self._rows = {link.name: row for row, link in enumerate(character.links)}
+        self._warnings = warnings
+        self._until_ns = -1  # of the last state of the episode that has had its contacts
+        self._newest_ns = -1
+        self._kept = dict[int, FloatArray]()  # by stamp
+
+    def begin(self) -> None:
+        """An episode begins, whose stamps may be those of another simulator's episode before."""
+        self._until_ns = -1
+
+    def restart(self) -> None:
+        """Forget all: what comes from now on is another simulator's."""
+        self._kept.clear()
+        self._until_ns = self._newest_ns = -1
+
+    def until(self, stamp_ns: int, episode_ns: int) -> FloatArray | None:
+        """Net wrenches (links, 6), N and N m, of all ticks since the last call up to a state.
+
+        None as long as those of the state's own tick are yet to come. In lockstep they are of one
+        tick, in real time of those as well whose states were left without an answer. What lies
+        before the episode's first state does not count.
+        """
+        for _ in range(_MOST_AT_ONCE):
+            raw = self._inbox.take()
+            if raw is None:
+                break
+            self._keep(raw)
+        if stamp_ns not in self._kept:
+            return None
+        wrenches = np.zeros((len(self._rows), 6))
+        for stamp in sorted(stamp for stamp in self._kept if stamp <= stamp_ns):
+            contacts = self._kept.pop(stamp)
+            if stamp >= episode_ns:
+                wrenches += contacts
+        self._until_ns = stamp_ns
+        return wrenches
+
+    def _keep(self, raw: bytes) -> None:
+        try:
+            if not self._simulators.is_own(topics.CONTACTS.name, frame_id_of(raw)):
+                return
+            message = decode_wrenches(raw)
+        except MessageError as error:
+            self._warnings.say_once(f"contacts ignored: {error}")
+            return
+        if message.stamp_ns < self._newest_ns:  # of a simulator that was started again
+            self._kept.clear()
+            self._until_ns = -1
+        self._newest_ns = message.stamp_ns
+        if message.stamp_ns <= self._until_ns:
+            return
+        wrenches = np.zeros((len(self._rows), 6))
+        fits = len(message.wrenches) == len(message.links)
+        if fits and (np.abs(message.wrenches) <= _LARGEST).all():  # NaN is not
+            for link, wrench in zip(message.links, message.wrenches, strict=True):
+                if link in self._rows:
+                    wrenches[self._rows[link]] += wrench
+        else:
+            self._warnings.say_once(
+                f"contacts ignored: not one wrench a link, of {_LARGEST:g} N and N m at most"
+            )
+        self._kept[message.stamp_ns] = wrenches
+        if len(self._kept) > _MOST_KEPT:
+            del self._kept[next(iter(self._kept))]  # the oldest: stamps that go back clear all
+            self._warnings.say_once(
+                f"contacts of more than {_MOST_KEPT} ticks wait for their states; the oldest are "
+                "dropped",
+                kind="contacts that wait",
+            )

@@ -1,0 +1,144 @@
+"""What the controller publishes."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory
+
+from controller_node.actuation import net_wrench
+from controller_node.behaviours.base import ModeReport
+from controller_node.interface.plan_message import plan_message
+from controller_node.planner.outlook import Outlook
+from controller_node.strength import Strengths
+from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.character.layout import JointLayout
+from msgs_config.messages import topics
+from msgs_config.messages.joint_state import DoublesEncoder, JointStateEncoder, split_stamp
+from msgs_config.messages.session import ANONYMOUS
+from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.messages.topics import Outgoing
+from msgs_config.messages.wrenches import WORLD
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An answer, kept: a state that comes again gets it again, and nothing is computed anew."""
+
+    raw_state: bytes
+    state: StampedState
+    effort: FloatArray  # (n,) what is sent of it, zero elsewhere
+    torques: bytes  # the message
+    session: str  # of the simulator whose state it is
+    reference: StampedReference
+
+
+class Outputs:
+    """The publishers of a controller. A topic that nobody listens to costs nothing."""
+
+    def __init__(
+        self, node: Node, layout: JointLayout, commanded: IntArray, session: str | None
+    ) -> None:
+        """Offer the topics; `commanded` are the entries of the effort that are sent.
+
+        `session` is the simulator's, None as long as that is not known.
+        """
+        self._layout = layout
+        self._commanded = commanded
+        self.bind(session or ANONYMOUS)
+        self._wrench_encoder = DoublesEncoder(WORLD)
+        self._initial_states = topics.create_publisher(node, topics.INITIAL_STATE)
+        self._references = topics.create_publisher(node, topics.REFERENCE)
+        self._wrenches = topics.create_publisher(node, topics.NET_WRENCH)
+        self._torques = topics.create_publisher(node, topics.JOINT_TORQUES)
+        self._configurations = topics.create_publisher(node, topics.CONFIGURATION)
+        self._trajectories = topics.create_publisher(node, topics.ACTIVE_TRAJECTORY)
+        self._strengths = topics.create_publisher(node, topics.ACTIVE_STRENGTH)
+        self._modes = topics.create_publisher(node, topics.MODE)
+        self._plans = topics.create_publisher(node, topics.PLAN)
+
+    def publish_initial_state(self, state: StampedState) -> None:
+        """Publish in which state the reference begins."""
+        self._initial_states.publish(
+            self._reference_encoder.encode(state.stamp_ns, state.position, state.velocity)
+        )
+
+    def bind(self, session: str) -> None:
+        """Name the simulator's session in what answers its states."""
+        names = self._layout.dof_names
+        self._session = session
+        self._torque_encoder = JointStateEncoder(
+            [names[entry] for entry in self._commanded], session
+        )
+        self._reference_encoder = JointStateEncoder(names, session)
+
+    @property
+    def torque_subscribers(self) -> int:
+        """How many subscribe to the torques."""
+        return int(self._torques.get_subscription_count())
+
+    def answer(
+        self, raw: bytes, state: StampedState, effort: FloatArray, reference: StampedReference
+    ) -> Answer:
+        """The answer with an effort (n,) to a state, ready to be published."""
+        torques = self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded])
+        sent = np.zeros(self._layout.size)
+        sent[self._commanded] = effort[self._commanded]
+        return Answer(raw, state, sent, torques, self._session, reference)
+
+    def publish(self, answer: Answer) -> None:
+        """Publish an answer, the torques first: the simulator goes on while the rest is made."""
+        self._torques.publish(answer.torques)
+        topics.publish_together(self._beside_torques(answer))
+
+    def _beside_torques(self, answer: Answer) -> Iterator[Outgoing]:
+        """What the simulator does not wait for, if anybody listens."""
+        if self._references.get_subscription_count():
+            reference = answer.reference
+            yield (
+                self._references,
+                self._reference_encoder.encode(
+                    reference.stamp_ns, reference.position, reference.velocity
+                ),
+            )
+        if self._wrenches.get_subscription_count():
+            yield self._wrenches, self._net_wrench(answer)
+
+    def flush(self, seconds: float) -> None:
+        """Wait until every subscriber has what was published, at the most `seconds`."""
+        topics.flush((self._torques, self._references, self._wrenches), seconds)
+
+    def publish_configuration(self, text: str) -> None:
+        """Publish what the controller is and has in force, as JSON."""
+        self._configurations.publish(String(data=text))
+
+    def publish_trajectory(self, trajectory: JointTrajectory) -> None:
+        """Publish a trajectory that was taken, with the stamp that it begins at."""
+        self._trajectories.publish(trajectory)
+
+    def publish_strengths(self, strengths: Strengths) -> None:
+        """Publish strengths that were taken, of every joint, with the stamp that they begin at."""
+        message = JointState()
+        message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(strengths.start_ns)
+        values = strengths.by_joint(self._layout)
+        message.name, message.effort = list(values), list(values.values())
+        self._strengths.publish(message)
+
+    def publish_mode(self, report: ModeReport) -> None:
+        """Publish what it does, since when and why, as JSON."""
+        self._modes.publish(String(data=json.dumps(report.content(), allow_nan=False)))
+
+    def publish_plan(self, outlook: Outlook, stamp_ns: int) -> None:
+        """Publish what is expected of a plan that was made in the state of a stamp."""
+        if self._plans.get_subscription_count():
+            self._plans.publish(plan_message(outlook, stamp_ns))
+
+    def _net_wrench(self, answer: Answer) -> bytes:
+        """The serialised message."""
+        configuration = self._layout.configuration(answer.state.position)
+        force, torque = net_wrench(self._layout, configuration, answer.effort)
+        return self._wrench_encoder.encode(answer.state.stamp_ns, np.concatenate((force, torque)))

@@ -1,0 +1,247 @@
+"""Which of the simulators that are heard the controller belongs to, and what those say."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rclpy.node import Node
+from std_msgs.msg import Header, String
+
+from msgs_config.errors import ActuatedCharactersError, ClockError, MessageError
+from msgs_config.messages import configuration, topics
+from msgs_config.messages.clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
+from msgs_config.messages.configuration import RunConfiguration
+from msgs_config.messages.joint_state import decode, frame_id_of
+from msgs_config.messages.session import (
+    ForeignSessions,
+    SessionBinding,
+    episode_session,
+    named,
+    session_of,
+)
+from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.polling import DirectSubscription
+
+_CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
+_MOST_KNOWN = 8  # simulators of which something is kept
+_MOST_AT_ONCE = 1000  # foreign states in a row
+_EXPLAIN_AFTER = 2.0  # s without a word of the episode
+_ALONE_AFTER = 1.0  # s in which another simulator would have been discovered
+
+
+@dataclass
+class _Known:
+    """What one simulator has said of itself."""
+
+    configuration: RunConfiguration | None = None
+    is_checked: bool = False
+    error: ActuatedCharactersError | None = None  # why this controller is not made for it
+    episode_ns: int | None = None
+
+
+class Simulators:
+    """Takes `~/configuration` and `episode` of all simulators, and binds to one of them.
+
+    It binds to the session that is given, or else to the first whose state can be used. What the
+    others say is rejected, counted, and logged once for each.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        session: str,
+        clock: TickClock,
+        check: Callable[[RunConfiguration], None],
+        warnings: Warnings,
+    ) -> None:
+        """`check` raises an error if a simulator is not what this controller was made for."""
+        self._count_publishers = lambda: int(node.count_publishers(topics.JOINT_STATES.name))
+        self._binding = SessionBinding(session, self._count_publishers)
+        self._foreign = ForeignSessions()
+        self._clock = clock
+        self._check = check
+        self._warnings = warnings
+        self._known: dict[str, _Known] = {}  # by session, the oldest first
+        self._rejected_episodes = 0
+        self._now = 0.0
+        self._lacks_episode_since: float | None = None
+        self._unusable_since: float | None = None
+        depth = 2 * _MOST_KNOWN  # one of the one must not push out one of the other
+        self._episodes = DirectSubscription(node, topics.EPISODE.for_listener(depth))
+        self._configurations = DirectSubscription(node, _CONFIGURATION.for_listener(depth))
+        self.runs_on = False
+        """Whether the simulator waits for nobody."""
+
+    @property
+    def bound(self) -> str | None:
+        """The session of the simulator that this controller belongs to; None if not known yet."""
+        return self._binding.bound
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """What was rejected, for the diagnostics."""
+        counts = self._foreign.counts
+        return {
+            "foreign_states": counts[topics.JOINT_STATES.name],
+            "foreign_contacts": counts[topics.CONTACTS.name],
+            "foreign_configurations": counts[_CONFIGURATION.name],
+            "rejected_episodes": counts[topics.EPISODE.name] + self._rejected_episodes,
+        }
+
+    def look(self, now: float) -> None:
+        """Take what simulators have said of themselves; `now` in s of wall time.
+
+        Raises:
+            ActuatedCharactersError: the one that it is bound to, or the only one that there is,
+                simulates something else than this controller was made for.
+        """
+        self._now = now
+        self._binding.look(now)
+        self._take_episode()
+        self._take_configuration()
+
+    def next_state(self, take: Callable[[], bytes | None]) -> bytes | None:
+        """The next state that is not foreign, serialised; None if there is none now."""
+        for _ in range(_MOST_AT_ONCE):
+            raw = take()
+            if raw is None or self._admits(raw):
+                return raw
+        return None
+
+    def bind(self, frame_id: str) -> bool:
+        """Take a usable state with this `frame_id`; whether that binds to a new simulator."""
+        session = session_of(frame_id)
+        is_new = self._binding.take(session)
+        if is_new:
+            self._lacks_episode_since, self.runs_on = None, False
+            self._judge(self._known_of(session))
+        return is_new
+
+    def is_own(self, topic: str, frame_id: str) -> bool:
+        """Whether a message is of the bound simulator; else it is counted as foreign."""
+        session = session_of(frame_id)
+        if self._binding.hear(session):
+            return True
+        self._reject(topic, session)
+        return False
+
+    def episode_before(self, stamp_ns: int) -> int | None:
+        """Stamp of the first state of the episode that goes on at a stamp, as the simulator says.
+
+        None if it does not, or not yet; after a while that is logged.
+        """
+        session = self._binding.bound
+        known = None if session is None else self._known.get(session)
+        if known is not None and known.episode_ns is not None and known.episode_ns <= stamp_ns:
+            self._lacks_episode_since = None
+            return known.episode_ns
+        if self._lacks_episode_since is None:
+            self._lacks_episode_since = self._now
+        elif self._now > self._lacks_episode_since + _EXPLAIN_AFTER:
+            self._warnings.say_once(
+                f"waiting for a message on '{topics.EPISODE.name}' that says when the episode of "
+                f"the state of {stamp_ns} ns began; its session must be {named(session)}"
+            )
+        return None
+
+    def _admits(self, raw: bytes) -> bool:
+        try:
+            session = session_of(frame_id_of(raw))
+        except MessageError:
+            return True  # the decoder says what is wrong with it
+        if not self._binding.admits(session):
+            self._reject(topics.JOINT_STATES.name, session)
+            return False
+        if self._binding.bound is None and (error := self._error_of(session)) is not None:
+            if self._unusable_since is None:  # else that is what this node ends with
+                self._warnings.say_once(f"state ignored: {error}")
+            return False
+        return True
+
+    def _reject(self, topic: str, session: str) -> None:
+        line = self._foreign.reject(topic, session, self._binding.bound)
+        if line is not None:
+            self._warnings.say_once(line)
+
+    def _take_episode(self) -> None:
+        raw = self._episodes.take()
+        if raw is None:
+            return
+        try:
+            header = decode(raw, Header)
+            session = episode_session(header.frame_id)
+            if self._binding.bound is not None and not self._binding.hear(session):
+                self._reject(topics.EPISODE.name, session)
+                return
+            stamp_ns = header.stamp.sec * NANOSECONDS_PER_SECOND + header.stamp.nanosec
+            if self._clock.tick(stamp_ns) < FIRST_TICK:
+                raise ClockError(f"its stamp, {stamp_ns} ns, is before the first tick")
+        except (MessageError, ClockError) as error:
+            self._rejected_episodes += 1
+            self._warnings.say_once(f"episode ignored: {error}")
+            return
+        self._known_of(session).episode_ns = stamp_ns
+
+    def _take_configuration(self) -> None:
+        raw = self._configurations.take()
+        if raw is not None:
+            try:
+                self._hear_configuration(configuration.parse(decode(raw, String).data))
+            except MessageError as error:
+                self._warnings.say_once(f"configuration ignored: {error}")
+        if self._binding.bound is None:
+            self._refuse_the_only_one()
+
+    def _hear_configuration(self, found: RunConfiguration) -> None:
+        if self._binding.bound not in (None, found.session):
+            self._reject(_CONFIGURATION.name, found.session)
+        known = self._known_of(found.session)
+        is_first = known.configuration is None
+        known.configuration, known.is_checked, known.error = found, False, None
+        if self._binding.bound != found.session:
+            return
+        if is_first and self._checked(known) is not None and self._binding.release():
+            return  # its first state came before it, and another simulator may be there
+        self._judge(known)
+
+    def _judge(self, known: _Known) -> None:
+        """Raise the error if the bound simulator is not what this controller was made for."""
+        if known.configuration is not None:
+            self.runs_on = known.configuration.parameters.get("mode") == "realtime"
+        if (error := self._checked(known)) is not None:
+            raise error
+
+    def _refuse_the_only_one(self) -> None:
+        """Raise the error of the only simulator that there is, if it can never be bound to.
+
+        A second one may be running for long and only not be discovered yet.
+        """
+        told = [known for known in self._known.values() if known.configuration is not None]
+        errors = [error for known in told if (error := self._checked(known)) is not None]
+        if not errors or len(errors) < len(told) or self._count_publishers() > 1:
+            self._unusable_since = None
+        elif self._unusable_since is None:
+            self._unusable_since = self._now
+        elif self._now > self._unusable_since + _ALONE_AFTER:
+            raise errors[-1]
+
+    def _error_of(self, session: str) -> ActuatedCharactersError | None:
+        known = self._known.get(session)
+        return None if known is None else self._checked(known)
+
+    def _checked(self, known: _Known) -> ActuatedCharactersError | None:
+        """Why a simulator is not the one that this controller was made for; checked once."""
+        if known.configuration is not None and not known.is_checked:
+            known.is_checked = True
+            try:
+                self._check(known.configuration)
+            except ActuatedCharactersError as error:
+                known.error = error
+        return known.error
+
+    def _known_of(self, session: str) -> _Known:
+        if session not in self._known:
+            if len(self._known) == _MOST_KNOWN:
+                others = (name for name in self._known if name != self._binding.bound)
+                del self._known[next(others)]
+            self._known[session] = _Known()
+        return self._known[session]

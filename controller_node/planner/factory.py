@@ -1,0 +1,98 @@
+"""The planner that a controller's parameters say."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from controller_node.planner.base import Planner
+from controller_node.planner.recorded import RecordedPlanner
+from controller_node.planner.settings import NO_PLANNER, RECORDED, check_planner, make_settings
+from controller_node.references.files.reconstructed import read_plan
+from controller_node.references.offsets import RecordedPlan
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
+from msgs_config.parameters import Values
+from msgs_config.shared_parameters import COMMAND_DELAY
+
+if TYPE_CHECKING:
+    from controller_node.planner.late_commands import LateCommands  # needs numba
+
+
+def check_planning(character: Character, values: Values) -> None:
+    """Raise ActuatedCharactersError as `make_planner`, but for what is not installed."""
+    name = values.text("planner")
+    if name == NO_PLANNER:
+        return
+    check_planner(character, values)
+    if name == RECORDED:
+        _recorded_plan(character, values)
+    else:
+        make_settings(character, values)
+
+
+def make_planner(character: Character, values: Values) -> Planner | None:
+    """The planner that the parameters' values say; None without one.
+
+    Raises:
+        ActuatedCharactersError: it cannot be had for the character, or beside the other values; or
+            the clip's file has no plan, or a malformed one.
+    """
+    name = values.text("planner")
+    if name == NO_PLANNER:
+        return None
+    check_planner(character, values)
+    if name == RECORDED:
+        plan = _recorded_plan(character, values)
+        return RecordedPlanner(plan, _late_commands(character, values))
+    settings = make_settings(character, values)
+    with saying_what_it_needs(name):
+        from controller_node.planner.planner import PredictivePlanner
+    return PredictivePlanner(
+        character, settings, rate_hz=values.integer("rate"), gravity=values.number("gravity")
+    )
+
+
+def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
+    """The plan in a clip's file, at this controller's rate."""
+    clip, rate = values.text("clip"), values.integer("rate")
+    plan = read_plan(character, clip) if values.text("reference") == "clip" else None
+    if plan is None:
+        raise ConfigurationError(
+            f"planner '{RECORDED}' plays the plan in a file of `reconstruct`; the clip '{clip}' "
+            "has none"
+        )
+    if plan.rate_hz != rate:
+        raise ConfigurationError(
+            f"parameter 'rate' is {rate}; the plan in {clip} is for {plan.rate_hz}"
+        )
+    return plan
+
+
+def _late_commands(character: Character, values: Values) -> "LateCommands | None":
+    """The commands on their way, where they take a tick or more."""
+    delay = values.integer(COMMAND_DELAY.name)
+    if not delay:
+        return None
+    with saying_what_it_needs(f"{RECORDED}' with '{COMMAND_DELAY.name}"):
+        from controller_node.planner.contact_model import ContactModel
+        from controller_node.planner.late_commands import LateCommands
+    model = ContactModel(
+        character,
+        period_s=1.0 / values.integer("rate"),
+        gravity=values.number("gravity"),
+        friction=values.number("plan.friction"),
+    )
+    return LateCommands(character, model, delay)
+
+
+@contextmanager
+def saying_what_it_needs(planner: str) -> Iterator[None]:
+    """Raise ConfigurationError, with how to get it, where an import needs numba in vain."""
+    try:
+        yield
+    except ImportError as error:
+        if (error.name or "").partition(".")[0] not in ("numba", "llvmlite"):
+            raise
+        raise ConfigurationError(
+            f"planner '{planner}' needs numba ({error}): pip install 'actuated_characters[plan]'"
+        ) from error

@@ -1,0 +1,72 @@
+"""What a rollout's deviations from the reference cost: each feature has its weight."""
+
+import math
+
+import numpy as np
+
+from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.settings import PlannerSettings
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Character
+
+_STEP_TIME = 0.2  # s of its velocity by which a foot is ahead of a centre of mass that was pushed
+_STEP = 5.0  # 1/m, of a foot that steps there
+_LOOSE_CENTRE = 0.4  # of the weight of the centre of mass, horizontally, while the place gives way
+
+
+class Comparison:
+    """Turns deviations of features (..., f) into residuals, linearly.
+
+    While the reference gives way, feet are not held to places but to the centre of mass and its
+    velocity, so that they step to where they catch it, and hands to the centre of mass. (Raibert
+    1986, "Legged Robots That Balance"; Pratt et al. 2006, "Capture Point".)
+    """
+
+    def __init__(
+        self, character: Character, model: ContactModel, settings: PlannerSettings
+    ) -> None:
+        joints, weights = len(settings.sigma), settings.weights
+        is_foot = [character.links[index].name in character.feet for index in model.end_effectors]
+        parts = [
+            (weights["root_rotation"], 3),
+            (weights["joints"], joints),
+            (weights["root_spin"], 3),
+            (weights["joint_rates"], joints),
+            (weights["centre_of_mass"], 3),
+            (weights["centre_of_mass_velocity"], 3),
+            (weights["angular_momentum"], 3),
+            *((weights["feet" if foot else "hands"], 3) for foot in is_foot),
+        ]
+        share = 1.0 / math.sqrt(settings.checks)  # the mean of the checks' squares counts
+        self._held = share * np.repeat(
+            [weight for weight, _ in parts], [count for _, count in parts]
+        )
+        self._centre = 6 + 2 * joints
+        self._feet, self._hands = (
+            [self._centre + 9 + 3 * i for i, foot in enumerate(is_foot) if foot is wanted]
+            for wanted in (True, False)
+        )
+        self._loose = self._held.copy()
+        self._loose[self._centre : self._centre + 2] *= _LOOSE_CENTRE
+        for foot in self._feet:
+            self._loose[foot : foot + 2] = share * _STEP
+
+    def balance(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Centres of mass (..., 3) in m, their velocities (..., 3) in m/s of features (..., f)."""
+        first = self._centre
+        return features[..., first : first + 3], features[..., first + 3 : first + 6]
+
+    def residuals(self, deviations: FloatArray, *, gives_way: bool) -> FloatArray:
+        """The residuals of deviations, both (..., f)."""
+        if not gives_way:
+            held: FloatArray = deviations * self._held
+            return held
+        loose = deviations.copy()
+        centre = deviations[..., self._centre : self._centre + 3]
+        velocity = deviations[..., self._centre + 3 : self._centre + 6]
+        for foot in self._feet:
+            loose[..., foot : foot + 2] -= centre[..., :2] + _STEP_TIME * velocity[..., :2]
+        for hand in self._hands:
+            loose[..., hand : hand + 3] -= centre
+        loose *= self._loose
+        return loose

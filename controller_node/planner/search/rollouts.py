@@ -1,0 +1,98 @@
+"""Rollouts of many plans from one state, shared by threads.
+
+Each depends on its own plan alone, so that neither their number nor their order matters.
+"""
+
+import itertools
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from controller_node.planner.compiled.rollout import (
+    Body,
+    Desired,
+    Engine,
+    features_of,
+    roll_out,
+)
+from controller_node.planner.contact_model import ContactModel
+from controller_node.references.offsets import Offsets, knot_before
+from msgs_config.arrays import BoolArray, FloatArray
+
+_LARGEST = 1e4  # of a feature; beyond, a rollout has come to nothing
+
+
+class Rollouts:
+    """Threads with an engine each."""
+
+    def __init__(self, model: ContactModel, workers: int) -> None:
+        """The thread that asks is one of the workers."""
+        self._model = model
+        self._own = model.engine()  # of the thread that asks for single states
+        self._engines = [model.engine() for _ in range(workers)]
+        self._threads = ThreadPoolExecutor(max(workers - 1, 1))
+
+    def features_of(self, position: FloatArray, velocity: FloatArray, body: Body) -> FloatArray:
+        """The features (f,) of a reference's state, MuJoCo's position (q,) and velocity (n,)."""
+        row = np.zeros(self._model.feature_count)
+        features_of(row, position, velocity, body, self._own)
+        return row
+
+    def state_after(
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        offsets: Offsets,
+        desired: Desired,
+        body: Body,
+    ) -> tuple[FloatArray, FloatArray]:
+        """The state, (q,) and (n,), to which offsets lead; the same one if they lead to nothing."""
+        unchecked = desired._replace(check_ticks=len(desired.positions))
+        nothing = np.zeros((0, self._model.feature_count))
+        assert _has_knots(offsets.rows, desired)
+        if not roll_out(nothing, position, velocity, offsets.rows, unchecked, body, self._own):
+            return position, velocity
+        return self._own.position.copy(), self._own.velocity.copy()
+
+    def simulate(
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        plans: FloatArray,
+        desired: Desired,
+        body: Body,
+    ) -> tuple[FloatArray, BoolArray]:
+        """What becomes of plans (s, k, n - 6): features (s, checks, f), and which went well (s,).
+
+        The features of those that did not are zero.
+        """
+        ticks = len(desired.positions) - 1
+        assert _has_knots(plans[0], desired)
+        checks = ticks // desired.check_ticks
+        features = np.zeros((len(plans), checks, self._model.feature_count))
+        sound = np.zeros(len(plans), dtype=np.bool_)
+        numbers = itertools.count()  # each worker takes the next plan
+
+        def work(engine: Engine) -> None:
+            while (number := next(numbers)) < len(plans):
+                sound[number] = roll_out(
+                    features[number], position, velocity, plans[number], desired, body, engine
+                )
+
+        own, *others = self._engines
+        waiting = [self._threads.submit(work, engine) for engine in others]
+        work(own)
+        for done in waiting:
+            done.result()
+        with np.errstate(invalid="ignore"):
+            sound &= (np.abs(features) < _LARGEST).all(axis=(1, 2))  # NaN is not
+        features[~sound] = 0.0
+        return features, sound
+
+
+def _has_knots(rows: FloatArray, desired: Desired) -> bool:
+    """Whether the knots (k, n - 6) are there, for which compiled code does not look."""
+    last_tick = desired.first_tick + len(desired.positions) - 2
+    first, _ = knot_before(desired.first_tick, desired.knot_ticks)
+    last, _ = knot_before(last_tick, desired.knot_ticks)
+    return desired.first_knot <= first and last + 2 - desired.first_knot <= len(rows)

@@ -1,0 +1,135 @@
+"""The project's own format for a reconstructed motion: a clip with the plan that keeps it, as JSON.
+
+`Loop` and `Frames` are those of the clip (`clip_file.py`), so that whatever reads clips reads the
+motion. `Plan` has the control rate in Hz (`rate`), the ticks that it lasts (`ticks`) and from one
+knot to the next (`knot_ticks`), the degrees of freedom (`dofs`), and `parts`: from a tick on
+(`tick`), offsets at knots, the first of a number (`knot`), rad or m (`offsets`). What made the file
+stands in `Reconstruction`; a run takes its length, its parameters and its pushes from there.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller_node.references.files.clip import clip_path
+from controller_node.references.offsets import Offsets, RecordedPlan, knot_before
+from msgs_config.character.layout import JointLayout
+from msgs_config.character.model import Character
+from msgs_config.errors import ClipError
+from msgs_config.files import read_text
+
+PLAN, RECONSTRUCTION = "Plan", "Reconstruction"
+SUFFIX = ".json"
+
+_LARGEST_OFFSET = 1e3  # rad or m; more is a mistake
+_MALFORMED = (ValueError, KeyError, TypeError, OverflowError)
+
+
+def read_plan(character: Character, name_or_path: str) -> RecordedPlan | None:
+    """The plan in a clip's file, None if it has none.
+
+    Raises:
+        ClipError: there is no such clip, or its plan is malformed or of other joints.
+    """
+    if not name_or_path.endswith(SUFFIX):
+        return None
+    path = clip_path(character, name_or_path)
+    content = _content(path)
+    if PLAN not in content:
+        return None
+    return _plan(path, character.layout, content[PLAN])
+
+
+@dataclass(frozen=True)
+class FoundWith:
+    """The run in which a motion was found; in any other one it is another motion."""
+
+    duration: float  # s, as far as it was found
+    simulator: Mapping[str, object]  # parameters of `sim_node`, by name
+    controller: Mapping[str, object]  # of `controller_node`
+    pushes: tuple[str, ...]  # LINK:FX,FY,FZ@S, which came in the search, too
+
+
+def read_found_with(character: Character, name_or_path: str) -> FoundWith | None:
+    """The run that a clip's file was found with, None if it does not say.
+
+    Raises:
+        ClipError: there is no such clip, or what it says is malformed.
+    """
+    if not name_or_path.endswith(SUFFIX):
+        return None
+    path = clip_path(character, name_or_path)
+    content = _content(path)
+    made = content.get(RECONSTRUCTION)
+    if made is None:
+        return None
+    try:
+        sides = made["parameters"]
+        duration = float(made["duration"])
+        pushes = made.get("pushes", [])
+        if not isinstance(pushes, list) or not all(isinstance(push, str) for push in pushes):
+            raise TypeError
+        found = FoundWith(
+            duration, dict(sides["sim_node"]), dict(sides["controller_node"]), tuple(pushes)
+        )
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise ClipError(
+            f"{path}: {RECONSTRUCTION} must have 'duration', 'parameters' of sim_node and of "
+            "controller_node, and 'pushes' as texts, if any"
+        ) from error
+    return found
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(read_text(path, ClipError))
+    except (ValueError, RecursionError) as error:
+        raise ClipError(f"{path}: not a motion clip; it must be JSON") from error
+    if not isinstance(content, dict):
+        raise ClipError(f"{path}: not a motion clip; it must be a JSON object")
+    return content
+
+
+def _plan(path: Path, layout: JointLayout, content: Any) -> RecordedPlan:
+    place = f"{path}: {PLAN}"
+    try:
+        rate, ticks, knot_ticks = (int(content[key]) for key in ("rate", "ticks", "knot_ticks"))
+        dofs = [str(name) for name in content["dofs"]]
+        starts = [int(part["tick"]) for part in content["parts"]]
+        offsets = [
+            Offsets(knot_ticks, int(part["knot"]), np.array(part["offsets"], dtype=float))
+            for part in content["parts"]
+        ]
+    except _MALFORMED as error:
+        raise ClipError(
+            f"{place} must have 'rate', 'ticks' and 'knot_ticks', 'dofs', and 'parts' with 'tick', "
+            "'knot' and 'offsets'"
+        ) from error
+    if not layout.has_floating_base or dofs != list(layout.dof_names[6:]):
+        raise ClipError(f"{place}: dofs must be the actuated ones of the character, in its order")
+    if min(rate, ticks, knot_ticks) < 1 or not starts:
+        raise ClipError(
+            f"{place}: rate, ticks, knot_ticks and the number of parts must be 1 or more"
+        )
+    if starts[0] < 0 or not (np.diff([*starts, ticks]) > 0).all():
+        raise ClipError(f"{place}: the parts' ticks must rise, from 0 to below 'ticks'")
+    for part, first, then in zip(offsets, starts, [*starts[1:], ticks], strict=True):
+        _check_part(f"{place}: from tick {first} on", part, first, then, len(dofs))
+    return RecordedPlan(rate, ticks, tuple(zip(starts, offsets, strict=True)))
+
+
+def _check_part(place: str, part: Offsets, first: int, then: int, width: int) -> None:
+    """Raise ClipError if a part lacks knots for the ticks from the first to before the next."""
+    begins, ends = (knot_before(tick, part.knot_ticks)[0] for tick in (first, then - 1))
+    shape = ends + 2 - begins, width
+    if part.first_knot != begins or part.rows.shape != shape:
+        raise ClipError(
+            f"{place} offsets are {part.rows.shape} from knot {part.first_knot} on; they must be "
+            f"{shape} from knot {begins} on"
+        )
+    if not (np.abs(part.rows) <= _LARGEST_OFFSET).all():  # NaN is not
+        raise ClipError(f"{place} an offset is not finite, or over {_LARGEST_OFFSET:g}")

@@ -1,0 +1,1 @@
+"""A character's description: files, links, joints, shapes."""

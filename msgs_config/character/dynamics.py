@@ -1,0 +1,251 @@
+"""The model of the dynamics on both sides of the loop: MuJoCo behind one class."""
+
+import mujoco
+import numpy as np
+
+from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.character.layout import JointType
+from msgs_config.character.model import Character, Joint, Link
+from msgs_config.geometry import fixed_order, rotations
+
+_GRAVITY = 9.81
+
+_MUJOCO_TYPES = {
+    JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE,
+    JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE,
+    JointType.SPHERICAL: mujoco.mjtJoint.mjJNT_BALL,
+    JointType.FLOATING: mujoco.mjtJoint.mjJNT_FREE,
+}
+
+
+class DynamicsModel:
+    """Mass matrix `M` and bias force `C` of `M dv/dt + C = f`, in the layout's coordinates.
+
+    MuJoCo's velocities and forces are the layout's own; only its positions differ, in that a
+    rotation is a quaternion (wxyz) there.
+    """
+
+    def __init__(self, character: Character, gravity: float = _GRAVITY) -> None:
+        """Build the model of a character under a gravity in m/s^2 along -z."""
+        self._layout = character.layout
+        self._model = _compile(character, gravity)
+        self._data = mujoco.MjData(self._model)
+        self._mass_matrix = np.zeros((self._layout.size, self._layout.size))
+        self._damping = character.passive_damping()
+        # M is stored by rows of its lower triangle, the diagonal last
+        self._diagonal = self._model.M_rowadr + self._model.M_rownnz - 1
+        # no position at all: no distance, no angle, and as quaternions (wxyz) no turn
+        self._identity = np.zeros(self._model.nq)
+        self._identity[quaternion_starts(self._model)] = 1.0
+        self._start, self._desired = self._identity.copy(), self._identity.copy()
+
+    def update(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Take over a state: position (n,), message form, and velocity (n,)."""
+        data = self._data
+        self._convert(position, data.qpos)
+        data.qvel[:] = velocity
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_comPos(self._model, data)
+        mujoco.mj_crb(self._model, data)
+        mujoco.mj_comVel(self._model, data)
+
+    def error_of(self, position: FloatArray, desired: FloatArray) -> FloatArray:
+        """What leads from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.
+
+        It is the velocity, and so a rotation's part is in the child frame, that leads there in 1 s.
+        """
+        error: FloatArray = np.empty(self._layout.size)
+        self._convert(position, self._start)
+        self._convert(desired, self._desired)
+        mujoco.mj_differentiatePos(self._model, error, 1.0, self._start, self._desired)
+        return error
+
+    def _convert(self, position: FloatArray, qpos: FloatArray) -> None:
+        """Write a position (n,), message form, as MuJoCo has it.
+
+        It is where the velocity of the same numbers leads to in 1 s, from no position at all.
+        """
+        qpos[:] = self._identity
+        mujoco.mj_integratePos(self._model, qpos, position, 1.0)
+
+    def mass_matrix(self) -> FloatArray:
+        """The mass matrix M (n, n) at the state taken over: kg, kg m, kg m^2."""
+        mujoco.mj_fullM(self._model, self._data, self._mass_matrix)
+        return self._mass_matrix.copy()
+
+    def solve(self, force: FloatArray, added: FloatArray, period: float) -> FloatArray:
+        """The acceleration `a` (n,) of `(M + D h + diag(added)) a = force` over a period h in s.
+
+        The passive damping D is then that of the velocity at the period's end. The factorisation
+        `L' D L` follows the tree of the links (Featherstone 2008, section 6.5), and uses no BLAS.
+        """
+        data, diagonal = self._data, self._diagonal
+        without = data.M[diagonal]
+        data.M[diagonal] = without + (period * self._damping + added)
+        mujoco.mj_factorM(self._model, data)
+        data.M[diagonal] = without
+        acceleration: FloatArray = np.empty(self._layout.size)
+        mujoco.mj_solveM(self._model, data, acceleration[np.newaxis], force[np.newaxis])
+        return acceleration
+
+    def delassus_matrix(self, rows: FloatArray) -> FloatArray:
+        """`J M^-1 J^T` (m, m) of rows J (m, n): how the force on each row accelerates each.
+
+        In the position taken over; without passive damping (Brogliato 2016, "Nonsmooth Mechanics").
+        """
+        accelerations = np.empty_like(rows)
+        mujoco.mj_factorM(self._model, self._data)
+        mujoco.mj_solveM(self._model, self._data, accelerations, rows)
+        return fixed_order.product(rows, accelerations.T)
+
+    def bias_force(self) -> FloatArray:
+        """The bias force C (n,) at the state taken over.
+
+        Coriolis, centrifugal and gravity, and what the joints' passive damping takes.
+        """
+        bias = np.zeros(self._layout.size)
+        mujoco.mj_rne(self._model, self._data, 0, bias)
+        bias += self._damping * self._data.qvel
+        return bias
+
+    def inverse_dynamics(self, acceleration: FloatArray) -> FloatArray:
+        """The effort (n,) of an acceleration (n,) in the state taken over: `M dv/dt + C`."""
+        effort = np.empty(self._layout.size)
+        self._data.qacc[:] = acceleration
+        mujoco.mj_rne(self._model, self._data, 1, effort)
+        effort += self._damping * self._data.qvel
+        return effort
+
+    def gravity_force(self) -> FloatArray:
+        """The part of the bias force that is gravity's (n,): the effort that holds it still."""
+        data = self._data
+        velocity = data.qvel.copy()
+        data.qvel[:] = 0.0
+        mujoco.mj_comVel(self._model, data)
+        force = np.empty(self._layout.size)
+        mujoco.mj_rne(self._model, data, 0, force)
+        data.qvel[:] = velocity
+        mujoco.mj_comVel(self._model, data)
+        return force
+
+    def kinetic_energy(self) -> float:
+        """Kinetic energy of the state taken over, J."""
+        velocity = self._data.qvel
+        momentum = fixed_order.apply(self.mass_matrix(), velocity)
+        return 0.5 * float(fixed_order.dot(velocity, momentum))
+
+    def link_poses(self) -> tuple[FloatArray, FloatArray]:
+        """Origins (links, 3) in m, quaternions xyzw (links, 4) of the link frames in the world."""
+        return self._data.xpos[1:].copy(), rotations.xyzw_from_wxyz(self._data.xquat[1:])
+
+    def link_jacobian(self, link: int) -> FloatArray:
+        """The Jacobian J (6, n) of one link: `(velocity, angular velocity) = J v`, world axes.
+
+        The velocity (m/s) is that of the link's centre of mass; `link` is an index of
+        `Character.links`. A wrench (6,) at the centre of mass is the generalised force `J^T w`.
+        """
+        jacobian = np.empty((6, self._layout.size))
+        mujoco.mj_jacBodyCom(self._model, self._data, jacobian[:3], jacobian[3:], link + 1)
+        return jacobian
+
+    @property
+    def weight(self) -> float:
+        """Weight of all links together, N."""
+        return float(-self._model.opt.gravity[2] * self._model.body_subtreemass[1])
+
+    def centre_of_mass(self) -> FloatArray:
+        """Centre of mass (3,) of all links in the world, m."""
+        centre: FloatArray = self._data.subtree_com[1].copy()
+        return centre
+
+    def centre_of_mass_at(self, position: FloatArray) -> FloatArray:
+        """Centre of mass (3,) in the world, m, of a position (n,), in which the model then is."""
+        self.update(position, np.zeros(self._layout.size))
+        return self.centre_of_mass()
+
+    def centre_of_mass_jacobian(self) -> FloatArray:
+        """The Jacobian J (3, n) of the centre of mass: its velocity in the world is `J v`, m/s."""
+        jacobian = np.empty((3, self._layout.size))
+        mujoco.mj_jacSubtreeCom(self._model, self._data, jacobian, 1)
+        return jacobian
+
+    def centre_of_mass_velocity(self) -> FloatArray:
+        """Velocity (3,) of the centre of mass in the world, m/s."""
+        return fixed_order.apply(self.centre_of_mass_jacobian(), self._data.qvel)
+
+    def link_frames(self, links: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Origins (k, 3) in m and axes (k, 3, 3), as columns, of some link frames in the world.
+
+        `links` (k,) are indices of `Character.links`.
+        """
+        bodies = links + 1
+        return self._data.xpos[bodies], self._data.xmat[bodies].reshape(-1, 3, 3)
+
+    def point_jacobian(self, link: int, point: FloatArray) -> FloatArray:
+        """The Jacobian J (6, n) of a point (3,) that moves with a link; point in the world, m.
+
+        `(velocity, angular velocity) = J v`, world axes. A force (N) at the point and a moment
+        (N m) about it are the generalised force `J^T w` of the wrench (6,).
+        """
+        jacobian = np.empty((6, self._layout.size))
+        mujoco.mj_jac(self._model, self._data, jacobian[:3], jacobian[3:], point, link + 1)
+        return jacobian
+
+
+def quaternion_starts(model: mujoco.MjModel) -> list[int]:
+    """First entry of each quaternion among MuJoCo's positions."""
+    before = {int(mujoco.mjtJoint.mjJNT_BALL): 0, int(mujoco.mjtJoint.mjJNT_FREE): 3}
+    return [
+        int(address) + before[int(kind)]
+        for address, kind in zip(model.jnt_qposadr, model.jnt_type, strict=True)
+        if int(kind) in before
+    ]
+
+
+def _compile(character: Character, gravity: float) -> mujoco.MjModel:
+    """MuJoCo's model of a character, its bodies in the order of the character's links."""
+    spec = mujoco.MjSpec()
+    spec.option.gravity = (0.0, 0.0, -gravity)
+    add_links(spec, character)
+    return compile_exactly(spec, character)
+
+
+def add_links(spec: mujoco.MjSpec, character: Character) -> list[mujoco.MjsBody]:
+    """Add a character's links and joints, without shapes; the bodies are in the links' order."""
+    bodies = [spec.worldbody]
+    for link in character.links:
+        bodies.append(_add_body(bodies[link.parent + 1], link))
+    return bodies[1:]
+
+
+def compile_exactly(spec: mujoco.MjSpec, character: Character) -> mujoco.MjModel:
+    """Compile a model with the links of a character, whose inertia is kept to the last bit."""
+    spec.compiler.balanceinertia = False
+    model = spec.compile()
+    # set afterwards: the compiler refuses a link with mass but without inertia, which is sound
+    # wherever the joints above it cannot turn it about its centre of mass alone
+    model.body_inertia[1:] = [link.inertia_diagonal for link in character.links]
+    model.dof_simplenum[:] = 0  # else a simple body's mass matrix is the one compiled
+    return model
+
+
+def _add_body(parent: mujoco.MjsBody, link: Link) -> mujoco.MjsBody:
+    pose, inertial = link.joint.pose_in_parent, link.inertial_pose
+    body = parent.add_body(
+        name=link.name,
+        pos=pose.position,
+        quat=rotations.wxyz_from_xyzw(np.array(pose.orientation_xyzw)),
+        mass=link.mass,
+        ipos=inertial.position,
+        iquat=rotations.wxyz_from_xyzw(np.array(inertial.orientation_xyzw)),
+        inertia=(1.0, 1.0, 1.0),
+        explicitinertial=True,
+    )
+    if link.joint.type is not JointType.FIXED:
+        _add_joint(body, link.joint)
+    return body
+
+
+def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
+    axis = joint.axis_in_child if any(joint.axis_in_child) else (0.0, 0.0, 1.0)
+    body.add_joint(name=joint.name, type=_MUJOCO_TYPES[joint.type], axis=axis)

@@ -1,0 +1,51 @@
+"""What the engine is given to read in the place of a URDF."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from msgs_config import files
+from msgs_config.character.mesh_check import check_mesh
+from msgs_config.character.meshes import resolve_meshes
+from msgs_config.character.model import Loading
+from msgs_config.character.urdf_check import NUMBERS
+from msgs_config.errors import CharacterError
+
+MAX_LINE_BYTES = 8000
+"""The engine reads lines of up to 8191 bytes, and breaks a longer one in two."""
+
+
+def engine_urdf(loading: Loading) -> str:
+    """A URDF's text for the engine: what moves and collides, in short lines, its meshes absolute.
+
+    The engine would look for a mesh in the working directory first, take a tab between two
+    numbers for an end, and read what is only seen, for nothing.
+
+    Raises:
+        CharacterError: a mesh does not exist or cannot be used, or an element is too long.
+    """
+    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
+    for link in robot.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    for element in robot.iter():
+        for attribute in NUMBERS.get(element.tag, {}):
+            if attribute in element.attrib:
+                element.set(attribute, " ".join(element.attrib[attribute].split()))
+    resolve_meshes(robot, loading.urdf_path)
+    for path in {mesh.get("filename", "") for mesh in robot.iterfind("link//mesh")}:
+        try:
+            check_mesh(Path(path))
+        except CharacterError as error:
+            raise CharacterError(f"{loading.urdf_path}: {error}") from error
+    for joint in robot.findall("joint[@type='continuous']"):
+        for limit in joint.findall("limit"):  # has no bounds, but the engine would report some
+            limit.attrib.pop("lower", None)
+            limit.attrib.pop("upper", None)
+    ElementTree.indent(robot)
+    text = ElementTree.tostring(robot, encoding="unicode")
+    if any(len(line.encode()) > MAX_LINE_BYTES for line in text.splitlines()):
+        raise CharacterError(
+            f"{loading.urdf_path}: an element of more than {MAX_LINE_BYTES} bytes; "
+            "the engine cannot read it"
+        )
+    return text

@@ -1,0 +1,96 @@
+"""The mesh files of a URDF: found by their names, which are made absolute."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+from xml.etree import ElementTree
+
+from msgs_config import files
+from msgs_config.character.model import Loading
+from msgs_config.errors import CharacterError
+
+MAX_MESH_BYTES = 64 * 1024 * 1024
+
+
+def resolve_meshes(robot: ElementTree.Element, urdf: Path) -> None:
+    """Replace the file names of all meshes of a URDF's links by absolute paths.
+
+    Raises:
+        CharacterError: a mesh does not exist or is too large; names the file, link and path.
+    """
+    for link in robot.findall("link"):
+        for mesh in link.iter("mesh"):
+            try:
+                mesh.set("filename", str(_find(mesh.get("filename", ""), urdf)))
+            except CharacterError as error:
+                raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
+
+
+def collision_meshes(loading: Loading) -> dict[str, str]:
+    """SHA-256 of each mesh that is collided with, hexadecimal, by the name that the URDF gives it.
+
+    Raises:
+        CharacterError: a mesh does not exist or cannot be read.
+    """
+    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
+    names = {mesh.get("filename", "") for mesh in robot.iterfind("link/collision//mesh")}
+    return {name: _hash_of(_find(name, loading.urdf_path)) for name in sorted(names)}
+
+
+def check_collision_meshes(loading: Loading, known: Mapping[str, str]) -> None:
+    """Check that the meshes are those whose hashes are known; see `collision_meshes`.
+
+    Raises:
+        CharacterError: one is missing or another one; names its path.
+    """
+    for name, digest in collision_meshes(loading).items():
+        if known.get(name, digest) != digest:
+            path = _find(name, loading.urdf_path)
+            raise CharacterError(f"mesh {path} is not the one that it was: its content differs")
+
+
+def _hash_of(path: Path) -> str:
+    try:
+        status = path.stat()
+        return _hash_of_version(path, status.st_mtime_ns, status.st_size)
+    except OSError as error:
+        raise CharacterError(f"mesh {path}: {error.strerror}") from error
+
+
+@cache
+def _hash_of_version(path: Path, modified_ns: int, size: int) -> str:
+    """Once for each version of a file: a node says it anew when its parameters change."""
+    del modified_ns, size
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _find(name: str, urdf: Path) -> Path:
+    if not name or "\0" in name:
+        raise CharacterError(f"mesh without a usable file name: {name!r}")
+    candidates = list(_candidates(name, urdf))
+    for path in candidates:
+        try:
+            if path.is_file():
+                if path.stat().st_size > MAX_MESH_BYTES:
+                    raise CharacterError(f"mesh {path} is larger than {MAX_MESH_BYTES >> 20} MiB")
+                return path.absolute()
+        except OSError:  # such as a name that is too long
+            continue
+    raise CharacterError(f"mesh {name!r} does not exist; looked for {candidates[0]}")
+
+
+def _candidates(name: str, urdf: Path) -> Iterator[Path]:
+    """Where a mesh may lie: `package://` in its package, else below a folder above the URDF."""
+    if name.startswith("file://"):
+        yield Path(unquote(urlsplit(name).path))
+    elif name.startswith("package://"):
+        with suppress(CharacterError):
+            yield files.resolve(name, urdf.parent, CharacterError)
+        # as PyBullet does, and as packages lie in a workspace that is not installed
+        for folder in urdf.absolute().parents:
+            yield folder / name.removeprefix("package://")
+    else:
+        yield urdf.parent / name

@@ -1,0 +1,259 @@
+"""What a character is: links, joints, masses, shapes and frames, and how it is to be driven.
+
+Both sides build theirs from this one description: the simulator its body, the controller its
+model of the dynamics. All frames are URDF link frames; lengths in m, masses in kg.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.geometry import rotations
+from msgs_config.geometry.rotations import IDENTITY_XYZW
+
+ROOT_TORQUE = ROOT + "_r"
+"""Name of the gains of the floating base's rotation; those of its translation are `root`."""
+
+Vector = tuple[float, float, float]
+Quadruple = tuple[float, float, float, float]
+Quaternion = Quadruple
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Position (m) and orientation of a frame in another."""
+
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation_xyzw: Quaternion = IDENTITY_XYZW
+
+
+class ShapeType(Enum):
+    """What a shape is, and what its `size` says; axes of symmetry are z."""
+
+    BOX = "box"  # edges x, y, z
+    SPHERE = "sphere"  # radius
+    CYLINDER = "cylinder"  # radius, length
+    CAPSULE = "capsule"  # radius, length of the cylinder between the two half spheres
+    MESH = "mesh"  # scale along x, y, z of what the file says
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape that is seen or touched. `pose` is in the link frame, `mesh` an absolute path."""
+
+    type: ShapeType
+    size: tuple[float, ...]  # m; for a mesh factors
+    pose: Pose = Pose()
+    color_rgba: Quadruple = (0.7, 0.7, 0.7, 1.0)
+    mesh: str = ""
+
+    def without_capsule(self) -> tuple["Shape", ...]:
+        """The shape itself, or a capsule's cylinder and two spheres."""
+        if self.type is not ShapeType.CAPSULE:
+            return (self,)
+        radius, length = self.size
+        x, y, z = rotations.rotate(
+            np.array(self.pose.orientation_xyzw), np.array((0.0, 0.0, 0.5 * length))
+        ).tolist()
+        px, py, pz = self.pose.position
+        ends = (px + x, py + y, pz + z), (px - x, py - y, pz - z)
+        spheres = [
+            replace(self, type=ShapeType.SPHERE, size=(radius,), pose=Pose(end)) for end in ends
+        ]
+        return (replace(self, type=ShapeType.CYLINDER), *spheres)
+
+
+@dataclass(frozen=True)
+class SoftLimit:
+    """Bounds of a ball joint's rotation vector, kept by a spring and a damper outside of them."""
+
+    lower: Vector  # rad
+    upper: Vector  # rad
+    stiffness: float  # N m/rad
+    damping: float  # N m s/rad
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What joins a link to its parent; for a base link, to the world."""
+
+    name: str
+    type: JointType
+    axis_in_child: Vector = (0.0, 0.0, 0.0)
+    pose_in_parent: Pose = Pose()
+    lower: float = -np.inf  # rad or m
+    upper: float = np.inf
+    effort_limit: float = np.inf  # N m or N, of the vector's norm for a ball joint
+    damping: float = 0.0  # passive; N m s/rad or N s/m
+    soft_limit: SoftLimit | None = None  # of a ball joint
+
+
+@dataclass(frozen=True)
+class Link:
+    """One rigid body. `parent` is its index in `Character.links`, -1 for the base."""
+
+    name: str
+    parent: int
+    joint: Joint
+    mass: float
+    inertia_diagonal: Vector  # kg m^2, in the inertial frame
+    inertial_pose: Pose  # in the link frame
+    shapes: tuple[Shape, ...] = ()  # that are seen
+    collision_shapes: tuple[Shape, ...] = ()
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of a joint, of its error, of that one's rate, and of its integral over time."""
+
+    stiffness: float = 0.0  # N m/rad or N/m
+    damping: float = 0.0  # N m s/rad or N s/m
+    integral: float = 0.0  # N m/(rad s) or N/(m s)
+
+
+@dataclass(frozen=True)
+class Planning:
+    """What differs where joint torques are planned."""
+
+    sigma: dict[str, float | Vector] = field(default_factory=dict)
+    """By joint: how far its reference may be moved, rad or m; the measure of offsets."""
+    gains: dict[str, Gains] = field(default_factory=dict)
+    """By joint, instead of its others."""
+
+
+@dataclass(frozen=True)
+class ClipFormat:
+    """Where a character's motion clips lie, which joints their columns are, and how they count."""
+
+    pattern: str = ""  # a path with one '*', the clip's name
+    joints: tuple[str, ...] = ()
+    up_axis: str = "z"
+    quaternion: str = "wxyz"
+    base_rotation: Vector = (0.0, 0.0, 0.0)  # rad, rotation vector: the root's axes in their base's
+    signs: dict[str, float] = field(default_factory=dict)
+    """By joint: 1 or -1, of its angle in a clip."""
+    offsets: dict[str, float] = field(default_factory=dict)
+    """By joint, rad or m: what is added to it then."""
+
+
+@dataclass(frozen=True)
+class Loading:
+    """How the URDF is to be read: what the simulator needs to load the same body."""
+
+    urdf_path: Path
+    urdf_text: str = field(repr=False)
+    scale: float = 1.0
+    fixed_base: bool = False
+    inertia_from_file: bool = False
+    self_collision: bool = False
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where a character's own world stands in the world: turned about z by `yaw`, then moved."""
+
+    x: float = 0.0  # m
+    y: float = 0.0
+    z: float = 0.0
+    yaw: float = 0.0  # rad
+
+    def moved(
+        self, positions: FloatArray, orientations_xyzw: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Positions (..., 3) in m and orientations (..., 4) of the own world, in the world."""
+        if self == Placement():
+            return positions, orientations_xyzw  # to the last bit
+        turn = rotations.about_z(self.yaw)
+        return (
+            rotations.rotate(turn, positions) + np.array((self.x, self.y, self.z)),
+            rotations.multiply(turn, orientations_xyzw),
+        )
+
+
+@dataclass(frozen=True)
+class Character:
+    """A character: its body and its defaults. Links and joints are listed depth-first."""
+
+    name: str
+    file: Path
+    file_text: str = field(repr=False)
+    loading: Loading
+    links: tuple[Link, ...]
+    gains: dict[str, Gains]  # by joint; the base's force and torque under `root` and `root_r`
+    rest_position: tuple[float, ...]  # (n,), message form
+    clips: ClipFormat
+    feet: tuple[str, ...] = ()  # the links that it stands on
+    planning: Planning = Planning()
+    notes: tuple[str, ...] = ()  # what its author may have overlooked
+    placement: Placement = Placement()
+
+    @cached_property
+    def layout(self) -> JointLayout:
+        """The order of the character's degrees of freedom."""
+        return JointLayout((link.joint.name, link.joint.type) for link in self.links)
+
+    def placed(self, placement: Placement) -> "Character":
+        """The character as it was loaded, with its fixed base or its rest pose's root moved."""
+        if placement == Placement():
+            return self
+        if self.layout.has_floating_base:
+            rest = np.array(self.rest_position)
+            origin, turn = placement.moved(rest[:3], rotations.exp(rest[3:6]))
+            rest[:3], rest[3:6] = origin, rotations.log(turn)
+            return replace(self, placement=placement, rest_position=tuple(rest.tolist()))
+        base = self.links[0]
+        pose = base.joint.pose_in_parent
+        origin, turn = placement.moved(np.array(pose.position), np.array(pose.orientation_xyzw))
+        x, y, z = origin.tolist()
+        qx, qy, qz, qw = turn.tolist()
+        joint = replace(base.joint, pose_in_parent=Pose((x, y, z), (qx, qy, qz, qw)))
+        links = (replace(base, joint=joint), *self.links[1:])
+        return replace(self, placement=placement, links=links)
+
+    @property
+    def mass(self) -> float:
+        """Mass of all links together, kg."""
+        return math.fsum(link.mass for link in self.links)
+
+    @property
+    def moving_joints(self) -> list[Joint]:
+        """The joints of the layout, in its order."""
+        return [link.joint for link in self.links if link.joint.type is not JointType.FIXED]
+
+    @property
+    def vector_names(self) -> list[str]:
+        """Name of each physical vector of the layout: the joint's, `root_r` for root torque."""
+        names: list[str] = []
+        for joint in self.moving_joints:
+            names.append(joint.name)
+            if joint.type is JointType.FLOATING:
+                names.append(ROOT_TORQUE)
+        return names
+
+    def effort_limits(self) -> FloatArray:
+        """Limit (b,) of the norm of each physical vector of the layout, N m or N."""
+        limits: list[float] = []
+        for joint in self.moving_joints:
+            limits += [joint.effort_limit] * len(self.layout.joint(joint.name).vectors)
+        return np.array(limits)
+
+    def passive_damping(self) -> FloatArray:
+        """Passive damping (n,) of each entry, N m s/rad or N s/m."""
+        damping = np.zeros(self.layout.size)
+        for joint in self.moving_joints:
+            damping[self.layout.joint(joint.name).entries] = joint.damping
+        return damping
+
+    def position_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bound (n,) of each entry; infinite where the joint has none."""
+        lower, upper = np.full(self.layout.size, -np.inf), np.full(self.layout.size, np.inf)
+        for joint in self.moving_joints:
+            entries = self.layout.joint(joint.name).entries
+            lower[entries], upper[entries] = joint.lower, joint.upper
+        return lower, upper

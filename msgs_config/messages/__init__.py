@@ -1,0 +1,1 @@
+"""What crosses between the nodes: topics, stamps and message encodings."""

@@ -1,0 +1,168 @@
+"""What `~/configuration` says: all that a run depends on, as JSON, so that a bag can repeat it."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointLayout, JointType
+from msgs_config.character.meshes import collision_meshes
+from msgs_config.character.model import Character, Loading
+from msgs_config.errors import LayoutError, MessageError
+from msgs_config.messages.probe import Probe, read_probe
+from msgs_config.messages.session import ANONYMOUS, SESSION, session_of
+from msgs_config.parameters import Value, Values
+from msgs_config.versions import installed_versions, read_versions
+
+
+def describe(
+    character: Character,
+    values: Values,
+    since_ns: int | None = None,
+    probe: Probe | None = None,
+    terrain: Loading | None = None,
+    actuation: Mapping[str, int | bool] | None = None,
+    name: str = "",
+    characters: Sequence[str] = (),
+    session: str = ANONYMOUS,
+) -> str:
+    """The JSON text: the character with its files, the parameters in force, and the versions.
+
+    `since_ns` is the stamp of the last state that was answered with other parameters, if any;
+    `probe` and `terrain` are a simulator's, `actuation` a controller's. `name` is the character's
+    in its world, where it is one of several: `characters`, in the order in which they entered it.
+    `session` is the simulator's; as a parameter it is left out, for it is of no influence.
+
+    Raises:
+        CharacterError: a mesh of the character or of the terrain cannot be read.
+    """
+    content = {
+        "character": character.name,
+        "character_file": character.file_text,
+        "character_path": str(character.file),
+        "urdf": character.loading.urdf_text,
+        "urdf_path": str(character.loading.urdf_path),
+        "meshes": collision_meshes(character.loading),
+        "session": session,
+        "name": name,
+        "characters": list(characters),
+        "joints": [
+            {"name": joint.name, "type": joint.type.value} for joint in character.layout.joints
+        ],
+        "effort_limits": [_finite(limit) for limit in character.effort_limits().tolist()],
+        "mass": character.mass,
+        "terrain_urdf": None if terrain is None else terrain.urdf_text,
+        "terrain_path": None if terrain is None else str(terrain.urdf_path),
+        "terrain_meshes": {} if terrain is None else collision_meshes(terrain),
+        "probe": None if probe is None else probe.content(),
+        "actuation": None if actuation is None else dict(actuation),
+        "parameters_after_stamp_ns": since_ns,
+        "parameters": {
+            name: _finite(value) for name, value in values.items() if name != SESSION.name
+        },
+        "versions": installed_versions(),
+    }
+    return json.dumps(content, allow_nan=False)
+
+
+def _finite(value: Value) -> Value | None:
+    """What JSON can say: no limit is null, not infinity."""
+    return None if isinstance(value, float) and math.isinf(value) else value
+
+
+@dataclass(frozen=True)
+class RunConfiguration:
+    """What a listener needs to read a simulator's topics."""
+
+    character: str
+    layout: JointLayout
+    effort_limits: FloatArray  # (b,) N m or N
+    mass: float  # kg
+    parameters: dict[str, Any]
+    probe: Probe | None = None  # absent where another simulator than ours speaks
+    versions: dict[str, str] = field(default_factory=dict)  # of what it runs with
+    session: str = ANONYMOUS
+
+
+def parse(text: str) -> RunConfiguration:
+    """Read a simulator's `~/configuration`.
+
+    Raises:
+        MessageError: the text is not one.
+    """
+    try:
+        content = json.loads(text)
+        joints = [(joint["name"], JointType(joint["type"])) for joint in content["joints"]]
+        layout, probe = JointLayout(joints), content.get("probe")
+        return RunConfiguration(
+            character=str(content["character"]),
+            layout=layout,
+            effort_limits=np.array(
+                [np.inf if limit is None else limit for limit in content["effort_limits"]]
+            ),
+            mass=float(content["mass"]),
+            parameters=dict(content["parameters"]),
+            probe=None if probe is None else read_probe(probe, layout.size),
+            versions=read_versions(content.get("versions")),
+            session=session_of(str(content.get("session", ""))),
+        )
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError, LayoutError) as error:
+        raise MessageError("not a simulator's configuration") from error
+
+
+@dataclass(frozen=True)
+class UrdfCopy:
+    """A URDF as it was read, and where it lay, which is where its meshes are looked for."""
+
+    path: Path | None  # None where an older simulator spoke, which did not say it
+    text: str = field(repr=False)
+    meshes: dict[str, str]  # SHA-256 by the name that the URDF gives, see `collision_meshes`
+
+
+@dataclass(frozen=True)
+class WorldCopy:
+    """The files that a simulator has read, and the character's place in its world."""
+
+    character_path: Path | None  # None where an older simulator spoke
+    character_text: str = field(repr=False)  # of its YAML file; empty for a URDF alone
+    urdf: UrdfCopy
+    terrain: UrdfCopy | None
+    name: str  # the character's, where it is one of several; else empty
+    characters: tuple[str, ...]  # in the order in which they entered the world; empty for one
+
+
+def parse_world(text: str) -> WorldCopy:
+    """Read what a simulator's `~/configuration` says of its files.
+
+    Raises:
+        MessageError: the text is not one.
+    """
+    try:
+        content = json.loads(text)
+        terrain = content.get("terrain_urdf")
+        return WorldCopy(
+            character_path=_path(content.get("character_path")),
+            character_text=str(content["character_file"]),
+            urdf=_urdf_copy(content, "urdf", "urdf_path", "meshes"),
+            terrain=None
+            if terrain is None
+            else _urdf_copy(content, "terrain_urdf", "terrain_path", "terrain_meshes"),
+            name=str(content.get("name", "")),
+            characters=tuple(str(name) for name in content.get("characters", ())),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise MessageError("not a simulator's configuration") from error
+
+
+def _urdf_copy(content: dict[str, Any], text: str, path: str, meshes: str) -> UrdfCopy:
+    hashes = {str(name): str(digest) for name, digest in content.get(meshes, {}).items()}
+    return UrdfCopy(_path(content.get(path)), str(content[text]), hashes)
+
+
+def _path(text: object) -> Path | None:
+    return None if text is None else Path(str(text))

@@ -1,0 +1,1 @@
+"""What each node's process does: start, polling, parameters, diagnostics, exit."""

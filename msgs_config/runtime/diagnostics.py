@@ -1,0 +1,45 @@
+"""The one status that a node reports on `/diagnostics`."""
+
+from collections.abc import Mapping
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+from msgs_config.messages.topics import DIAGNOSTICS, create_publisher, flush
+
+DIAGNOSTICS_PERIOD = 1.0  # s of wall time
+
+
+class DiagnosticsPublisher:
+    """Publishes a node's counts, and its fault if it has one."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = create_publisher(node, DIAGNOSTICS)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody listens; if not, there is no need to gather anything."""
+        return bool(self._publisher.get_subscription_count())
+
+    def publish(
+        self, values: Mapping[str, object], fault: str | None = None, below: str = ""
+    ) -> None:
+        """Publish the values by name; with a fault the level is ERROR and its text the message.
+
+        The status has the node's name, that in a namespace `below` its own if there is one.
+        """
+        namespace = "/".join(filter(None, (self._node.get_namespace().strip("/"), below)))
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.OK if fault is None else DiagnosticStatus.ERROR,
+            name=f"{namespace}/{self._node.get_name()}".lstrip("/"),
+            message=fault or "running",
+            values=[KeyValue(key=name, value=str(value)) for name, value in values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def flush(self, seconds: float) -> bool:
+        """Wait until every subscriber has the last report, at most `seconds`; whether it has."""
+        return flush([self._publisher], seconds)

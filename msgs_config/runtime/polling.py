@@ -1,0 +1,160 @@
+"""Waiting for messages with the least delay, while services and parameters stay alive.
+
+An executor's way from a message to its callback costs more than the rest of a lockstep tick. So a
+loop takes the one message that it waits for directly from the subscription, gives the processor
+away between tries, and lets the executor have a turn every now and then. When nothing comes for a
+while the loop blocks in the executor, and an idle node costs nothing.
+"""
+
+import os
+import time
+from collections import deque
+from typing import NamedTuple
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
+from rclpy.node import Node
+
+from msgs_config.messages.topics import Topic
+
+_SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
+_SHORT_REST = 0.002  # s; waking up from the executor takes up to that
+_SLEEP_ERROR = 0.0002  # s by which a sleep may be late
+_MOST_TURNS = 50  # of the executor in a row, which has one callback a turn
+_PATIENCE = 0.003  # s of taking turns with other processes before the loop blocks
+
+
+class Received(NamedTuple):
+    """A serialised message as it came."""
+
+    raw: bytes
+    published_ns: int  # wall time
+    number: int | None  # that its publisher gave it, from 1 on; None where the middleware has none
+
+
+class DirectSubscription:
+    """A subscription whose serialised messages a loop takes one by one, oldest first."""
+
+    def __init__(
+        self, node: Node, topic: Topic, events: SubscriptionEventCallbacks | None = None
+    ) -> None:
+        """Subscribe; with `events` also to what the middleware says of the subscription."""
+        # as many as the middleware keeps, and like it the newest, lest a flood fill the memory
+        self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
+        self.dropped = 0  # messages, as more came than were taken
+        self._node = node
+        # When the loop blocks in the executor, it is the executor that takes the message. It
+        # hands a callback of two arguments the message's info too, which rclpy's types leave out.
+        self._subscription = node.create_subscription(
+            topic.message_type,
+            topic.name,
+            self._keep,  # type: ignore[arg-type]
+            topic.qos,
+            raw=True,
+            # not one thing more for the executor to look at in each turn; `waiting.py` says it
+            event_callbacks=events or SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
+
+    def _keep(self, raw: bytes, info: dict[str, int]) -> None:
+        most = self._pending.maxlen
+        if most == len(self._pending) and most > 1:  # with a depth of 1 the newest is all
+            if not self.dropped:
+                self._node.get_logger().warning(
+                    f"'{self._subscription.topic_name}': more than {most} messages wait to be "
+                    "taken; the oldest are dropped, which is logged once"
+                )
+            self.dropped += 1
+        self._pending.append(_received(raw, info))
+
+    def close(self) -> None:
+        """End the subscription; what it has not handed out is lost."""
+        self._pending.clear()
+        self._node.destroy_subscription(self._subscription)
+
+    def take(self) -> bytes | None:
+        """The next serialised message; None if there is none now."""
+        received = self.take_received()
+        return None if received is None else received.raw
+
+    def take_received(self) -> Received | None:
+        """The next message with when it was published, and its number; None if there is none."""
+        if self._pending:
+            return self._pending.popleft()
+        handle = self._subscription.handle
+        with handle:
+            taken = handle.take_message(self._subscription.msg_type, True)
+        return None if taken is None else _received(*taken)
+
+
+def _received(raw: bytes, info: dict[str, int]) -> Received:
+    return Received(raw, info["source_timestamp"], info.get("publication_sequence_number"))
+
+
+class Spinner:
+    """Gives a loop's idle moments to other processes and to the node's executor."""
+
+    def __init__(self, node: Node, service_period: float = _SERVICE_PERIOD) -> None:
+        """`service_period` is the time in s between turns of the executor in a busy loop."""
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(node)
+        self._service_period = service_period
+        self._busy_until = 0.0
+        self._next_service = 0.0
+
+    def received(self) -> None:
+        """Say that a message came: the next one is worth waiting for without blocking."""
+        self._busy_until = time.monotonic() + _PATIENCE
+
+    def rest(self) -> None:
+        """Let others work; at most about 20 ms."""
+        if time.monotonic() > self._busy_until:
+            self._turn(_SERVICE_PERIOD)
+        else:
+            self.serve()
+            os.sched_yield()
+
+    def rest_for(self, seconds: float) -> None:
+        """Let others work for a time that is known; ends early rather than late."""
+        until = time.monotonic() + seconds
+        self.serve()
+        seconds = until - time.monotonic()
+        if seconds > _SHORT_REST:
+            self._turn(min(seconds - _SHORT_REST, _SERVICE_PERIOD))
+        elif seconds > _SLEEP_ERROR:
+            time.sleep(seconds - _SLEEP_ERROR)
+        else:
+            os.sched_yield()
+
+    def serve(self) -> None:
+        """Give the executor its turn if it is due, without waiting for anything."""
+        now = time.monotonic()
+        if now > self._next_service:
+            self._next_service = now + self._service_period
+            self.serve_pending()
+
+    def serve_pending(self) -> None:
+        """Do all that is ready: a flood of messages must not keep services waiting."""
+        for _ in range(_MOST_TURNS):
+            if not self._turn(0.0):
+                return
+
+    def _turn(self, seconds: float) -> bool:
+        """Do one thing that is ready, or becomes so within a time; whether there was one.
+
+        A callback that awaits something is not over when it returns, and the executor offers it
+        first at each turn, whereas `spin_once` would take it for the one thing to do.
+        """
+        for _ in range(_MOST_TURNS):
+            try:
+                callback, *_ = self._executor.wait_for_ready_callbacks(seconds)
+            except (TimeoutException, ShutdownException):
+                return False
+            callback()
+            if callback.done():
+                callback.result()  # raises what it has raised
+                return True
+        return False
+
+    def close(self) -> None:
+        """End the executor."""
+        self._executor.shutdown()

@@ -1,0 +1,164 @@
+"""What every node's process does alike: threads, signals, one clear line for an error.
+
+Imports neither numpy nor rclpy at the top: the limit on threads must come before numpy loads.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn, Protocol
+
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError
+from msgs_config.runtime.exit_watchdog import exit_after
+from msgs_config.runtime.shared_memory import remove_orphans
+
+EXIT_ERROR = 1
+LEAVE_TIME = 2  # s that leaving the ROS graph may take
+_FAST_DDS = "rmw_fastrtps"
+_ANYWHERE, _LOCALHOST = (
+    Path(__file__).with_name(f"{name}.xml") for name in ("fastdds", "fastdds_localhost")
+)
+_PROFILES, _RANGE = "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_PARAMETERS_ARE_SET = (
+    "parameters are set by --ros-args -p NAME:=VALUE or --params-file FILE, and listed by "
+    "'actuated_characters parameters'"
+)
+_USAGE = "usage: {name} [--ros-args ...]\n\n" + _PARAMETERS_ARE_SET
+
+
+def limit_threads() -> None:
+    """Keep numpy's linear algebra on one thread: on matrices this small more only get in the way.
+
+    To be called before numpy is imported; what the user has set stays.
+    """
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+def stand_back() -> None:
+    """Let this process' threads wait until others leave a processor, rather than interrupt them.
+
+    For who only listens to a loop. To be called before there are other threads, which inherit it.
+    Its share of a busy machine stays the same.
+    """
+    if not hasattr(os, "SCHED_BATCH"):  # Linux alone has it
+        return
+    if os.sched_getscheduler(0) == os.SCHED_OTHER:  # what somebody has chosen stays
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+
+
+class StopSignal:
+    """Becomes true at SIGINT or SIGTERM, so that a loop can end in good order."""
+
+    def __init__(self) -> None:
+        self._received = False
+        self._ends_at_once = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._receive)
+
+    def __bool__(self) -> bool:
+        return self._received
+
+    def _receive(self, number: int, frame: FrameType | None) -> None:
+        del number, frame
+        self._received = True
+        if self._ends_at_once:
+            os._exit(0)  # an exception would be swallowed by some module that is being imported
+
+    @contextmanager
+    def ending_at_once(self) -> Iterator[None]:
+        """Let a signal end the process there and then: nothing is open yet."""
+        self._ends_at_once = True
+        try:
+            yield
+        finally:
+            self._ends_at_once = False
+
+
+class RunnableNode(Protocol):
+    """A node whose work ends by itself or at a stop signal."""
+
+    def run(self, stop: StopSignal) -> None:
+        """Work until the end or until `stop`."""
+
+    def destroy_node(self) -> object:
+        """Leave the graph."""
+
+
+def run_node(load: Callable[[], Callable[[], RunnableNode]]) -> NoReturn:
+    """Run a node between rclpy's start and end, and end the process.
+
+    rclpy's own signal handlers would end the context under a loop that still has something to
+    publish or to write, so the node is handed a `StopSignal` instead. Once it has left the graph
+    nothing is open any more, and the process ends without taking itself apart: for Python, with
+    all that a node has loaded, that is by far the longest part of its end.
+
+    Args:
+        load: Imports what the node needs, and gives what makes it.
+    """
+    stop = StopSignal()
+    node, code = None, EXIT_ERROR
+    try:
+        with stop.ending_at_once():
+            _start_ros()
+            make_node = load()
+        node = make_node()
+        node.run(stop)
+        code = 0
+    except ActuatedCharactersError as error:
+        print(f"error: {error}", file=sys.stderr, flush=True)
+    finally:
+        _leave(node, code)
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def _leave(node: RunnableNode | None, code: int) -> None:
+    import rclpy
+
+    sys.stdout.flush()
+    exit_after(LEAVE_TIME, code)
+    if node is not None:
+        node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
+    """The variables with which Fast DDS 2.14, Jazzy's, takes up settings of ours.
+
+    Empty where the user has settings. Under LOCALHOST, what that range means is in the file.
+    """
+    given = environment.get(_PROFILES)
+    if given not in (None, str(_ANYWHERE), str(_LOCALHOST)):
+        return {}
+    is_fast_dds = environment.get("RMW_IMPLEMENTATION", _FAST_DDS).startswith(_FAST_DDS)
+    is_plain = not environment.get("ROS_STATIC_PEERS")
+    is_plain &= environment.get("ROS_LOCALHOST_ONLY", "0") != "1"
+    if environment.get(_RANGE) == "LOCALHOST" and is_fast_dds and is_plain:
+        return {_RANGE: "SYSTEM_DEFAULT", _PROFILES: str(_LOCALHOST)}
+    return {} if given is not None else {_PROFILES: str(_ANYWHERE)}
+
+
+def _start_ros() -> None:
+    os.environ.update(middleware_settings(os.environ))
+    remove_orphans()
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    try:
+        others = remove_ros_args(sys.argv)[1:]
+        if {"-h", "--help"} & set(others):
+            print(_USAGE.format(name=os.path.basename(sys.argv[0])))
+            raise SystemExit(0)
+        if others:
+            raise ConfigurationError(f"unknown argument {others[0]!r}; {_PARAMETERS_ARE_SET}")
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # rclpy's own, of several types: a bad file or argument
+        reason = " ".join(str(error).split())
+        raise ConfigurationError(f"ROS does not take the arguments: {reason}") from error

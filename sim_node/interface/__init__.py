@@ -1,0 +1,1 @@
+"""The simulator's ROS interface: subscribers, publishers, services."""

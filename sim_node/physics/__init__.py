@@ -1,0 +1,1 @@
+"""The simulated world without ROS: characters, contacts, passive forces, projectiles."""

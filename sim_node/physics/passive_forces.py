@@ -1,0 +1,222 @@
+"""Forces that a character's joints have of themselves: damping, and the soft limits of ball joints.
+
+A soft limit is a spring and a damper outside of bounds on the components of a joint's rotation
+vector r. With e the excess of a component over its bound, the force against it is
+`f = k e + c de/dt`, and never one that draws it further out. As `dr/dt = J w`, with w the angular
+velocity in the child frame and J the inverse of the right Jacobian of SO(3), its torque in the
+child frame is `-J^T f`. The spring's potential is `V = k/2 e^2`; the damper only takes energy.
+
+A limb is light, and a spring that stops it in a few degrees is far too stiff to be explicit. So e
+and de/dt are those at the end of the engine's step h, with the velocity that the forces lead to:
+`f = k (e + h u) + c u`, `u = de/dt - h A f`, where `A = J M^-1 J^T` of all bounds together. That is
+stable for any k and c at any h (implicit Euler; as Tan, Liu and Turk 2011 do it for control), and
+as h goes to zero it is the law above. Other forces on the limb are not foreseen.
+
+Of the two rotation vectors of a turn, r and the longer way round, the one nearer to the bounds
+counts, so that nothing jumps where r does, at an angle of pi.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.model import Character, SoftLimit
+from msgs_config.geometry import fixed_order, frames
+from msgs_config.geometry.frames import Triple
+
+_MOST_PIVOTS = 50
+_ROUNDING = 1e-12  # of a force, that may be wrong without consequence
+
+
+class PassiveForces:
+    """The passive forces of one character, for an engine that adds them at each of its steps.
+
+    `active` says whether there are any, `notes` what the user should know of them.
+    """
+
+    def __init__(self, character: Character, step_s: float, mobility: FloatArray) -> None:
+        """For engine steps of `step_s`; `mobility` (n, n) is the inverse mass matrix at rest."""
+        self._step_s = step_s
+        self._limits = [
+            (character.layout.joint(joint.name).entries, joint.soft_limit)
+            for joint in character.moving_joints
+            if joint.soft_limit is not None
+        ]
+        self._model = DynamicsModel(character) if self._limits else None
+        wanted = character.passive_damping()
+        self._damping = bounded_damping(wanted, mobility, step_s)
+        self.active = bool(self._limits or wanted.any())
+        self.notes = tuple(
+            f"the passive damping of '{name}' is kept at {kept:.3g} of {asked:.3g}: more would be "
+            f"unstable at engine steps of {1e3 * step_s:.3g} ms, substeps make them shorter"
+            for name, asked, kept in zip(
+                character.layout.dof_names, wanted, self._damping, strict=True
+            )
+            if kept < asked
+        )
+
+    def effort(self, position: FloatArray, velocity: FloatArray) -> FloatArray:
+        """The passive effort (n,) in a state, message form; N m or N."""
+        effort: FloatArray = -self._damping * velocity
+        if self._model is None:
+            return effort
+        bounds, rows = [], []
+        turns, spins = position.tolist(), velocity.tolist()
+        for entries, limit in self._limits:
+            for bound in passed_bounds(limit, turns[entries], spins[entries], self._step_s):
+                bounds.append(bound)
+                rows.append(np.zeros(len(effort)))
+                rows[-1][entries] = bound.row
+        if bounds:
+            jacobian = np.array(rows)
+            self._model.update(position, velocity)
+            forces = complementary_forces(bounds, self._model.delassus_matrix(jacobian))
+            effort -= fixed_order.apply(jacobian.T, forces)
+        return effort
+
+
+class PassedBound(NamedTuple):
+    """A bound of a soft limit that a joint is beyond, or is about to pass."""
+
+    row: Triple  # of J, outwards: `de/dt = row . w` of the angular velocity w in the child frame
+    explicit: float  # N m, the force if nothing yielded
+    implicit: float  # N m s^2/rad, what each rad/s^2 of yielding takes away of it
+
+
+def passed_bounds(
+    limit: SoftLimit, turn: Sequence[float], spin: Sequence[float], step_s: float
+) -> Iterator[PassedBound]:
+    """The bounds that a joint is beyond, or will be in a step, and that push it back.
+
+    Its rotation vector (3,) in rad, its angular velocity (3,) in the child frame in rad/s.
+    """
+    x, y, z = spin
+    # up to two thirds of a turn a rotation vector is less than twice as fast
+    reach = 2.0 * step_s * math.sqrt(x * x + y * y + z * z)
+    if not _is_near(turn, limit, reach):
+        return
+    turn = closest_rotation_vector(turn, limit)
+    jacobian = frames.right_jacobian_inverse(turn)
+    rates = frames.to_parent(jacobian, spin)
+    for part, rate, row, lower, upper in zip(
+        turn, rates, jacobian, limit.lower, limit.upper, strict=True
+    ):
+        outward = math.copysign(1.0, 2.0 * (part + step_s * rate) - lower - upper)
+        excess = outward * (part - (upper if outward > 0.0 else lower))
+        following = excess + step_s * outward * rate
+        explicit = limit.stiffness * following + limit.damping * outward * rate
+        if max(excess, following) > 0.0 and explicit > 0.0:
+            across, along, about = row
+            yield PassedBound(
+                (outward * across, outward * along, outward * about),
+                explicit,
+                step_s * (limit.stiffness * step_s + limit.damping),
+            )
+
+
+def _is_near(turn: Sequence[float], limit: SoftLimit, reach: float) -> bool:
+    """Whether a component of a rotation vector (3,) is beyond a bound, or within reach of it."""
+    for part, lower, upper in zip(turn, limit.lower, limit.upper, strict=True):
+        if part < lower + reach or part > upper - reach:
+            return True
+    return False
+
+
+def closest_rotation_vector(turn: Sequence[float], limit: SoftLimit) -> Sequence[float]:
+    """Of a rotation vector (3,) and the longer way round the one nearer to a limit's bounds."""
+    x, y, z = turn
+    angle = math.sqrt(x * x + y * y + z * z)
+    if not angle:
+        return turn
+    factor = 1.0 - 2.0 * math.pi / angle
+    long_way = (factor * x, factor * y, factor * z)
+    return long_way if _squared_excess(long_way, limit) < _squared_excess(turn, limit) else turn
+
+
+def _squared_excess(turn: Sequence[float], limit: SoftLimit) -> float:
+    """The squared distance in rad^2 of a rotation vector (3,) from a limit's bounds."""
+    square = 0.0
+    for part, lower, upper in zip(turn, limit.lower, limit.upper, strict=True):
+        beyond = max(part - upper, lower - part, 0.0)
+        square += beyond * beyond
+    return square
+
+
+def complementary_forces(bounds: Sequence[PassedBound], delassus: FloatArray) -> FloatArray:
+    """Forces (m,) in N m that push at bounds and never draw: `f = max(0, explicit - implicit A f)`.
+
+    `delassus` (m, m) is A, symmetrical: the accelerations that a unit of each force leads to. With
+    all bounds pushing it is one linear system. A bound that would draw leaves it, one that lacks a
+    push enters, the first such one at a time: that finds the one solution (Murty 1974, "Note on a
+    Bard-type Scheme for Solving the Complementarity Problem").
+    """
+    coupling = [
+        [bound.implicit * entry for entry in row]
+        for bound, row in zip(bounds, delassus.tolist(), strict=True)
+    ]
+    pushing = [True] * len(bounds)
+    forces = [0.0] * len(bounds)
+    for _ in range(_MOST_PIVOTS):
+        forces = _forces_of(bounds, coupling, pushing)
+        for number, bound in enumerate(bounds):
+            if pushing[number]:
+                wrong = forces[number] < 0.0
+            else:
+                yielded = _dot(coupling[number], forces)
+                wrong = bound.explicit - yielded > _ROUNDING * bound.explicit
+            if wrong:
+                pushing[number] = not pushing[number]
+                break
+        else:
+            break
+    return np.maximum(forces, 0.0)
+
+
+def _forces_of(
+    bounds: Sequence[PassedBound], coupling: Sequence[Sequence[float]], pushing: Sequence[bool]
+) -> list[float]:
+    """The forces of the bounds that push, `(1 + coupling) f = explicit`; the others' are zero.
+
+    By elimination; the matrix is similar to a positive definite one, so no pivots are looked for.
+    """
+    chosen = [number for number, pushes in enumerate(pushing) if pushes]
+    rows = [[coupling[i][j] + (i == j) for j in chosen] + [bounds[i].explicit] for i in chosen]
+    for place, row in enumerate(rows):
+        for other in rows[place + 1 :]:
+            share = other[place] / row[place]
+            for column in range(place + 1, len(row)):
+                other[column] -= share * row[column]
+    forces = [0.0] * len(bounds)
+    for place in range(len(chosen) - 1, -1, -1):
+        row = rows[place]
+        known = row[-1]
+        for later in range(place + 1, len(chosen)):
+            known -= row[later] * forces[chosen[later]]
+        forces[chosen[place]] = known / row[place]
+    return forces
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    product = 0.0
+    for one, other in zip(a, b, strict=True):
+        product += one * other
+    return product
+
+
+def bounded_damping(damping: FloatArray, mobility: FloatArray, step_s: float) -> FloatArray:
+    """Damping (n,) no larger than an explicit damper may have.
+
+    An explicit damper is unstable where it takes more than twice the velocity away in one step,
+    `h d / m > 2`. Where it would take more than all of it, as seen at the rest pose, it is made as
+    much weaker: d becomes d / R where `R = h sum_j sqrt(d_i d_j) |inverse of M|_ij` is above 1. No
+    eigenvalue of `h inverse(M) D` is above 1 then (Gershgorin 1931), and the other half is left to
+    poses in which the inertia is less.
+    """
+    roots = np.sqrt(damping)
+    taken: FloatArray = step_s * roots * fixed_order.apply(np.abs(mobility), roots)
+    bounded: FloatArray = damping / np.maximum(taken, 1.0)
+    return bounded

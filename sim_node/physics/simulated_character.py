@@ -1,0 +1,196 @@
+"""One character's part in a simulation: what drives it, what it does, what touches it. No ROS."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError, SimulationError
+from msgs_config.messages.state import StampedState
+from sim_node.physics.contacts import TouchedLinks
+from sim_node.physics.mass_matrix import make_passive_forces
+from sim_node.physics.projectiles import Balls
+from sim_node.physics.world import World
+from sim_node.physics.wrenches import Push
+
+
+@dataclass(frozen=True)
+class Role:
+    """A character, what of it may be commanded, and where it begins."""
+
+    character: Character
+    commanded_joints: tuple[str, ...]
+    initial_position: tuple[float, ...]  # (n,)
+    initial_velocity: tuple[float, ...]  # (n,)
+    name: str = ""  # where there are several
+
+    @property
+    def prefix(self) -> str:
+        """What distinguishes the names of its links and joints from another character's."""
+        return f"{self.name}/" if self.name else ""
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """What touched a character's links during a tick."""
+
+    # (links, 6) net force, N, and torque about the centre of mass, N m, world axes; of several
+    # substeps the mean, with each torque about the centre at its own substep
+    wrenches: FloatArray
+    touching: BoolArray  # (links,)
+
+
+@dataclass(frozen=True)
+class ActorMemory:
+    """What an actor knows between two ticks, beside the engine."""
+
+    state: StampedState
+    contacts: Contacts | None
+    pushes: tuple[Push, ...]
+    delayed: tuple[FloatArray, ...]  # (n,) each, commands on their way
+    saturated_ticks: IntArray  # (b,)
+
+
+class Actor:
+    """A character in a world."""
+
+    state: StampedState
+    contacts: Contacts | None  # over the last tick; None if nobody watched
+    pushes: tuple[Push, ...]  # what pushed it during the last tick
+
+    def __init__(self, role: Role, *, delay_ticks: int, step_s: float) -> None:
+        """Check the role, for efforts that come late by some ticks and engine steps of `step_s`.
+
+        Raises:
+            ConfigurationError: an array does not fit the character.
+            LayoutError: a commanded joint does not exist.
+        """
+        self.role = role
+        self.character = role.character
+        self.layout = role.character.layout
+        self.commanded: BoolArray = self.layout.mask(role.commanded_joints)
+        self._limits = role.character.effort_limits()
+        self.saturated_ticks: IntArray = np.zeros(len(self._limits), dtype=np.intp)  # (b,)
+        self._position = self._initial("initial_position", role.initial_position)
+        self._velocity = self._initial("initial_velocity", role.initial_velocity)
+        self._passive = make_passive_forces(role.character, step_s)
+        self._delay_ticks = delay_ticks
+
+    def begin_in(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Make a state, each (n,), the initial one of every world that it enters from now on."""
+        self._position, self._velocity = position.copy(), velocity.copy()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the simulation does otherwise than the character's file says."""
+        return self._passive.notes
+
+    def enter(self, world: World, stamp_ns: int) -> None:
+        """Enter a world in the initial state; an episode begins."""
+        zero = np.zeros(self.layout.size)
+        self._delayed = deque([zero] * self._delay_ticks)
+        self._body = world.add(self.character)
+        self._balls = world.balls
+        self._body.set_state(self._position, self._velocity)
+        self.contacts = self._no_contacts()
+        self.pushes = ()
+        self._read(stamp_ns, effort=None)
+
+    def begin_tick(
+        self, effort: FloatArray, pushes: Sequence[Push], watches_contacts: bool
+    ) -> None:
+        """Take the effort (n,) and the pushes of a tick."""
+        self._delayed.append(effort + 0.0)  # -0.0 becomes 0.0: a tick has one effort, to the bit
+        wanted = self._delayed.popleft()
+        self._applied = self.layout.clipped(wanted, self._limits)
+        if self._applied is not wanted:
+            self.saturated_ticks += self.layout.norms(wanted) > self._limits
+        self.pushes = tuple(pushes)
+        self.contacts = self._no_contacts() if watches_contacts else None
+        self._motion = self.state.position, self.state.velocity
+
+    def begin_substep(self, first: bool) -> None:
+        """Apply all forces anew for one engine step."""
+        total = self._applied
+        if self._passive.active:
+            motion = self._motion if first else self._body.read()
+            total = total + self._passive.effort(*motion)
+        self._body.apply(total)
+        if self.pushes:
+            self._body.links.push(self.pushes)
+        if self.contacts is not None:
+            self._centres = self._body.links.centres()
+
+    def add_contacts(self, touched: TouchedLinks, share: float) -> None:
+        """Take up the contacts of the last engine step, which is a share of the tick."""
+        assert self.contacts is not None
+        wrenches, touching = self._body.links.contact_wrenches(touched, self._centres)
+        self.contacts = Contacts(
+            self.contacts.wrenches + share * wrenches, self.contacts.touching | touching
+        )
+
+    def end_tick(self, stamp_ns: int) -> None:
+        """Read the state that the tick has led to."""
+        self._read(stamp_ns, self._applied)
+
+    def memory(self) -> ActorMemory:
+        """What `recall` needs, to be taken between two ticks."""
+        return ActorMemory(
+            self.state,
+            self.contacts,
+            self.pushes,
+            tuple(self._delayed),
+            self.saturated_ticks.copy(),
+        )
+
+    def recall(self, memory: ActorMemory) -> None:
+        """Know again what was known then; the engine is restored by who owns it."""
+        self.state, self.contacts, self.pushes = memory.state, memory.contacts, memory.pushes
+        self._delayed = deque(memory.delayed)
+        self.saturated_ticks = memory.saturated_ticks.copy()
+
+    def link_frames(self) -> tuple[FloatArray, FloatArray]:
+        """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""
+        return self._body.links.frames()
+
+    @property
+    def balls(self) -> Balls:
+        """The balls of the world that it is in."""
+        return self._balls
+
+    def base_frame(self) -> tuple[FloatArray, FloatArray]:
+        """Origin (3,) in m and orientation xyzw (4,) of the base link in the world."""
+        return self._body.links.base_frame()
+
+    def check_divergence(self, tick: int, speed_limit: float) -> None:
+        """Raise SimulationError if the state is not finite or faster than a limit."""
+        state = self.state
+        speed = np.abs(state.velocity)
+        sound = (speed <= speed_limit) & np.isfinite(state.position)  # NaN is unsound
+        if not sound.all():
+            worst = int(np.argmin(sound))
+            raise SimulationError(
+                f"diverged at tick {tick}: '{self.role.prefix}{self.layout.dof_names[worst]}' is "
+                f"at {state.position[worst]:.4g} with velocity {state.velocity[worst]:.4g}; "
+                f"the limit is {speed_limit:g}"
+            )
+
+    def _no_contacts(self) -> Contacts:
+        links = len(self.character.links)
+        return Contacts(np.zeros((links, 6)), np.zeros(links, dtype=np.bool_))
+
+    def _read(self, stamp_ns: int, effort: FloatArray | None) -> None:
+        position, velocity = self._body.read()
+        self.state = StampedState(stamp_ns, position, velocity, effort)
+
+    def _initial(self, name: str, values: tuple[float, ...]) -> FloatArray:
+        if len(values) != self.layout.size:
+            below = f"{self.role.name}." if self.role.name else ""
+            raise ConfigurationError(
+                f"parameter '{below}{name}' has {len(values)} entries; it must have "
+                f"{self.layout.size}: {', '.join(self.layout.dof_names)}"
+            )
+        return np.array(values)

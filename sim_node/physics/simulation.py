@@ -1,0 +1,222 @@
+"""The simulation of characters in one world: efforts for one tick, then the next states. No ROS."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from msgs_config.arrays import FloatArray
+from msgs_config.errors import SimulationError
+from msgs_config.messages.clock import FIRST_TICK, TickClock
+from msgs_config.messages.state import StampedState
+from msgs_config.messages.throw import Throw
+from sim_node.physics.simulated_character import Actor, ActorMemory, Role
+from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.wrenches import Push
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """All that a simulation depends on, beside its roles, the efforts and the pushes."""
+
+    rate_hz: int
+    substeps: int
+    speed_limit: float  # rad/s or m/s
+    command_delay_ticks: int
+    ball_ticks: int  # after which a ball is taken out of the way; 0: never
+    world: WorldSettings
+
+
+@dataclass(frozen=True)
+class Memory:
+    """A state between two ticks, but for the engine's."""
+
+    tick: int
+    episode: int
+    actors: tuple[ActorMemory, ...]
+    throws: tuple[Throw, ...]  # of the last tick
+    thrown_at: tuple[int, ...]  # ticks, of the balls that are in the world
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A state between two ticks, which the simulation that saved it can return to."""
+
+    memory: Memory
+    world: int  # its number in the engine
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A state between two ticks, for any simulation of equal roles and settings."""
+
+    memory: Memory
+    balls: tuple[Throw, ...]
+    world: bytes
+
+
+class Simulation:
+    """Forward dynamics in ticks: `(q, v, effort) -> next (q, v)` of every actor.
+
+    The effort is held over the tick and applied anew at each engine step: a force in the world
+    stays so, a torque in a body's frame turns with the body.
+    """
+
+    def __init__(
+        self, roles: Sequence[Role], settings: SimulationSettings, first_tick: int = FIRST_TICK
+    ) -> None:
+        """Build the world and put the characters into their initial states, which are `first_tick`.
+
+        Raises:
+            ConfigurationError: an array or a name in a role does not fit its character.
+            LayoutError: a commanded joint does not exist.
+            CharacterError: the engine refuses a file.
+        """
+        self.settings = settings
+        self.clock = TickClock(settings.rate_hz)
+        self.actors = tuple(
+            Actor(role, delay_ticks=settings.command_delay_ticks, step_s=settings.world.step_s)
+            for role in roles
+        )
+        self.tick = first_tick
+        self.episode = 1
+        self.watches_contacts = False  # whether to find out what touches, which takes time
+        self.throws: tuple[Throw, ...] = ()  # what was thrown at the beginning of the last tick
+        self._thrown_at: tuple[int, ...] = ()
+        self._world = self._fresh_world()
+
+    def __enter__(self) -> "Simulation":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the engine."""
+        self._world.close()
+
+    @property
+    def stamp_ns(self) -> int:
+        """The stamp of the present states."""
+        return self.clock.stamp_ns(self.tick)
+
+    @property
+    def balls(self) -> tuple[Throw, ...]:
+        """What was thrown in this episode, and is still in the world."""
+        return self._world.balls.throws
+
+    def ball_motion(self) -> FloatArray:
+        """Centre m, orientation xyzw, velocity m/s and rad/s of each ball, world: (m, 13)."""
+        return self._world.balls.motion()
+
+    def step(
+        self,
+        efforts: Sequence[FloatArray],
+        pushes: Sequence[Sequence[Push]] | None = None,
+        throws: Sequence[Throw] = (),
+    ) -> None:
+        """Advance one tick: for each actor an effort (n,), clipped to its limits, and its pushes.
+
+        What is thrown is let go first.
+
+        Raises:
+            SimulationError: a next state is not finite or faster than the speed limit; it names
+                the degree of freedom.
+        """
+        nothing: list[tuple[Push, ...]] = [()] * len(self.actors)
+        for actor, effort, its in zip(self.actors, efforts, pushes or nothing, strict=True):
+            actor.begin_tick(effort, its, self.watches_contacts)
+        self._move_balls(throws)
+        substeps = self.settings.substeps
+        for substep in range(substeps):
+            for actor in self.actors:
+                actor.begin_substep(first=substep == 0)
+            self._world.step()
+            if self.watches_contacts:
+                touched = self._world.touched_links()
+                for actor in self.actors:
+                    actor.add_contacts(touched, share=1.0 / substeps)
+        self.tick += 1
+        for actor in self.actors:
+            actor.end_tick(self.stamp_ns)
+        try:
+            for actor in self.actors:
+                actor.check_divergence(self.tick, self.settings.speed_limit)
+        except SimulationError:
+            self.tick -= 1  # nobody is to see that state; a reset's first one has its stamp
+            raise
+
+    def _move_balls(self, throws: Sequence[Throw]) -> None:
+        """Let balls go, and take those out of the way whose time is over."""
+        if self.settings.ball_ticks:
+            over = self.tick - self.settings.ball_ticks
+            for number, thrown_at in enumerate(self._thrown_at):
+                if thrown_at == over:
+                    self._world.balls.put_away(number)
+        self.throws = tuple(throws)
+        for throw in throws:
+            self._world.balls.add(throw)
+        self._thrown_at += (self.tick,) * len(throws)
+
+    def reset(self) -> None:
+        """Begin a new episode in a new world, whose first states have the next tick's stamp.
+
+        All that follows is what would follow in a fresh simulation, to the bit.
+        """
+        self.tick += 1
+        self.episode += 1
+        self.throws, self._thrown_at = (), ()
+        self._world.close()  # first: two engines at a time would take twice the memory
+        self._world = self._fresh_world()
+
+    def begin_in(self, states: Mapping[str, StampedState]) -> None:
+        """Begin in other states, by the characters' names, before the first step; episodes, too."""
+        for actor in self.actors:
+            if (state := states.get(actor.role.name)) is not None:
+                actor.begin_in(state.position, state.velocity)
+        self._world.close()
+        self._world = self._fresh_world()
+
+    def save(self) -> Saved:
+        """Keep the present state in memory, until it is forgotten."""
+        return Saved(self._memory(), self._world.save())
+
+    def restore(self, saved: Saved) -> None:
+        """Return to a saved state: what follows is what followed it, to the bit.
+
+        That holds of states that a step has led to; in a world without a step yet, the engine has
+        not found out what touches. After a reset no state saved before can be restored.
+        """
+        self._world.restore(saved.world)
+        self._recall(saved.memory)
+
+    def forget(self, saved: Saved) -> None:
+        """Give back the memory of a saved state."""
+        self._world.forget(saved.world)
+
+    def snapshot(self) -> Snapshot:
+        """The present state, to be taken over by a simulation in another process."""
+        return Snapshot(self._memory(), self.balls, self._world.to_bytes())
+
+    def take_over(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot, as its own simulation would, to the bit."""
+        self._world.from_bytes(snapshot.world, snapshot.balls)
+        self._recall(snapshot.memory)
+
+    def _memory(self) -> Memory:
+        actors = tuple(actor.memory() for actor in self.actors)
+        return Memory(self.tick, self.episode, actors, self.throws, self._thrown_at)
+
+    def _recall(self, memory: Memory) -> None:
+        self.tick, self.episode = memory.tick, memory.episode
+        self.throws, self._thrown_at = memory.throws, memory.thrown_at
+        for actor, its in zip(self.actors, memory.actors, strict=True):
+            actor.recall(its)
+
+    def _fresh_world(self) -> World:
+        world = World(self.settings.world)
+        try:
+            for actor in self.actors:
+                actor.enter(world, self.stamp_ns)
+        except Exception:
+            world.close()
+            raise
+        return world

@@ -1,0 +1,41 @@
+"""Balls that are to be thrown, and wait for their tick. No ROS in here."""
+
+from dataclasses import dataclass, field
+
+from msgs_config.errors import CommandError
+from msgs_config.messages.throw import Throw
+
+MOST_BALLS = 100
+"""In an episode, lest a hostile sender fill the world."""
+
+
+@dataclass
+class ThrowSchedule:
+    """The throws of an episode that wait, in the order in which they were sent."""
+
+    _waiting: list[tuple[int, Throw]] = field(default_factory=list)  # with the tick
+    _taken: int = 0
+
+    def add(self, throw: Throw, first_tick: int) -> None:
+        """Take a throw that begins in the state of a tick.
+
+        Raises:
+            CommandError: there are too many in this episode.
+        """
+        if self._taken + len(self._waiting) >= MOST_BALLS:
+            raise CommandError(f"an episode has at most {MOST_BALLS} balls")
+        self._waiting.append((first_tick, throw))
+
+    def take(self, tick: int) -> list[Throw]:
+        """The throws that begin in the state of a tick."""
+        if not self._waiting:
+            return []
+        due = [throw for first_tick, throw in self._waiting if first_tick == tick]
+        self._waiting = [waiting for waiting in self._waiting if waiting[0] != tick]
+        self._taken += len(due)
+        return due
+
+    def clear(self) -> None:
+        """Forget all: another episode begins."""
+        self._waiting.clear()
+        self._taken = 0

@@ -1,0 +1,124 @@
+"""The physics world: PyBullet behind one class; the only place that steps the engine."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgs_config.character.bullet import connect, load_urdf, pybullet
+from msgs_config.character.model import Character, Loading
+from msgs_config.messages.throw import Throw
+from sim_node.physics.body import Body
+from sim_node.physics.contacts import TouchedLinks, read_contacts
+from sim_node.physics.projectiles import Balls
+
+_STATE_FILE = "state.bullet"  # the engine writes to files alone
+
+
+@dataclass(frozen=True)
+class WorldSettings:
+    """The physics of the world."""
+
+    step_s: float = 1.0 / 240.0  # length of one engine step
+    gravity: float = 9.81  # m/s^2, along -z
+    friction: float = 0.9  # of the ground; a contact's is the product of both surfaces'
+    link_friction: float = 0.5  # of every link
+    solver_iterations: int = 10
+    ground: bool = True  # the plane z = 0
+    terrain: Loading | None = None  # what else lies there for ever
+
+
+class World:
+    """The ground and the characters on it, and what is thrown at them, in a private engine.
+
+    `save` and `restore` keep the engine's contact caches, so that what follows a restored state
+    is what followed the saved one, to the bit; setting positions and velocities alone is not.
+    Restore right after a step: the engine keeps an effort that was applied but not stepped yet.
+    """
+
+    def __init__(self, settings: WorldSettings) -> None:
+        """Start the engine.
+
+        Raises:
+            CharacterError: the terrain cannot be loaded.
+        """
+        self._client = connect()
+        self._link_friction = settings.link_friction
+        pybullet.setGravity(0.0, 0.0, -settings.gravity, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=settings.step_s,
+            numSolverIterations=settings.solver_iterations,
+            numSubSteps=0,
+            # They are for rigid bodies alone: a hinge 0.04 rad beyond its limit would stay there.
+            useSplitImpulse=0,
+            deterministicOverlappingPairs=1,
+            enableFileCaching=0,
+            physicsClientId=self._client,
+        )
+        if settings.ground:
+            shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+            ground = pybullet.createMultiBody(0.0, shape, physicsClientId=self._client)
+            self._set_friction(ground, settings.friction)
+        if settings.terrain is not None:
+            self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
+        self.balls = Balls(self._client, settings.link_friction)
+        self._saved: dict[int, tuple[Throw, ...]] = {}  # the balls of each saved state
+
+    def __enter__(self) -> "World":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the engine; the world cannot be used any more."""
+        pybullet.disconnect(self._client)
+
+    def add(self, character: Character) -> Body:
+        """Put a character into the world, at the pose of its URDF."""
+        return Body(self._client, character, self._link_friction)
+
+    def step(self) -> None:
+        """Advance by one engine step; efforts last one step and are to be applied anew."""
+        pybullet.stepSimulation(physicsClientId=self._client)
+
+    def touched_links(self) -> TouchedLinks:
+        """What touched in the last step."""
+        return read_contacts(self._client)
+
+    def save(self) -> int:
+        """Keep the whole state in memory; returns its number for `restore`."""
+        number = int(pybullet.saveState(physicsClientId=self._client))
+        self._saved[number] = self.balls.throws
+        return number
+
+    def restore(self, saved: int) -> None:
+        """Return to a saved state, exactly."""
+        self.balls.have(self._saved.get(saved, self.balls.throws))
+        pybullet.restoreState(stateId=saved, physicsClientId=self._client)
+
+    def forget(self, saved: int) -> None:
+        """Give back the memory of a saved state; it cannot be restored any more."""
+        pybullet.removeState(saved, physicsClientId=self._client)
+        del self._saved[saved]
+
+    def to_bytes(self) -> bytes:
+        """The whole state for a world of the same making with the same balls, anywhere."""
+        with tempfile.TemporaryDirectory() as directory:
+            file = Path(directory) / _STATE_FILE
+            pybullet.saveBullet(str(file), physicsClientId=self._client)
+            return file.read_bytes()
+
+    def from_bytes(self, state: bytes, throws: Sequence[Throw] = ()) -> None:
+        """Take over a state from `to_bytes`, exactly, in which these balls were."""
+        self.balls.have(throws)
+        with tempfile.TemporaryDirectory() as directory:
+            file = Path(directory) / _STATE_FILE
+            file.write_bytes(state)
+            pybullet.restoreState(fileName=str(file), physicsClientId=self._client)
+
+    def _set_friction(self, body: int, friction: float) -> None:
+        for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):
+            pybullet.changeDynamics(
+                body, link, lateralFriction=friction, physicsClientId=self._client
+            )

@@ -1,0 +1,1 @@
+"""When a tick goes on: lockstep, real time, watchdog, flow control. Neither ROS nor engine."""

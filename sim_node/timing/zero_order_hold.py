@@ -1,0 +1,111 @@
+"""Real time: commands that are held while the world goes on by the wall clock. No ROS in here."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from sim_node.timing.lockstep import Verdict, check_command
+
+_NEVER = -1
+
+
+class CommandHold:
+    """The last command of each degree of freedom, held until it is too old; then zero.
+
+    Offers the same as `LockstepBarrier`, save that a tick never waits: it is always complete. Of
+    two commands in conflict the later one is taken.
+    """
+
+    complete = True
+    missing: Sequence[str] = ()
+
+    def __init__(self, dof_names: Sequence[str], allowed: BoolArray, timeout_ns: int) -> None:
+        """`allowed` (n,) may be commanded; `timeout_ns` is simulated time."""
+        self._dof_names = tuple(dof_names)
+        self._allowed = allowed
+        self._effort = np.zeros(len(allowed))
+        self._given_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
+        self._stamp_of_command_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
+        self._oldest_ns = 0  # of the states that a command of this episode can answer
+        self.timeout_ns = timeout_ns
+        self.stamp_ns = 0
+        self.conflict: str | None = None  # the first entry of the last conflict
+        self.counts: Counter[Verdict] = Counter()
+        self.timeouts = 0  # times that a held command became too old
+        self._was_held = np.zeros(len(allowed), dtype=np.bool_)
+
+    def open(self, stamp_ns: int) -> None:
+        """Go on to the tick of the state of this stamp."""
+        self.stamp_ns = stamp_ns
+        self.conflict = None
+        held = self._held
+        self.timeouts += bool((self._was_held & ~held).any())
+        self._was_held = held
+
+    def clear(self) -> None:
+        """Forget all commands, and those on their way: the next tick begins a new episode."""
+        self._oldest_ns = self.stamp_ns + 1
+        self._given_ns[:] = _NEVER
+        self._was_held[:] = False
+
+    @property
+    def effort(self) -> FloatArray:
+        """The effort (n,) of this tick; zero where no command is held."""
+        return np.where(self._held, self._effort, 0.0)
+
+    @property
+    def age_ns(self) -> int | None:
+        """How old the oldest command is that is held; None without any."""
+        held = self._held
+        return int(self.stamp_ns - self._given_ns[held].min()) if held.any() else None
+
+    def offer(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> Verdict:
+        """Take a command: `effort` (m,) for the entries `indices` (m,).
+
+        It answers the state of `stamp_ns`, or whichever is the last one where the stamp is zero.
+
+        Raises:
+            CommandError: the lengths differ, a number is not finite, or an entry may not be
+                commanded; nothing of the command is taken.
+        """
+        check_command(self._dof_names, self._allowed, indices, effort)
+        answered_ns = stamp_ns or self.stamp_ns
+        verdict = self._judge(stamp_ns, answered_ns, indices, effort)
+        self.counts[verdict] += 1
+        if verdict in (Verdict.ACCEPTED, Verdict.CONFLICT):
+            self._effort[indices] = effort
+            self._given_ns[indices] = answered_ns
+            self._stamp_of_command_ns[indices] = stamp_ns
+            self._was_held[indices] = True
+        return verdict
+
+    def count_rejected(self) -> None:
+        """Count a command that was refused, here or before it could be offered."""
+        self.counts[Verdict.REJECTED] += 1
+
+    @property
+    def _held(self) -> BoolArray:
+        held: BoolArray = (self._given_ns != _NEVER) & (
+            self.stamp_ns - self._given_ns < self.timeout_ns
+        )
+        return held
+
+    def _judge(
+        self, stamp_ns: int, answered_ns: int, indices: IntArray, effort: FloatArray
+    ) -> Verdict:
+        if answered_ns > self.stamp_ns:
+            return Verdict.FUTURE
+        oldest_ns = max(self._oldest_ns, int(self._given_ns[indices].max()))
+        if answered_ns < oldest_ns or self.stamp_ns - answered_ns >= self.timeout_ns:
+            return Verdict.STALE
+        if stamp_ns:
+            same = self._stamp_of_command_ns[indices] == stamp_ns
+            differs = same & (self._effort[indices] != effort)
+            if differs.any():
+                self.conflict = self._dof_names[indices[int(np.argmax(differs))]]
+                return Verdict.CONFLICT
+            if same.all():
+                return Verdict.DUPLICATE
+        return Verdict.ACCEPTED

@@ -1,0 +1,326 @@
+"""Bags of some kilobytes that would unpack to gigabytes: refused in one line, in little memory."""
+
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mcap.writer
+import pytest
+from lz4.frame import LZ4FrameCompressor
+from mcap.writer import CompressionType, IndexType
+
+from actuated_characters.bags import reader
+from actuated_characters.bags.limits import MIB
+from actuated_characters.bags.reader import read_messages
+from msgs_config.errors import RecordingError
+from tests.support.foreign_bags import Said, texts, write_jazzy_db3, write_mcap, write_metadata
+
+pytestmark = pytest.mark.slow
+
+GIB = 1024 * MIB
+TOPIC = "/sim_node/configuration"  # what every command reads first
+BLOCK = 128 * 1024  # bytes that a block of zstd may stand for
+MOST_MEBIBYTES = 600
+SOUND = [Said(TOPIC, number, f"text {number}") for number in range(1, 6)]
+
+
+class Stored(NamedTuple):
+    """A message as it is written into a file."""
+
+    topic: str
+    log_time_ns: int
+    cdr: bytes
+
+
+def zstd_bomb(size: int, *, declared: bool) -> bytes:
+    """A frame of zstd that stands for zeros, in blocks that repeat one byte (RFC 8878)."""
+    head = b"\x28\xb5\x2f\xfd" + (
+        b"\xc0\x40" + size.to_bytes(8, "little") if declared else b"\x00\x40"
+    )
+    blocks, rest = divmod(size, BLOCK)
+    block = (1 << 1 | BLOCK << 3).to_bytes(3, "little") + b"\0"
+    last = (1 | 1 << 1 | rest << 3).to_bytes(3, "little") + b"\0"
+    return head + block * blocks + last
+
+
+def lz4_bomb(size: int) -> bytes:
+    compressor = LZ4FrameCompressor()
+    pieces = [compressor.begin()]
+    pieces += [compressor.compress(bytes(64 * MIB)) for _ in range(size // (64 * MIB))]
+    return b"".join([*pieces, compressor.flush()])
+
+
+def messages(bag: Path, monkeypatch: pytest.MonkeyPatch, *, declared: bool) -> None:
+    del monkeypatch
+    bomb = zstd_bomb(6 * GIB, declared=declared)
+    sound = [Stored(TOPIC, each.log_time_ns, compressed(each.cdr)) for each in SOUND]
+    write_jazzy_db3(bag / "bag_0.db3", [Stored(TOPIC, 0, bomb), *sound])  # type: ignore[list-item]
+    how = {"compression_format": "zstd", "compression_mode": "MESSAGE"}
+    write_metadata(bag, 9, "sqlite3", ["bag_0.db3"], [TOPIC], **how)
+
+
+def compressed(raw: bytes) -> bytes:
+    return bytes(mcap.writer.zstandard.compress(raw))
+
+
+def chunks(
+    bag: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    bomb: bytes,
+    codec: str = "zstandard",
+    size: int | None = None,
+    **options: Any,
+) -> None:
+    """The first chunk is the bomb, and says that it stands for `size`, or for what it did."""
+    whole = mcap.writer.Chunk
+    made: list[object] = []
+
+    def chunk(**fields: Any) -> mcap.writer.Chunk:
+        made.append(fields)
+        if len(made) == 1:
+            fields |= {"data": bomb}
+            fields |= {} if size is None else {"uncompressed_size": size}
+        return whole(**fields)
+
+    def index(**fields: Any) -> Any:
+        fields |= {"compressed_size": len(bomb)} if len(made) == 1 else {}
+        return plain(**fields)
+
+    plain = mcap.writer.ChunkIndex
+    monkeypatch.setattr(mcap.writer, "Chunk", chunk)
+    monkeypatch.setattr(mcap.writer, "ChunkIndex", index)
+    kind = CompressionType.ZSTD if codec == "zstandard" else CompressionType.LZ4
+    write_mcap(bag / "bag_0.mcap", SOUND, chunk_size=1, compression=kind, **options)
+    monkeypatch.undo()
+    write_metadata(bag, 9, "mcap", ["bag_0.mcap"], [TOPIC])
+
+
+def overlapping(bag: Path, monkeypatch: pytest.MonkeyPatch, **options: Any) -> None:
+    """Chunks whose messages are the first and the last in time: all would be open at once."""
+    del monkeypatch
+    large = "0" * (60 * MIB)
+    said = [
+        Said(TOPIC, time, text) for _ in range(12) for time, text in ((100, "last"), (1, large))
+    ]
+    write_mcap(bag / "bag_0.mcap", said, chunk_size=MIB, **options)
+    write_metadata(bag, 9, "mcap", ["bag_0.mcap"], [TOPIC])
+
+
+def whole_file(bag: Path, monkeypatch: pytest.MonkeyPatch, *, declared: bool, size: int) -> None:
+    del monkeypatch
+    (bag / "bag_0.db3.zstd").write_bytes(zstd_bomb(size, declared=declared))
+    how = {"compression_format": "zstd", "compression_mode": "FILE"}
+    write_metadata(bag, 9, "sqlite3", ["bag_0.db3.zstd"], [TOPIC], **how)
+
+
+def computed_column(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An SQLite file whose messages are made when they are read."""
+    del monkeypatch
+    with closing(sqlite3.connect(write_jazzy_db3(bag / "bag_0.db3", SOUND))) as database:
+        database.executescript(
+            "ALTER TABLE messages RENAME COLUMN data TO was;"
+            "ALTER TABLE messages ADD COLUMN data BLOB AS (zeroblob(900000000)) VIRTUAL;"
+        )
+    write_metadata(bag, 9, "sqlite3", ["bag_0.db3"], [TOPIC])
+
+
+Write = Callable[[Path, pytest.MonkeyPatch], None]
+KINDS: dict[str, tuple[Write, str]] = {
+    "message": (
+        lambda *to: messages(*to, declared=True),
+        "at least 6144 MiB, more than the limit of 64",
+    ),
+    "message undeclared": (
+        lambda *to: messages(*to, declared=False),
+        "a message would unpack to more than the limit of 64 MiB",
+    ),
+    "chunk": (
+        lambda *to: chunks(*to, bomb=zstd_bomb(6 * GIB, declared=True), size=6 * GIB),
+        "at least 6144 MiB, more than the limit of 128 MiB",
+    ),
+    "chunk that lies": (
+        lambda *to: chunks(*to, bomb=zstd_bomb(6 * GIB, declared=False)),
+        "a chunk would unpack to more than the limit of 128 MiB",
+    ),
+    "chunk of lz4": (
+        lambda *to: chunks(*to, bomb=lz4_bomb(GIB), codec="lz4"),
+        "a chunk would unpack to more than the limit of 128 MiB",
+    ),
+    "chunk without an index": (
+        lambda *to: chunks(
+            *to, bomb=zstd_bomb(6 * GIB, declared=False), index_types=IndexType.NONE
+        ),
+        "a chunk would unpack to more than the limit of 128 MiB",
+    ),
+    "chunks of one time": (overlapping, "chunks would unpack to at least"),
+    "file": (
+        lambda *to: whole_file(*to, declared=True, size=64 * GIB),
+        "its files would unpack to at least 65536 MiB, more than the limit of 8192 MiB",
+    ),
+    "computed column": (computed_column, "its table 'messages' is computed"),
+}
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+    """Writes a bag of a kind."""
+
+    def bag_of(kind: str) -> Path:
+        bag = tmp_path / "bag"
+        bag.mkdir()
+        KINDS[kind][0](bag, monkeypatch)
+        assert sum(file.stat().st_size for file in bag.iterdir()) < 5 * MIB
+        return bag
+
+    return bag_of
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bomb_is_refused_in_one_line(write: Callable[[str], Path], kind: str) -> None:
+    bag = write(kind)
+
+    with pytest.raises(RecordingError) as caught:
+        list(read_messages(bag))
+
+    line = str(caught.value)
+    assert line.startswith(f"cannot read recording {bag}: ")
+    assert KINDS[kind][1] in line
+    assert ("recover" in line) == bool(list(bag.glob("*.mcap")))
+    assert "\n" not in line and len(line) < 500
+
+
+class Ended(NamedTuple):
+    """A process that has ended."""
+
+    code: int
+    errors: str
+    mebibytes: float  # that it had at most
+
+
+PEAK = "VmHWM:"
+# A process tells its peak itself: to its parent, the parent's own memory counts as well.
+WITH_PEAK = f"""
+import atexit, re, sys
+from actuated_characters.cli import main
+def tell():
+    sys.stdout.flush()
+    print(re.search("{PEAK}.*", open("/proc/self/status").read())[0], flush=True)
+atexit.register(tell)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def run(*arguments: object) -> Ended:
+    """The command line in a process of its own, and the memory that it took."""
+    command = [sys.executable, "-c", WITH_PEAK, *map(str, arguments)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert process.stdout is not None
+    said = process.stdout.read()
+    code = process.wait()
+    process.stdout.close()
+    said, _, peak = said.rpartition(PEAK)
+    return Ended(code, said, int(peak.split()[0]) / 1024)
+
+
+COMMANDS = {
+    "info": ["message undeclared", "chunk", "chunk that lies", "chunks of one time"],
+    "replay": ["message"],
+    "report": ["message undeclared"],
+    "export": ["chunk that lies"],
+}
+
+
+@pytest.mark.parametrize(
+    ("command", "kind"), [(each, kind) for each, kinds in COMMANDS.items() for kind in kinds]
+)
+def test_a_command_refuses_a_bomb_in_little_memory(
+    write: Callable[[str], Path], tmp_path: Path, command: str, kind: str
+) -> None:
+    output = {"report": ["--output", tmp_path / "to"], "export": ["--output", tmp_path / "to.csv"]}
+
+    ended = run(command, write(kind), *output.get(command, []))
+
+    assert ended.code == 1, ended.errors
+    assert KINDS[kind][1] in ended.errors
+    assert ended.mebibytes < MOST_MEBIBYTES
+
+
+@pytest.mark.parametrize("kind", ["chunk", "chunk that lies", "chunk of lz4"])
+def test_recover_keeps_the_rest_and_says_what_it_left(
+    write: Callable[[str], Path], kind: str
+) -> None:
+    bag = write(kind)
+
+    ended = run("recover", bag)
+
+    assert ended.code == 0, ended.errors
+    assert KINDS[kind][1] in " ".join(ended.errors.split())
+    assert ended.mebibytes < MOST_MEBIBYTES
+    assert texts(bag) == SOUND[1:]
+
+
+def test_a_file_that_declares_nothing_is_unpacked_up_to_the_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reader, "MOST_OF_FILES", 20 * MIB)
+    whole_file(tmp_path, monkeypatch, declared=False, size=8 * GIB)
+    monkeypatch.setattr(reader, "MOST_OF_FILES", 20 * MIB)
+
+    with pytest.raises(
+        RecordingError, match=r"its files would unpack to at least .*limit of 20 MiB"
+    ):
+        list(read_messages(tmp_path))
+
+
+def test_a_file_without_an_index_is_sorted_up_to_a_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_mcap(tmp_path / "bag_0.mcap", SOUND * 100, index_types=IndexType.NONE)
+    assert len(texts(tmp_path / "bag_0.mcap")) == 500
+    monkeypatch.setattr(reader, "MOST_SORTED", 10_000)
+
+    with pytest.raises(RecordingError, match="a file without an index would unpack to at least"):
+        list(read_messages(tmp_path / "bag_0.mcap"))
+
+
+@pytest.mark.parametrize("size", [64 * MIB, 64 * MIB + 1])
+def test_a_message_may_be_as_large_as_the_limit(tmp_path: Path, size: int) -> None:
+    raw = b"\x00\x01\x00\x00" + bytes(size - 4)
+    for bag, stored in ((tmp_path / "plain", raw), (tmp_path / "packed", compressed(raw))):
+        bag.mkdir()
+        write_jazzy_db3(bag / "bag_0.db3", [Stored(TOPIC, 1, stored)])  # type: ignore[list-item]
+        mode = "MESSAGE" if bag.name == "packed" else ""
+        how = {"compression_format": "zstd" if mode else "", "compression_mode": mode}
+        write_metadata(bag, 9, "sqlite3", ["bag_0.db3"], [TOPIC], **how)
+        if size > 64 * MIB:
+            with pytest.raises(RecordingError, match=f"on '{TOPIC}' a message would unpack to"):
+                list(read_messages(bag))
+        else:
+            assert [message.raw for message in read_messages(bag)] == [raw]
+
+
+def test_metadata_that_stands_for_a_thousand_million_entries_is_refused(tmp_path: Path) -> None:
+    merges = [f"l{n}: &l{n} {{<<: [{', '.join([f'*l{n - 1}'] * 10)}]}}" for n in range(1, 9)]
+    content = "\n".join(["l0: &l0 {a: 0}", *merges, "rosbag2_bagfile_information: *l8"])
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    write_jazzy_db3(bag / "bag_0.db3", SOUND)
+    (bag / "metadata.yaml").write_text(content)
+
+    ended = run("info", bag)
+
+    assert ended.code == 1, ended.errors
+    assert "metadata.yaml" in ended.errors
+    assert ended.mebibytes < MOST_MEBIBYTES
+
+
+def test_metadata_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "metadata.yaml").write_text("# " + "x" * (8 * MIB))
+
+    with pytest.raises(RecordingError, match=r"metadata.yaml is damaged: larger than 4096 KiB"):
+        list(read_messages(tmp_path))

@@ -1,0 +1,509 @@
+"""A recording read back is the run itself, to the bit; what is none says so in a line."""
+
+import hashlib
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pybullet_data
+import pytest
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
+
+from actuated_characters.bags.recording import Recording, read_recording, read_recordings
+from actuated_characters.bags.writer import BagWriter
+from actuated_characters.runs.plan import Plan
+from msgs_config.errors import ActuatedCharactersError, MessageError, RecordingError
+from msgs_config.messages import configuration, topics
+from msgs_config.messages.joint_state import JointStateEncoder
+from msgs_config.messages.state import StampedState
+from msgs_config.messages.wrenches import WrenchArrays
+from tests.support.bags import (
+    CONFIGURATION,
+    Made,
+    Said,
+    add_to,
+    make_run,
+    said_configuration,
+    said_references,
+    said_states,
+    said_wrenches,
+    write_bag,
+)
+
+WALK = {"reference": "clip", "clip": "walk"}
+PLACEMENT = [1.0, -2.0, 0.5, 0.7]
+LONG = 5000  # ticks
+
+
+@pytest.fixture(scope="module")
+def walk() -> Made:
+    return make_run("humanoid", 0.1, WALK)
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> Made:
+    return make_run("pendulum", 0.05)
+
+
+def assert_same_states(recording: Recording, made: Made) -> None:
+    """Stamps, positions, velocities and efforts are those of the run, to the bit."""
+    assert recording.stamps_ns.tolist() == [state.stamp_ns for state in made.states]
+    for row, state in enumerate(made.states):
+        assert recording.position[row].tobytes() == state.position.tobytes()
+        assert recording.velocity[row].tobytes() == state.velocity.tobytes()
+    for row, tick in enumerate(made.ticks):
+        assert tick.following.effort is not None
+        assert recording.effort[row].tobytes() == tick.following.effort.tobytes()
+
+
+# What a recording says
+
+
+def test_a_recording_has_the_runs_own_states_efforts_and_references(
+    walk: Made, tmp_path: Path
+) -> None:
+    recording = read_recording(write_bag(tmp_path / "bag", walk.messages()))
+
+    assert len(walk.ticks) == 24
+    assert_same_states(recording, walk)
+    for row, tick in enumerate(walk.ticks):
+        assert tick.reference is not None
+        assert recording.reference_position[row].tobytes() == tick.reference.position.tobytes()
+        assert recording.reference_velocity[row].tobytes() == tick.reference.velocity.tobytes()
+    # nobody answers the last state
+    assert np.isnan(recording.reference_position[-1]).all()
+    assert recording.contacts == recording.applied_wrench == ()
+
+
+def test_it_knows_the_character_and_the_parameters(walk: Made, tmp_path: Path) -> None:
+    recording = read_recording(write_bag(tmp_path / "bag", walk.messages()))
+
+    assert recording.character == walk.plan.character
+    assert recording.layout.dof_names == walk.plan.character.layout.dof_names
+    assert recording.parameters["rate"] == 240
+    assert recording.parameters["terrain"] == "plane"
+
+
+def test_times_begin_at_zero_with_the_first_state(walk: Made, tmp_path: Path) -> None:
+    recording = read_recording(write_bag(tmp_path / "bag", walk.messages()))
+
+    np.testing.assert_allclose(recording.times, np.arange(25) / 240.0, atol=2e-9)
+
+
+def test_a_runs_directory_is_as_good_as_the_bag_in_it(pendulum: Made, tmp_path: Path) -> None:
+    write_bag(tmp_path / "bag", pendulum.messages())
+
+    assert_same_states(read_recording(tmp_path), pendulum)
+
+
+def test_the_character_stands_where_it_was_placed(tmp_path: Path) -> None:
+    made = make_run("kuka", 0.02, placement=PLACEMENT)
+
+    recording = read_recording(write_bag(tmp_path / "bag", made.messages()))
+
+    pose = recording.character.links[0].joint.pose_in_parent
+    assert pose.position == tuple(PLACEMENT[:3])
+    assert recording.character == made.plan.character
+
+
+def test_names_may_come_in_any_order(walk: Made, tmp_path: Path) -> None:
+    layout = walk.plan.character.layout
+    order = np.random.default_rng(1).permutation(layout.size)
+    encoder = JointStateEncoder([layout.dof_names[index] for index in order])
+    shuffled = [
+        (
+            topics.JOINT_STATES,
+            encoder.encode(
+                state.stamp_ns,
+                state.position[order],
+                state.velocity[order],
+                *(() if state.effort is None else (state.effort[order],)),
+            ),
+        )
+        for state in walk.states
+    ]
+
+    recording = read_recording(
+        write_bag(tmp_path / "bag", [said_configuration(walk.plan), *shuffled])
+    )
+
+    assert_same_states(recording, walk)
+    assert np.isnan(recording.reference_position).all()
+
+
+def test_a_state_that_was_published_again_counts_once(pendulum: Made, tmp_path: Path) -> None:
+    states = said_states(pendulum.plan, pendulum.states)
+    again = [states[0], *states[:3], states[1], states[2], *states[3:], states[-1]]
+
+    recording = read_recording(
+        write_bag(tmp_path / "bag", [said_configuration(pendulum.plan), *again])
+    )
+
+    assert_same_states(recording, pendulum)
+
+
+def test_what_comes_before_the_configuration_counts_too(pendulum: Made, tmp_path: Path) -> None:
+    configuration, *rest = pendulum.messages()
+
+    assert_same_states(
+        read_recording(write_bag(tmp_path / "bag", [*rest, configuration])), pendulum
+    )
+
+
+def test_a_tick_that_was_a_reset_has_no_effort(pendulum: Made, tmp_path: Path) -> None:
+    states = list(pendulum.states)
+    states[5] = replace(states[5], effort=None)
+
+    recording = read_recording(
+        write_bag(
+            tmp_path / "bag",
+            [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)],
+        )
+    )
+
+    assert np.isnan(recording.effort).all(axis=1).tolist() == [
+        row == 4 for row in range(len(pendulum.ticks))
+    ]
+
+
+def test_a_reference_counts_at_its_stamp(pendulum: Made, tmp_path: Path) -> None:
+    third = pendulum.ticks[3].reference
+    assert third is not None
+    of_nobody = replace(third, stamp_ns=third.stamp_ns + 1)
+
+    recording = read_recording(
+        write_bag(
+            tmp_path / "bag",
+            [
+                *said_references(pendulum.plan, [third, of_nobody]),
+                said_configuration(pendulum.plan),
+                *said_states(pendulum.plan, pendulum.states),
+            ],
+        )
+    )
+
+    known = ~np.isnan(recording.reference_position[:, 0])
+    assert np.flatnonzero(known).tolist() == [3]
+
+
+@pytest.mark.parametrize("name", ["contacts", "applied_wrench"])
+def test_wrenches_belong_to_the_tick_that_their_stamp_ends(
+    pendulum: Made, tmp_path: Path, name: str
+) -> None:
+    topic = {"contacts": topics.CONTACTS, "applied_wrench": topics.APPLIED_WRENCH}[name]
+    stamps = [state.stamp_ns for state in pendulum.states]
+    touch = WrenchArrays.of_rows(stamps[3], ["rod"], [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)], [])
+    nothing = WrenchArrays.of_rows(stamps[6], [], [], [])
+    messages = [*pendulum.messages(), *said_wrenches(topic, [nothing, touch])]
+
+    recording = read_recording(write_bag(tmp_path / "bag", messages))
+
+    found = getattr(recording, name)
+    assert len(found) == len(pendulum.ticks)
+    assert [row for row, wrenches in enumerate(found) if wrenches is not None] == [2, 5]
+    assert (found[2].links, found[5].links) == (("rod",), ())
+    np.testing.assert_array_equal(found[2].wrenches, touch.wrenches)
+
+
+def test_names_may_be_in_a_namespace(walk: Made, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", walk.messages(), namespace="robots/left")
+
+    assert_same_states(read_recording(bag), walk)
+
+
+def test_a_long_recording_is_read_in_a_moment(walk: Made, tmp_path: Path) -> None:
+    clock = 1_000_000_000
+    template = walk.states[1]
+    states = [replace(template, stamp_ns=k * clock // 240) for k in range(1, LONG + 2)]
+    states[0] = replace(states[0], effort=None)
+    stand_ins = [
+        replace(walk.ticks[0].reference, stamp_ns=state.stamp_ns)  # type: ignore[type-var]
+        for state in states
+    ]
+    touch = [WrenchArrays.of_rows(s.stamp_ns, ["chest"], [(1.0,) * 6], []) for s in states]
+    bag = write_bag(
+        tmp_path / "bag",
+        [
+            said_configuration(walk.plan),
+            *said_states(walk.plan, states),
+            *said_references(walk.plan, stand_ins),
+            *said_wrenches(topics.CONTACTS, touch),
+        ],
+    )
+
+    started = time.process_time()
+    recording = read_recording(bag)
+
+    assert time.process_time() - started < 0.1 * LONG / 240  # ten times as fast as it went
+    assert recording.effort.shape == (LONG, 34)
+
+
+# What is none
+
+
+def refusal(path: Path) -> str:
+    """Why there is no recording to read, in one line."""
+    with pytest.raises(RecordingError) as caught:
+        read_recording(path)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_what_is_not_there_is_named(tmp_path: Path) -> None:
+    assert refusal(tmp_path / "nothing") == f"no run or recording at {tmp_path / 'nothing'}"
+
+
+def test_a_run_without_a_bag_has_none(tmp_path: Path) -> None:
+    (tmp_path / "summary.json").touch()
+
+    assert refusal(tmp_path).startswith(f"no recording in {tmp_path}")
+
+
+def test_a_bag_that_was_not_finished_is_none(pendulum: Made, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", pendulum.messages())
+    (bag / "metadata.yaml").unlink()
+
+    assert "no complete recording" in refusal(tmp_path)
+
+
+def test_a_bag_without_states_is_none(pendulum: Made, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", [said_configuration(pendulum.plan)])
+
+    assert "no states" in refusal(bag)
+
+
+def test_a_bag_without_the_simulators_configuration_is_none(pendulum: Made, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", said_states(pendulum.plan, pendulum.states))
+
+    assert "sim_node/configuration" in refusal(bag)
+
+
+def write_both(path: Path, left: list[Said], right: list[Said]) -> Path:
+    """A bag of two characters, each in its namespace."""
+    with BagWriter(path) as bag:
+        add_to(bag, right, "right")
+        add_to(bag, left, "left")
+    return path
+
+
+def test_of_several_characters_one_must_be_named(pendulum: Made, tmp_path: Path) -> None:
+    bag = write_both(tmp_path / "bag", pendulum.messages(), pendulum.messages())
+
+    assert "several characters (left, right)" in refusal(bag)
+    with pytest.raises(RecordingError, match="unknown character 'lef'; there are: left, right"):
+        read_recording(bag, "lef")
+
+
+def test_each_of_several_characters_has_its_own_states(
+    walk: Made, pendulum: Made, tmp_path: Path
+) -> None:
+    bag = write_both(tmp_path / "bag", walk.messages(), pendulum.messages())
+
+    assert_same_states(read_recording(bag, "left"), walk)
+    assert_same_states(read_recording(bag, "right"), pendulum)
+
+
+def test_they_come_in_the_order_of_their_world(pendulum: Made, tmp_path: Path) -> None:
+    names = ("right", "left")
+    left, right = (
+        [said_configuration(pendulum.plan, name, names), *pendulum.messages()[1:]]
+        for name in ("left", "right")
+    )
+
+    recordings = read_recordings(write_both(tmp_path / "bag", left, right))
+
+    assert [recording.name for recording in recordings] == ["right", "left"]
+    assert {recording.world.namespace for recording in recordings} == {""}
+
+
+def test_what_comes_before_an_episode_is_left_out(pendulum: Made, tmp_path: Path) -> None:
+    states = list(pendulum.states)
+    states[4] = replace(states[4], effort=None)
+    messages = [
+        said_configuration(pendulum.plan),
+        *said_states(pendulum.plan, states[2:]),
+        *said_references(pendulum.plan, [tick.reference for tick in pendulum.ticks]),  # type: ignore[misc]
+    ]
+
+    recording = read_recording(write_bag(tmp_path / "bag", messages))
+
+    assert recording.stamps_ns.tolist() == [state.stamp_ns for state in states[4:]]
+    assert recording.skipped_states == 2
+    assert recording.episode_rows.tolist() == [0]
+    reference = pendulum.ticks[4].reference
+    assert reference is not None
+    assert recording.reference_position[0].tobytes() == reference.position.tobytes()
+
+
+def test_without_an_episodes_first_state_there_is_nothing(pendulum: Made, tmp_path: Path) -> None:
+    messages = [said_configuration(pendulum.plan), *said_states(pendulum.plan, pendulum.states[1:])]
+
+    assert "in the middle of an episode" in refusal(write_bag(tmp_path / "bag", messages))
+
+
+def test_a_simulator_that_was_started_anew_is_found(pendulum: Made, tmp_path: Path) -> None:
+    other = replace(pendulum.states[0], position=pendulum.states[0].position + 1e-15)
+    states = [*pendulum.states, other]
+    messages = [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)]
+
+    assert "two states of tick 1" in refusal(write_bag(tmp_path / "bag", messages))
+
+
+def test_commands_are_there_as_they_were_sent(pendulum: Made, tmp_path: Path) -> None:
+    encoder, stamps = JointStateEncoder(["hinge"]), [s.stamp_ns for s in pendulum.states]
+    sent = [(stamps[3], 1.5), (stamps[3], 2.5), (0, 3.5), (stamps[0], 4.5)]
+    said = [
+        (topics.JOINT_TORQUES, encoder.encode(stamp, effort=np.array([effort])))
+        for stamp, effort in sent
+    ]
+    no_command = (topics.JOINT_TORQUES, b"\0\1\0\0 nonsense")
+
+    recording = read_recording(
+        write_bag(tmp_path / "bag", [*pendulum.messages(), *said, no_command])
+    )
+
+    found = {row: c for row, c in enumerate(recording.commands) if c}
+    assert {row: [c.efforts.tolist() for c in each] for row, each in found.items()} == {
+        0: [[4.5]],
+        3: [[1.5], [2.5]],
+    }
+    assert found[0][0].names == ("hinge",)
+    assert [c.efforts.tolist() for c in recording.unstamped_commands] == [[3.5]]
+
+
+def test_what_a_controller_says_of_itself_is_there_once(pendulum: Made, tmp_path: Path) -> None:
+    plan, topic = pendulum.plan, topics.CONFIGURATION.of(topics.CONTROLLER_NODE)
+    texts = [
+        configuration.describe(plan.character, plan.controller, since_ns=since)
+        for since in (None, None, pendulum.states[3].stamp_ns)
+    ]
+    said = [(topic, serialize_message(String(data=text))) for text in (*texts, "no JSON")]
+
+    recording = read_recording(write_bag(tmp_path / "bag", [*pendulum.messages(), *said]))
+
+    assert [c.after_stamp_ns for c in recording.controller] == [None, pendulum.states[3].stamp_ns]
+    assert recording.controller[0].parameters["rate"] == 240
+
+
+def test_two_simulators_are_told_apart(pendulum: Made, tmp_path: Path) -> None:
+    other = make_run("pendulum", 0.01, gravity=1.0)
+    messages = [*pendulum.messages(), said_configuration(other.plan)]
+
+    assert "several simulators" in refusal(write_bag(tmp_path / "bag", messages))
+
+
+def test_ticks_that_are_missing_are_named(pendulum: Made, tmp_path: Path) -> None:
+    states = [state for row, state in enumerate(pendulum.states) if row not in (4, 5)]
+    messages = [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)]
+
+    assert "ticks 5 to 6" in refusal(write_bag(tmp_path / "bag", messages))
+
+
+def own_character(folder: Path) -> Path:
+    """A pendulum of the user's own; its file."""
+    text = Path("msgs_config/character/data/pendulum.urdf").read_text()
+    (folder / "thing.urdf").write_text(text)
+    file = folder / "thing.yaml"
+    file.write_text(
+        "urdf: thing.urdf\nfixed_base: true\njoints: {hinge: {lower: -1.0, upper: 1.0}}\n"
+    )
+    return file
+
+
+def said_without(plan: Plan, *names: str, **changes: object) -> Said:
+    """The simulator's configuration without some entries, and with others changed."""
+    text = configuration.describe(plan.character, plan.simulator)
+    content = {key: value for key, value in json.loads(text).items() if key not in names}
+    return CONFIGURATION, serialize_message(String(data=json.dumps(content | changes)))
+
+
+@pytest.mark.parametrize("alone", [False, True], ids=["file", "urdf alone"])
+def test_a_character_is_made_from_the_texts_in_the_bag(tmp_path: Path, alone: bool) -> None:
+    file = own_character(tmp_path)
+    made = make_run(str(file.with_suffix(".urdf") if alone else file), 0.02)
+    bag = write_bag(tmp_path / "bag", made.messages())
+
+    for each in (file, file.with_suffix(".urdf")):
+        each.unlink()
+
+    recording = read_recording(bag)
+    assert_same_states(recording, made)
+    assert recording.character == made.plan.character
+
+
+NEW = ("character_path", "urdf_path", "meshes", "name", "characters")  # in a configuration
+
+
+def test_an_older_bag_has_its_character_in_its_texts_too(tmp_path: Path) -> None:
+    file = own_character(tmp_path)
+    made = make_run(str(file), 0.02)
+    bag = write_bag(tmp_path / "bag", [said_without(made.plan, *NEW), *made.messages()[1:]])
+    assert read_recording(bag).character == made.plan.character
+
+    file.write_text(file.read_text() + "feet: [rod]\n")
+
+    assert read_recording(bag).character == made.plan.character
+    file.unlink()
+    assert "cannot build character thing anew" in refusal(bag) and str(file) in refusal(bag)
+
+
+def test_meshes_of_an_older_bag_are_those_of_the_same_text(tmp_path: Path) -> None:
+    made = make_run("franka_panda", 0.01)
+    older, rest = said_without(made.plan, *NEW), made.messages()[1:]
+    other = said_without(made.plan, *NEW, urdf=made.plan.character.loading.urdf_text + "<!-- -->")
+
+    recording = read_recording(write_bag(tmp_path / "same", [older, *rest]))
+
+    assert recording.character == made.plan.character
+    assert "another text now" in refusal(write_bag(tmp_path / "other", [other, *rest]))
+
+
+def test_texts_that_contradict_their_own_numbers_are_refused(
+    pendulum: Made, tmp_path: Path
+) -> None:
+    heavier = pendulum.plan.character.loading.urdf_text.replace("1.0", "2.0")
+    messages = [said_without(pendulum.plan, urdf=heavier), *pendulum.messages()[1:]]
+
+    assert "not the one that was recorded" in refusal(write_bag(tmp_path / "bag", messages))
+
+
+def test_a_mesh_that_is_another_one_or_missing_is_named(tmp_path: Path) -> None:
+    made = make_run("franka_panda", 0.01)
+    text = configuration.describe(made.plan.character, made.plan.simulator)
+    hashes = json.loads(text)["meshes"]
+    name = "package://meshes/collision/hand.obj"
+    path = Path(pybullet_data.getDataPath()) / "franka_panda/meshes/collision/hand.obj"
+    assert hashes[name] == hashlib.sha256(path.read_bytes()).hexdigest()
+
+    other = said_without(made.plan, meshes=hashes | {name: "0" * 64})
+    line = refusal(write_bag(tmp_path / "other", [other, *made.messages()[1:]]))
+    assert "is not the one that it was" in line and path.name in line
+    urdf = made.plan.character.loading.urdf_text.replace(name, f"{name}.gone.obj")
+    gone = said_without(made.plan, urdf=urdf)
+    line = refusal(write_bag(tmp_path / "gone", [gone, *made.messages()[1:]]))
+    assert f"{path.name}.gone.obj" in line
+
+
+@pytest.mark.parametrize("said", ["no JSON", "{}", '{"character": 1, "joints": []}'])
+def test_a_configuration_of_somebody_else_is_refused(
+    pendulum: Made, tmp_path: Path, said: str
+) -> None:
+    messages = [
+        (CONFIGURATION, serialize_message(String(data=said))),
+        *said_states(pendulum.plan, pendulum.states),
+    ]
+
+    with pytest.raises(MessageError, match=r"recording .*bag: .*configuration"):
+        read_recording(write_bag(tmp_path / "bag", messages))
+
+
+def test_states_of_something_else_are_refused(pendulum: Made, tmp_path: Path) -> None:
+    state = StampedState(pendulum.states[0].stamp_ns, np.zeros(1), np.zeros(1), None)
+    raw = JointStateEncoder(["elbow"]).encode(state.stamp_ns, state.position, state.velocity)
+    messages = [said_configuration(pendulum.plan), (topics.JOINT_STATES, raw)]
+
+    with pytest.raises(ActuatedCharactersError, match="elbow"):
+        read_recording(write_bag(tmp_path / "bag", messages))

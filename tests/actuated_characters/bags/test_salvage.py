@@ -1,0 +1,301 @@
+"""Files that were cut off, damaged, split or compressed: what of them `recover` finds, and says."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from backports import zstd
+from mcap.writer import CompressionType
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader
+from std_msgs.msg import String
+
+from actuated_characters.bags.definitions import read_definition
+from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.recovery.recover import recover
+from msgs_config.errors import RecordingError
+from tests.support.foreign_bags import (
+    SAID,
+    Said,
+    texts,
+    write_humble_db3,
+    write_mcap,
+    write_metadata,
+)
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    (tmp_path / "bag").mkdir()
+    return tmp_path / "bag"
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_a_truncated_file_of_ros2_bag_record_is_recovered_up_to_the_cut(
+    bag: Path, compression: CompressionType
+) -> None:
+    file = write_mcap(bag / "bag_0.mcap", SAID, compression=compression, chunk_size=150)
+    size = file.stat().st_size
+    os.truncate(file, size // 2)
+
+    recovered = recover(bag)
+
+    read = texts(bag)
+    assert read == SAID[: len(read)]
+    assert 5 < len(read) < len(SAID)
+    (lost,) = recovered.contents.lost
+    assert lost.startswith("bag_0.mcap: ")
+    with Reader(bag) as reader:
+        assert {connection.digest for connection in reader.connections} == {"RIHS01_ab"}
+
+
+def test_a_damaged_chunk_in_the_middle_is_left_out_and_said(bag: Path) -> None:
+    file = write_mcap(
+        bag / "bag_0.mcap", SAID, compression=CompressionType.NONE, chunk_size=150, close=False
+    )
+    data = bytearray(file.read_bytes())
+    data[data.index(SAID[15].cdr) + 10] ^= 1
+    file.write_bytes(data)
+
+    recovered = recover(bag)
+
+    read = texts(bag)
+    assert SAID[15] not in read
+    assert {SAID[0], SAID[-5]} <= set(read)
+    assert read == [said for said in SAID if said in read]
+    assert recovered.contents.lost == ["bag_0.mcap: damaged chunk (1)"]
+
+
+def test_topics_whose_first_chunk_is_damaged_are_taken_from_the_files_end(bag: Path) -> None:
+    file = write_mcap(bag / "bag_0.mcap", SAID, compression=CompressionType.NONE, chunk_size=150)
+    data = bytearray(file.read_bytes())
+    data[data.index(SAID[0].cdr) + 10] ^= 1
+    file.write_bytes(data)
+    (bag / "metadata.yaml").write_text("cut off")
+
+    recover(bag)
+
+    assert SAID[-1] in texts(bag)
+
+
+def test_split_files_come_together_in_the_order_of_their_numbers(bag: Path) -> None:
+    for number in range(12):
+        part = SAID[number * 2 : number * 2 + 2]
+        write_mcap(bag / f"bag_{number}.mcap", part, chunk_size=1, close=number < 11)
+
+    recover(bag)
+
+    assert texts(bag) == SAID[:24]
+    assert [file.name for file in bag.glob("*.mcap")] == ["bag.mcap"]
+
+
+def test_a_type_that_is_not_installed_is_recovered_with_the_hash_of_its_text(bag: Path) -> None:
+    file = write_mcap(bag / "bag_0.mcap", SAID, close=False, compression=CompressionType.NONE)
+    data = file.read_bytes().replace(b"std_msgs/msg/String", b"own_msgs/msg/Sample")
+    data = data.replace(b"topic_type_hash", b"topic_type_hasx")
+    (bag / "bag_0.mcap").write_bytes(_without_checksums(data))
+
+    recover(bag)
+
+    with AnyReader([bag]) as reader:
+        (digest,) = {connection.digest for connection in reader.connections}
+        assert {c.msgtype for c in reader.connections} == {"own_msgs/msg/Sample"}
+    assert digest.startswith("RIHS01_")
+    assert digest != read_definition(String).type_hash
+
+
+def _without_checksums(data: bytes) -> bytes:
+    """An MCAP file whose chunks' checksums are unset, which the format allows."""
+    out, position = bytearray(data), 8
+    while position < len(data):
+        length = int.from_bytes(data[position + 1 : position + 9], "little")
+        if data[position] == 6:
+            out[position + 9 + 24 : position + 9 + 28] = bytes(4)
+        position += 9 + length
+    return bytes(out)
+
+
+# Lengths that lie
+
+
+def records(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Kind, begin and end of the records of an MCAP file."""
+    position = 8
+    while position + 9 <= len(data):
+        length = int.from_bytes(data[position + 1 : position + 9], "little")
+        yield data[position], position, position + 9 + length
+        position += 9 + length
+
+
+CHUNK, MESSAGE_INDEX, FOOTER = 6, 7, 2
+DATA_LENGTH = 9 + 28 + 4  # bytes into a chunk that is not compressed
+ENTRIES_LENGTH = 9 + 2  # bytes into a message's index
+
+
+@pytest.mark.parametrize("bit", [3, 16, 47, 63])
+def test_of_a_chunk_whose_inner_length_lies_nothing_else_is_lost(bag: Path, bit: int) -> None:
+    file = plain(bag)
+    data = bytearray(file.read_bytes())
+    _, begin, end = [each for each in records(bytes(data)) if each[0] == CHUNK][2]
+    gone = {said for said in SAID if said.cdr in data[begin:end]}
+    data[begin + DATA_LENGTH + bit // 8] ^= 1 << bit % 8
+    file.write_bytes(data)
+
+    recovered = recover(bag)
+
+    if bit in (16, 47):  # the record ends where it ends
+        assert texts(bag) == SAID and recovered.contents.lost == []
+    else:
+        assert texts(bag) == [said for said in SAID if said not in gone]
+        assert recovered.contents.lost == ["bag_0.mcap: damaged chunk (1)"]
+
+
+@pytest.mark.parametrize(("kind", "bit"), [(CHUNK, 2), (MESSAGE_INDEX, 3), (CHUNK, 0), (CHUNK, 4)])
+def test_a_record_of_another_kind_ends_nothing(bag: Path, kind: int, bit: int) -> None:
+    """By one bit a chunk is a footer, an index or unknown, and an index the end of the data."""
+    file = plain(bag)
+    data = bytearray(file.read_bytes())
+    _, begin, end = [each for each in records(bytes(data)) if each[0] == kind][2]
+    gone = {said for said in SAID if kind == CHUNK and said.cdr in data[begin:end]}
+    data[begin] ^= 1 << bit
+    file.write_bytes(data)
+
+    recovered = recover(bag)
+
+    assert texts(bag) == [said for said in SAID if said not in gone]
+    assert bool(recovered.contents.lost) == (bit == 4)
+
+
+def test_what_nobody_needs_may_be_damaged(bag: Path) -> None:
+    file = plain(bag)
+    data = bytearray(file.read_bytes())
+    for kind, begin, _ in list(records(bytes(data))):
+        if kind == MESSAGE_INDEX:
+            data[begin + ENTRIES_LENGTH + 3] ^= 0x40
+    file.write_bytes(data)
+
+    recovered = recover(bag)
+
+    assert texts(bag) == SAID and recovered.contents.lost == []
+
+
+def test_a_tail_of_zeros_is_no_record(bag: Path) -> None:
+    file = plain(bag)
+    with file.open("ab") as stream:
+        stream.truncate(file.stat().st_size + (1 << 30))
+
+    recovered = recover(bag)
+
+    assert texts(bag) == SAID
+    assert recovered.contents.lost == [f"bag_0.mcap: bytes cut off ({1 << 30})"]
+
+
+def test_a_summary_that_begins_among_the_messages_unpacks_nothing(bag: Path) -> None:
+    file = write_mcap(bag / "bag_0.mcap", SAID, chunk_size=150)
+    data = bytearray(file.read_bytes())
+    _, footer, _ = next(each for each in records(bytes(data)) if each[0] == FOOTER)
+    data[footer + 9 : footer + 17] = (8).to_bytes(8, "little")
+    file.write_bytes(data)
+
+    recovered = recover(bag)
+
+    assert texts(bag) == SAID and recovered.contents.lost == []
+
+
+def test_a_message_that_is_cut_off_swallows_none_behind_it(bag: Path) -> None:
+    file = plain(bag)
+    data = bytearray(file.read_bytes())
+    _, begin, end = next(each for each in records(bytes(data)) if each[0] == CHUNK)
+    inside = DATA_LENGTH + 8
+    message = next(
+        each for each in records(bytes(8) + bytes(data[begin + inside : end])) if each[0] == 5
+    )
+    data[begin + inside + message[1] - 8 + 2] ^= 1  # 256 bytes more
+    file.write_bytes(data)
+
+    recovered = recover(bag)
+
+    assert texts(bag) == [said for said in SAID if said.cdr not in data[begin:end]]
+    assert "bytes cut off" in recovered.contents.lost[0]
+
+
+def test_many_losses_are_one_line(bag: Path) -> None:
+    many = [Said("/a", number, f"text {number}") for number in range(3000)]
+    file = write_mcap(bag / "bag_0.mcap", many, compression=CompressionType.ZSTD, close=False)
+    data = bytearray(file.read_bytes())
+    _, begin, end = next(each for each in records(bytes(data)) if each[0] == CHUNK)
+    data[(begin + end) // 2] ^= 0x55
+    file.write_bytes(data)
+
+    with pytest.raises(RecordingError) as caught:
+        recover(bag)
+
+    assert "damaged chunk (1)" in str(caught.value)
+    assert "message of a topic that is not announced (29" in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+def plain(bag: Path) -> Path:
+    """A file of several chunks, not compressed and without checksums."""
+    file = write_mcap(
+        bag / "bag_0.mcap", SAID, compression=CompressionType.NONE, chunk_size=150, close=False
+    )
+    file.write_bytes(_without_checksums(file.read_bytes()))
+    return file
+
+
+# What was compressed
+
+
+@contextmanager
+def compressing_each(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Have messages written as `ros2 bag record --compression-mode message` does."""
+    plain = Said.cdr
+    with monkeypatch.context() as patch:
+        patch.setattr(Said, "cdr", property(lambda said: zstd.compress(plain.fget(said))))
+        yield
+
+
+def test_messages_that_rosbag2_compressed_are_recovered(
+    bag: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with compressing_each(monkeypatch):
+        write_mcap(bag / "bag_0.mcap", SAID, compression=CompressionType.NONE, close=False)
+
+    recovered = recover(bag)
+
+    assert texts(bag) == SAID and recovered.contents.lost == []
+
+
+def test_messages_that_rosbag2_compressed_in_a_file_without_an_index_are_read(
+    bag: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with compressing_each(monkeypatch):
+        write_mcap(bag / "bag_0.mcap", SAID, use_chunking=False)
+    how = {"compression_format": "zstd", "compression_mode": "MESSAGE"}
+    write_metadata(bag, 9, "mcap", ["bag_0.mcap"], ["/a", "/b"], **how)
+
+    assert texts(bag) == SAID
+
+
+def test_a_part_that_was_compressed_as_a_whole_is_not_left_out_in_silence(bag: Path) -> None:
+    file = write_mcap(bag / "bag_0.mcap", SAID[:20])
+    (bag / "bag_0.mcap.zstd").write_bytes(zstd.compress(file.read_bytes()))
+    file.unlink()
+    write_mcap(bag / "bag_1.mcap", SAID[20:], close=False)
+
+    with pytest.raises(
+        RecordingError, match=r"bag_0.mcap.zstd is compressed as a whole; 'zstd -d'"
+    ):
+        recover(bag)
+
+
+def test_an_sqlite_file_needs_no_recovering(bag: Path) -> None:
+    write_humble_db3(bag / "bag_0.db3", SAID)
+
+    with pytest.raises(RecordingError, match=r"bag_0.db3 is SQLite's, .*; give the file itself"):
+        recover(bag)
+
+    assert [message.raw for message in read_messages(bag / "bag_0.db3")] == [s.cdr for s in SAID]

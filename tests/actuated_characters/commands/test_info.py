@@ -1,0 +1,373 @@
+"""What `info` says of bags: of ours, of broken ones, of anybody's."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from actuated_characters.bags.writer import BagWriter
+from actuated_characters.cli import main
+from actuated_characters.report.contents import read_contents
+from actuated_characters.report.facts import BagFacts, as_json, look_at
+from actuated_characters.report.timing import lateness, pauses, state_times
+from msgs_config.errors import RecordingError
+from msgs_config.messages import topics
+from msgs_config.messages.joint_state import JointStateEncoder
+from msgs_config.messages.topics import Topic
+from tests.support.bags import Made, add_to, make_run, said_configuration, said_states, write_bag
+from tests.support.eventful import (
+    MS,
+    START_NS,
+    Eventful,
+    eventful_run,
+    said_controller,
+    write_timed,
+)
+from tests.support.foreign_bags import Said as SaidText
+from tests.support.foreign_bags import write_humble_db3, write_metadata
+
+PUSH = (100.0, 0.0, 50.0)
+TICKS = 60
+
+
+@pytest.fixture(scope="module")
+def fall() -> Eventful:
+    """A humanoid in real time, pushed in two ticks, reset, paused."""
+    return eventful_run(
+        "humanoid",
+        TICKS,
+        pushed=[(10, 12, "chest", PUSH), (40, 1, "left_knee", PUSH)],
+        reset_after=30,
+        pause_after=50,
+        tick_ns=4 * MS,
+        mode="realtime",
+    )
+
+
+@pytest.fixture(scope="module")
+def facts(fall: Eventful, tmp_path_factory: pytest.TempPathFactory) -> BagFacts:
+    messages = fall.messages()
+    changed = {**fall.plan.controller, "gain_scale.p": 2.0}
+    since = fall.states[20].stamp_ns
+    said = said_controller(fall.plan, changed, since)  # type: ignore[arg-type]
+    messages.append((said, fall.log_times_ns[20]))
+    messages.sort(key=lambda each: each[1])
+    directory = tmp_path_factory.mktemp("fall")
+    write_timed(directory / "bag", messages)
+    return look_at(directory)
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> Made:
+    return make_run("pendulum", 0.05)
+
+
+# Files and topics
+
+
+def test_topics_have_counts_rates_and_largest_gaps(facts: BagFacts, fall: Eventful) -> None:
+    topic = {topic.name: topic for topic in facts.contents.topics}["/joint_states"]
+    times = np.array(fall.log_times_ns)
+
+    assert topic.type_name == "sensor_msgs/msg/JointState"
+    assert topic.count == TICKS + 1
+    assert topic.rate_hz == pytest.approx(TICKS / ((times[-1] - times[0]) / 1e9))
+    assert topic.largest_gap_ns == np.diff(times).max() == 2_004 * MS
+
+
+def test_the_bag_is_described(facts: BagFacts) -> None:
+    contents = facts.contents
+
+    assert set(contents.files) == {"bag.mcap", "metadata.yaml"}
+    assert contents.files["bag.mcap"] == (contents.bag / "bag.mcap").stat().st_size
+    assert (contents.storage, contents.version) == ("mcap", 9)
+    assert contents.start_ns == START_NS - 2 * MS
+
+
+@pytest.mark.parametrize(
+    ("storage", "compression", "said"),
+    [
+        ("mcap", "none", "none"),
+        ("mcap", "zstd", "zstd (chunks)"),
+        ("sqlite3", "none", "none"),
+        ("sqlite3", "zstd", "zstd (message)"),
+    ],
+)
+def test_storage_and_compression_are_named(
+    pendulum: Made, tmp_path: Path, storage: str, compression: str, said: str
+) -> None:
+    with BagWriter(tmp_path / "bag", storage=storage, compression=compression) as bag:
+        add_to(bag, pendulum.messages())
+
+    contents = read_contents(tmp_path)
+
+    assert (contents.storage, contents.compression) == (storage, said)
+
+
+def test_a_topic_without_messages_is_listed(pendulum: Made, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        add_to(bag, pendulum.messages())
+        topic = topics.CONTACTS
+        bag.add_topic("/contacts", topic.message_type, topic.qos)
+
+    found = {topic.name: topic for topic in read_contents(tmp_path).topics}
+
+    assert found["/contacts"].count == 0 and found["/contacts"].rate_hz is None
+
+
+# A character
+
+
+def test_a_character_is_described(facts: BagFacts, fall: Eventful) -> None:
+    (stream,) = facts.streams
+
+    assert (stream.name, stream.character) == ("", "humanoid")
+    assert stream.degrees_of_freedom == fall.plan.character.layout.size == 34
+    assert stream.mass == pytest.approx(fall.plan.character.mass)
+    assert (stream.rate_hz, stream.mode) == (240, "realtime")
+    assert (stream.ticks, stream.sim_time) == (TICKS, pytest.approx(TICKS / 240))
+    assert "pybullet" in stream.versions
+    assert facts.lacks is None
+
+
+def test_episodes_and_resets_are_found(facts: BagFacts) -> None:
+    (run,) = facts.runs
+
+    assert run.resets == 1
+    assert [episode.start for episode in run.episodes] == pytest.approx([0.0, 31 / 240])
+    assert [e.duration for e in run.episodes] == pytest.approx([30 / 240, 29 / 240])
+
+
+def test_a_pause_is_found_by_the_wall_clock(facts: BagFacts) -> None:
+    (pause,) = facts.streams[0].pauses
+
+    assert pause.start == pytest.approx(50 / 240)
+    assert pause.duration == pytest.approx(2.004)
+
+
+def test_pushes_have_their_link_time_and_impulse(facts: BagFacts) -> None:
+    chest, knee = facts.runs[0].pushes
+
+    assert (chest.link, knee.link) == ("chest", "left_knee")
+    assert (chest.start, chest.duration) == pytest.approx((10 / 240, 12 / 240))
+    assert chest.largest_force == pytest.approx(np.linalg.norm(PUSH))
+    assert chest.impulse == pytest.approx(np.linalg.norm(PUSH) * 12 / 240)
+    assert (knee.start, knee.duration) == pytest.approx((40 / 240, 1 / 240))
+
+
+def test_law_gains_and_their_changes_are_named(facts: BagFacts, fall: Eventful) -> None:
+    (run,) = facts.runs
+    knee = {row.joint: row for row in run.gains}["left_knee"]
+    given = fall.plan.character.gains["left_knee"]
+    (change,) = run.changes
+
+    assert run.law == "stable_pd"
+    assert (knee.p, knee.d, knee.limit) == (given.stiffness, given.damping, 150.0)
+    assert (change.name, change.before, change.after) == ("gain_scale.p", 1.0, 2.0)
+    assert change.time == pytest.approx(20 / 240)
+
+
+def test_the_share_of_saturated_ticks_is_counted(tmp_path: Path) -> None:
+    step: dict[str, object] = {"reference": "step", "step.size": 0.5, "step.time": 0.01}
+    step["signal.dofs"] = ["panda_joint1", "panda_joint7"]
+    made = make_run("franka_panda", 0.05, step)
+    applied = np.array([state.effort for state in made.states[1:]])
+    at_limit = np.isclose(np.abs(applied), made.plan.character.effort_limits(), rtol=1e-12)
+
+    (run,) = look_at(write_bag(tmp_path / "bag", made.messages())).runs
+
+    assert at_limit[:, 0].any() and not at_limit[:, 0].all()
+    shares = [run.saturated_shares[name] for name in made.plan.character.vector_names]
+    np.testing.assert_allclose(shares, at_limit.mean(axis=0))
+
+
+def test_several_characters_are_described_each(pendulum: Made, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        for namespace in ("left", "right"):
+            add_to(bag, pendulum.messages(), namespace)
+
+    facts = look_at(tmp_path)
+
+    assert [stream.name for stream in facts.streams] == ["left", "right"]
+    assert sorted(run.name for run in facts.runs) == ["left", "right"]
+
+
+# What is broken or foreign
+
+
+def test_missing_ticks_are_named_and_all_else_is_there(pendulum: Made, tmp_path: Path) -> None:
+    states = [state for row, state in enumerate(pendulum.states) if row not in (4, 5, 8)]
+    messages = [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)]
+
+    facts = look_at(write_bag(tmp_path / "bag", messages))
+
+    (stream,) = facts.streams
+    assert stream.missing == [(5, 6), (9, 9)]  # ticks begin at 1
+    assert stream.missing_count == 3
+    assert stream.character == "pendulum"
+    assert facts.runs == () and facts.lacks is not None and "5" in facts.lacks
+
+
+def test_states_that_were_published_again_count_once(pendulum: Made, tmp_path: Path) -> None:
+    states = [*pendulum.states[:3], *pendulum.states[1:]]
+    messages = [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)]
+
+    (stream,) = look_at(write_bag(tmp_path / "bag", messages)).streams
+
+    assert stream.repeated == 2
+    assert stream.missing == [] and stream.ticks == len(pendulum.states) - 1
+
+
+def test_a_bag_of_something_else_has_its_topics(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    chatter = Topic("chatter", String, topics.STREAM_QOS)
+    raw = JointStateEncoder(["wheel"]).encode(5 * MS, np.zeros(1))
+    messages = [
+        (chatter, serialize_message(String(data="[bold]hello"))),
+        (topics.JOINT_STATES, raw),
+        (topics.JOINT_STATES, serialize_message(JointState())),
+    ]
+    bag = write_bag(tmp_path / "bag", messages)
+
+    assert main(["info", str(bag)]) == 0
+
+    said = capsys.readouterr().out
+    assert "/chatter" in said and "std_msgs/msg/String" in said
+    assert "sim_node/configuration" in said  # what is missing for more
+
+
+@pytest.mark.parametrize("version", [4, 5, 9, 12])
+def test_bags_of_other_versions_of_rosbag2_have_their_topics(tmp_path: Path, version: int) -> None:
+    said = [SaidText("/a", 5_000, "1"), SaidText("/b", 7_000, "2"), SaidText("/a", 9_000, "3")]
+    write_humble_db3(tmp_path / "bag_0.db3", said)
+    write_metadata(tmp_path, version, "sqlite3", ["bag_0.db3"], ["/a", "/b", "/c"])
+
+    facts = look_at(tmp_path)
+
+    assert facts.contents.version == version and facts.contents.storage == "sqlite3"
+    counts = {topic.name: (topic.count, topic.largest_gap_ns) for topic in facts.contents.topics}
+    assert counts == {"/a": (2, 4_000), "/b": (1, 0), "/c": (0, 0)}
+    assert facts.streams == () and facts.lacks
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "no JSON",
+        "[]",
+        '{"parameters": {"rate": "fast"}, "mass": []}',
+        '{"parameters": {"rate": 1e400}, "mass": %s}' % 10**400,
+        '{"parameters": {"rate": 0, "mode": "realtime", "real_time_factor": "x"}, "versions": 1}',
+    ],
+)
+def test_a_configuration_of_somebody_else_does_no_harm(
+    pendulum: Made, tmp_path: Path, said: str
+) -> None:
+    configuration = topics.CONFIGURATION.of(topics.SIM_NODE)
+    messages = [
+        (configuration, serialize_message(String(data=said))),
+        *said_states(pendulum.plan, pendulum.states),
+    ]
+
+    facts = look_at(write_bag(tmp_path / "bag", messages))
+
+    assert facts.runs == () and facts.lacks
+    assert facts.streams[0].ticks is None
+    json.loads(as_json(facts))
+
+
+def test_no_bag_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(RecordingError):
+        look_at(tmp_path)
+
+    assert main(["info", str(tmp_path / "nothing")]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+# Printed
+
+
+def test_json_says_the_same(facts: BagFacts, fall: Eventful) -> None:
+    content = json.loads(as_json(facts))
+
+    topic = {topic["name"]: topic for topic in content["topics"]}["/joint_states"]
+    assert topic["count"] == TICKS + 1
+    assert topic["rate_sim_hz"] == pytest.approx((TICKS + 1) * 240 / TICKS)
+    assert content["characters"][0]["missing"] == []
+    assert content["runs"][0]["pushes"][0]["link"] == "chest"
+    root = next(row for row in content["runs"][0]["gains"] if row["joint"] == "root")
+    assert root["limit"] is None  # infinite, which JSON cannot say
+    assert content["size_bytes"] == sum(content["files"].values())
+
+
+def test_the_tables_are_printed(
+    facts: BagFacts, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+
+    assert main(["info", str(facts.contents.bag)]) == 0
+
+    said = capsys.readouterr().out
+    for words in (
+        "humanoid, 34 degrees of freedom",
+        "chest at 0.04167 s for 0.05 s",
+        "gain_scale.p: 1.0 to 2.0 after 0.08333 s",
+        "2 s of wall time",
+        "missing ticks",
+        "gains and limits in force",
+    ):
+        assert words in said
+
+
+# The wall clock
+
+
+def test_ticks_are_late_by_the_schedule() -> None:
+    period = 0.01
+    due = np.arange(8) * period
+    delay = np.array([0.0, 0.001, 0.0, 0.025, 0.015, 0.005, 0.0, 0.0])
+    published = START_NS + np.round(1e9 * (due + delay)).astype(np.intp)
+
+    np.testing.assert_allclose(lateness(published, period), delay, atol=1e-9)
+
+
+def test_after_a_long_delay_the_schedule_begins_anew() -> None:
+    times = np.array([0.0, 0.05, 0.10, 0.35, 0.40, 0.45])  # 0.2 s late once
+    published = START_NS + np.round(1e9 * times).astype(np.intp)
+
+    late = lateness(published, 0.05)
+
+    np.testing.assert_allclose(late, [0.0, 0.0, 0.0, 0.2, 0.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("every", [12, 24, 48])
+def test_what_takes_long_again_and_again_is_no_pause(every: int) -> None:
+    steps = np.full(960, 0.003)
+    steps[::every] = 0.4  # a planner
+    steps[500] = 9.0
+    published = START_NS + np.round(1e9 * np.cumsum(np.append(0.0, steps))).astype(np.intp)
+
+    assert pauses(published).tolist() == [500]
+
+
+def test_a_pause_makes_no_tick_late() -> None:
+    times = np.concatenate((np.arange(10) * 0.01, 5.0 + np.arange(10) * 0.01))
+    published = START_NS + np.round(1e9 * times).astype(np.intp)
+
+    assert pauses(published).tolist() == [9]
+    np.testing.assert_allclose(lateness(published, 0.01), 0.0, atol=1e-9)
+
+
+def test_states_are_told_from_repetitions_at_any_rate() -> None:
+    stamps = np.array([k * 10**9 // 240 for k in (1, 2, 2, 1, 3, 7)])
+
+    times = state_times(stamps, np.arange(6), 240)
+
+    assert times.ticks.tolist() == [1, 2, 3, 7]
+    assert times.published_ns.tolist() == [0, 1, 4, 5]
+    assert (times.repeated, times.missing, times.missing_count) == (2, [(4, 6)], 3)

@@ -1,0 +1,644 @@
+"""The figures of a run, against numbers that can be worked out by hand."""
+
+import hashlib
+import json
+import math
+import struct
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
+
+from actuated_characters.metrics.collector import RunListener
+from actuated_characters.metrics.run_metrics import COLUMNS, Measurement, StateHash, Tick
+from actuated_characters.metrics.tick_assembler import MOST_AHEAD, TickAssembler
+from controller_node import parameters as for_controller
+from msgs_config.arrays import FloatArray
+from msgs_config.character.file import shipped_characters
+from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.errors import ActuatedCharactersError, ClockError, RecordingError
+from msgs_config.messages import configuration, topics
+from msgs_config.messages.clock import TickClock
+from msgs_config.messages.configuration import RunConfiguration
+from msgs_config.messages.joint_state import JointStateEncoder
+from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.parameters import resolve
+from sim_node.parameters import PARAMETERS, character_parameters
+from tests.support.physics import character, controller, run_together, simulation
+
+RATE = 100
+CLOCK = TickClock(RATE)
+LAYOUT = JointLayout(
+    [
+        (ROOT, JointType.FLOATING),
+        ("chest", JointType.SPHERICAL),
+        ("knee", JointType.REVOLUTE),
+        ("slider", JointType.PRISMATIC),
+    ]
+)
+KNOWN = RunConfiguration(
+    character="test",
+    layout=LAYOUT,
+    effort_limits=np.array([math.inf, math.inf, 10.0, 5.0, math.inf]),  # root's, then the joints'
+    mass=20.0,
+    parameters={"rate": RATE, "gravity": 10.0},
+)
+QUARTER = math.pi / 2
+
+
+def entries(
+    root: Iterable[float] = (0.0, 0.0, 1.0),
+    turn: Iterable[float] = (0.0, 0.0, 0.0),
+    chest: Iterable[float] = (0.0, 0.0, 0.0),
+    knee: float = 0.0,
+    slider: float = 0.0,
+) -> FloatArray:
+    """Positions of all degrees of freedom, upright at 1 m where nothing is said."""
+    return np.array([*root, *turn, *chest, knee, slider])
+
+
+def efforts(
+    root: Iterable[float] = (0.0, 0.0, 0.0),
+    turn: Iterable[float] = (0.0, 0.0, 0.0),
+    chest: Iterable[float] = (0.0, 0.0, 0.0),
+    knee: float = 0.0,
+    slider: float = 0.0,
+) -> FloatArray:
+    """Efforts on all degrees of freedom, zero where nothing is said."""
+    return entries(root, turn, chest, knee, slider)
+
+
+NONE = efforts()
+
+
+def state(tick: int, position: FloatArray, effort: FloatArray | None = NONE) -> StampedState:
+    """A state; `effort` is what was applied before it, None in the first of an episode."""
+    return StampedState(CLOCK.stamp_ns(tick), position, 0.5 * position, effort)
+
+
+def reference(tick: int, position: FloatArray) -> StampedReference:
+    return StampedReference(CLOCK.stamp_ns(tick), position, np.zeros(len(position)))
+
+
+def measured(
+    ticks: Iterable[tuple[FloatArray, FloatArray | None, FloatArray]],
+    known: RunConfiguration = KNOWN,
+    wall_time: float = 1.0,
+) -> dict[str, object]:
+    """The figures of ticks, each with its position, its reference's, and its effort."""
+    measurement = Measurement(known)
+    tick = 1
+    measurement.add_state(state(1, np.zeros(known.layout.size), None))
+    for tick, (position, desired, applied) in enumerate(ticks, start=1):
+        wanted = None if desired is None else reference(tick, desired)
+        following = state(tick + 1, position, applied)
+        measurement.add_state(following)
+        measurement.add_tick(Tick(state(tick, position), following, wanted))
+    return measurement.summary(wall_time)
+
+
+# Errors
+
+
+@pytest.mark.parametrize(
+    ("found", "desired", "angle"),
+    [
+        ((0.0, 0.0, 0.3), (0.0, 0.0, -0.1), 0.4),
+        ((0.0, 0.0, 0.3), (0.0, 0.0, 0.3), 0.0),
+        ((QUARTER, 0.0, 0.0), (0.0, QUARTER, 0.0), 2.0 * math.pi / 3.0),  # a third of a turn
+        ((0.0, 0.0, 3.1), (0.0, 0.0, -3.1), 2.0 * math.pi - 6.2),  # on both sides of pi
+        ((0.0, math.pi, 0.0), (0.0, 0.0, 0.0), math.pi),
+    ],
+)
+def test_a_ball_joints_error_is_the_angle_between_its_two_rotations(
+    found: tuple[float, ...], desired: tuple[float, ...], angle: float
+) -> None:
+    figures = measured([(entries(chest=found), entries(chest=desired), NONE)])
+
+    assert figures["joint_error_mean_rad"] == pytest.approx(angle / 2.0, abs=1e-9)  # and the knee
+
+
+def test_a_hinges_error_is_the_absolute_difference() -> None:
+    figures = measured(
+        [
+            (entries(knee=-0.5), entries(knee=0.3), NONE),
+            (entries(knee=4.0), entries(knee=-2.0), NONE),  # a hinge that turns knows its turns
+        ]
+    )
+
+    assert figures["joint_error_mean_rad"] == pytest.approx((0.8 / 2.0 + 6.0 / 2.0) / 2.0)
+
+
+def test_every_joint_counts_once_and_sliders_and_the_root_are_no_angles() -> None:
+    position = entries(root=(1.0, 2.0, 3.0), turn=(0.0, 0.0, 1.0), slider=7.0)
+    desired = entries(chest=(0.0, 0.6, 0.8), knee=0.5)
+
+    figures = measured([(position, desired, NONE)])
+
+    assert figures["joint_error_mean_rad"] == pytest.approx((1.0 + 0.5) / 2.0)
+
+
+def test_the_roots_error_is_a_distance() -> None:
+    figures = measured(
+        [
+            (entries(root=(3.0, 4.0, 1.0)), entries(), NONE),
+            (entries(root=(0.0, 0.0, 2.0)), entries(), NONE),
+        ]
+    )
+
+    assert figures["root_error_mean_m"] == pytest.approx(3.0)
+    assert figures["root_error_max_m"] == pytest.approx(5.0)
+
+
+def test_ticks_without_a_reference_have_no_error_but_count() -> None:
+    figures = measured(
+        [
+            (entries(knee=1.0), None, NONE),
+            (entries(knee=1.0), entries(knee=0.5), NONE),
+            (entries(knee=1.0, root=(0.0, 0.0, 0.1)), None, efforts(knee=5.0)),
+        ]
+    )
+
+    assert figures["ticks"] == 3
+    assert figures["joint_error_mean_rad"] == pytest.approx(0.25)
+    assert figures["root_error_mean_m"] == 0.0
+    assert figures["fell"] is False
+    assert figures["saturated_fraction"] == pytest.approx(1.0 / 9.0)
+
+
+def test_without_any_reference_there_is_no_error_to_tell() -> None:
+    figures = measured([(entries(), None, NONE)])
+
+    assert figures["joint_error_mean_rad"] is None
+    assert figures["root_error_mean_m"] is figures["root_error_max_m"] is None
+    assert figures["fell"] is None
+
+
+def test_what_a_character_does_not_have_is_not_measured() -> None:
+    layout = JointLayout([("height", JointType.PRISMATIC)])
+    known = replace(KNOWN, layout=layout, effort_limits=np.array([5.0]))
+
+    figures = measured([(np.array([0.5]), np.array([1.0]), np.array([5.0]))], known)
+
+    for name in ("joint_error_mean_rad", "root_error_mean_m", "root_error_max_m"):
+        assert figures[name] is None
+    assert figures["assist_force_mean_n"] is figures["fell"] is None
+    assert figures["saturated_fraction"] == 1.0
+
+
+# Efforts
+
+
+def test_assistance_is_the_length_of_the_roots_force_and_weight_is_the_bodys() -> None:
+    figures = measured(
+        [
+            (entries(), entries(), efforts(root=(0.0, 3.0, -4.0), turn=(9.0, 9.0, 9.0))),
+            (entries(), entries(), efforts(root=(2.0, 0.0, 0.0))),
+        ]
+    )
+
+    assert figures["assist_force_mean_n"] == pytest.approx(3.5)
+    assert figures["body_weight_n"] == pytest.approx(200.0)
+
+
+def test_a_joint_at_its_limit_is_saturated_and_a_ball_joint_by_its_length() -> None:
+    figures = measured(
+        [
+            (entries(), entries(), efforts(chest=(6.0, 0.0, -8.0), knee=4.99)),
+            (entries(), entries(), efforts(chest=(9.9, 0.0, 0.0), knee=-5.0)),
+            (entries(), entries(), efforts(chest=(5.7, 5.7, 5.7), knee=0.0)),
+            (entries(), entries(), efforts(root=(1e6, 0.0, 0.0), slider=1e6)),
+        ]
+    )
+
+    assert figures["saturated_fraction"] == pytest.approx(2.0 / 12.0)  # three joints, four ticks
+
+
+# The fall
+
+
+@pytest.mark.parametrize(
+    ("height", "desired", "fell"),
+    [
+        (0.44, 0.9, True),
+        (0.46, 0.9, False),
+        (0.45, 0.9, False),  # half is not below half
+        (-1.0, 0.9, True),
+        (0.1, 0.5, False),  # a reference at 0.5 m or below lies of its own will
+        (0.2, 0.51, True),
+        (0.0, 0.3, False),
+    ],
+)
+def test_it_fell_if_the_root_is_below_half_of_a_reference_that_stands(
+    height: float, desired: float, fell: bool
+) -> None:
+    upright = (entries(), entries(), NONE)
+    now = (entries(root=(0.0, 0.0, height)), entries(root=(0.0, 0.0, desired)), NONE)
+
+    assert measured([upright, now, upright])["fell"] is fell
+
+
+# Time
+
+
+def test_simulated_time_is_that_between_the_first_and_the_last_state() -> None:
+    figures = measured([(entries(), entries(), NONE)] * 50, wall_time=0.125)
+
+    assert figures["ticks"] == 50
+    assert figures["sim_time_s"] == pytest.approx(0.5)
+    assert figures["wall_time_s"] == 0.125
+    assert figures["real_time_factor"] == pytest.approx(4.0)
+
+
+def test_no_wall_time_gives_no_factor() -> None:
+    assert measured([(entries(), entries(), NONE)], wall_time=0.0)["real_time_factor"] is None
+
+
+def test_a_run_without_a_tick_has_figures_too() -> None:
+    figures = measured([])
+
+    assert figures["ticks"] == 0
+    assert figures["sim_time_s"] == 0.0
+    assert figures["saturated_fraction"] is figures["joint_error_mean_rad"] is None
+    assert figures["fell"] is None
+
+
+@pytest.mark.parametrize("count", [255, 256, 257, 513])
+def test_where_one_block_ends_and_the_next_begins_does_not_matter(count: int) -> None:
+    rng = np.random.default_rng(7)
+    ticks = []
+    for _ in range(count):
+        applied = efforts(chest=rng.uniform(0.0, 8.0, 3), knee=rng.choice([5.0, 1.0]))
+        here, there = (entries(root=rng.normal(size=3), knee=rng.normal()) for _ in range(2))
+        ticks.append((here, there, applied))
+
+    figures = measured(ticks)
+
+    roots = [math.dist(here[:3], there[:3]) for here, there, _ in ticks]
+    knees = [abs(here[9] - there[9]) for here, there, _ in ticks]
+    at_limit = [int(math.hypot(*e[6:9]) >= 10.0) + int(e[9] == 5.0) for *_, e in ticks]
+    assert figures["ticks"] == count
+    assert figures["root_error_mean_m"] == pytest.approx(np.mean(roots))
+    assert figures["root_error_max_m"] == pytest.approx(max(roots))
+    assert figures["joint_error_mean_rad"] == pytest.approx(np.mean(knees) / 2.0)
+    assert figures["saturated_fraction"] == pytest.approx(sum(at_limit) / (3 * count))
+
+
+def test_the_series_has_one_row_a_tick_and_looking_at_it_changes_nothing() -> None:
+    measurement = Measurement(KNOWN)
+    measurement.add_state(state(1, entries(), None))
+    for tick in range(1, 301):
+        measurement.add_state(state(tick + 1, entries()))
+        desired = None if tick == 3 else reference(tick, entries(knee=0.5))
+        now = state(tick, entries(knee=0.01 * tick))
+        measurement.add_tick(Tick(now, state(tick + 1, entries()), desired))
+        if tick in (1, 100, 256):
+            assert len(measurement.series()) == tick
+
+    columns = dict(zip(COLUMNS, measurement.series().T, strict=True))
+
+    assert columns["time_s"] == pytest.approx(np.arange(300) / RATE)
+    assert math.isnan(columns["joint_error_mean_rad"][2])
+    assert columns["joint_error_max_rad"][99] == pytest.approx(0.5)
+    assert columns["joint_error_mean_rad"][99] == pytest.approx(0.25)
+    assert columns["root_height_m"] == pytest.approx(np.ones(300))
+    assert measurement.summary(1.0)["ticks"] == 300
+
+
+# The hash
+
+
+def hash_of(*states: StampedState) -> str:
+    state_hash = StateHash()
+    for one in states:
+        state_hash.add(one)
+    return state_hash.hexdigest()
+
+
+def test_the_hash_is_over_stamp_position_and_velocity_of_every_state() -> None:
+    first, second = state(1, entries(knee=0.1), None), state(2, entries(knee=0.2))
+
+    content = b"".join(
+        struct.pack("<q22d", one.stamp_ns, *one.position, *one.velocity) for one in (first, second)
+    )
+
+    assert hash_of(first, second) == hashlib.sha256(content).hexdigest()
+
+
+def test_the_smallest_difference_gives_another_hash() -> None:
+    one = state(1, entries(knee=0.1))
+    changed = [
+        state(2, entries(knee=0.1)),
+        state(1, entries(knee=np.nextafter(0.1, 1.0))),
+        state(1, entries(knee=0.1, slider=-0.0)),
+        replace(one, velocity=np.nextafter(one.velocity, 1.0)),
+        replace(one, position=one.velocity, velocity=one.position),
+    ]
+
+    hashes = {hash_of(one), hash_of(one, one), *(hash_of(other) for other in changed)}
+
+    assert len(hashes) == 2 + len(changed)
+    assert hash_of(replace(one, effort=None)) == hash_of(one)
+
+
+# Putting states and references together
+
+
+def assembled(order: Iterable[StampedState | StampedReference]) -> tuple[dict[str, object], int]:
+    """The figures and the number of missing ticks, whatever order things have come in."""
+    measurement = Measurement(KNOWN)
+    assembler = TickAssembler(measurement, RATE)
+    for thing in order:
+        if isinstance(thing, StampedState):
+            assembler.add_state(thing)
+        else:
+            assembler.add_reference(thing)
+    assembler.finish()
+    return measurement.summary(1.0), assembler.missing_ticks
+
+
+STATES = [
+    state(tick, entries(knee=0.1 * tick), efforts(knee=0.1 * tick) if tick > 1 else None)
+    for tick in range(1, 11)
+]
+REFERENCES = [reference(tick, entries(knee=0.2 * tick)) for tick in range(1, 11)]
+
+
+def test_each_state_meets_its_reference_and_the_effort_that_the_next_state_tells() -> None:
+    figures, missing = assembled([*STATES[:3], *REFERENCES[:3]])
+
+    assert missing == 0
+    assert figures["ticks"] == 2  # what is applied to the last state nobody has said yet
+    assert figures["joint_error_mean_rad"] == pytest.approx((0.1 + 0.2) / 2.0 / 2.0)
+    assert figures["state_hash"] == hash_of(*STATES[:3])
+
+
+def test_a_reference_may_come_before_its_state_or_long_after() -> None:
+    pairs = zip(STATES, REFERENCES, strict=True)
+    in_turn, _ = assembled([thing for pair in pairs for thing in pair])
+
+    assert in_turn["ticks"] == 9
+    assert in_turn["joint_error_mean_rad"] == pytest.approx(0.1 * 5.0 / 2.0)
+    assert assembled([*STATES, *REFERENCES])[0] == in_turn
+    assert assembled([*REFERENCES, *STATES])[0] == in_turn
+    assert assembled([*STATES, *reversed(REFERENCES)])[0] == in_turn
+
+
+def test_what_comes_again_counts_once() -> None:
+    once = assembled([*STATES, *REFERENCES])
+
+    repeated = [thing for pair in zip(STATES, REFERENCES, strict=True) for thing in 3 * pair]
+
+    assert assembled(repeated) == once
+    assert assembled([*STATES, *STATES, *REFERENCES, *REFERENCES]) == once
+
+
+def test_missing_ticks_are_counted() -> None:
+    gaps = [one for index, one in enumerate(STATES) if index not in (3, 6, 7)]
+
+    assert assembled(gaps)[1] == 3
+    assert assembled(STATES)[1] == 0
+
+
+def test_a_reference_that_never_comes_leaves_the_others_their_ticks() -> None:
+    figures, missing = assembled([*STATES, *REFERENCES[:4], *REFERENCES[5:]])
+
+    assert missing == 0
+    assert figures["ticks"] == 9
+    errors = [0.1 * tick / 2.0 for tick in (1, 2, 3, 4, 6, 7, 8, 9)]
+    assert figures["joint_error_mean_rad"] == pytest.approx(np.mean(errors))
+
+
+def test_references_wait_only_for_the_states_that_they_belong_to() -> None:
+    sound = assembled([*STATES, *REFERENCES])
+    far = [reference(tick, entries(knee=9.0)) for tick in range(11 + MOST_AHEAD, 200 + MOST_AHEAD)]
+    between = [replace(one, stamp_ns=one.stamp_ns + 5) for one in REFERENCES]
+    late = [replace(one, stamp_ns=-5) for one in REFERENCES]
+    strange = [*far, *between, *late]
+
+    for order in ([*STATES, *strange, *REFERENCES], [*strange, *STATES, *REFERENCES]):
+        assert assembled(order) == sound
+    gap = [one for index, one in enumerate(STATES) if index != 4]
+    assembler = dropping([*REFERENCES, *gap, *far])
+    assert assembler.dropped_references == len(far) + 1
+
+
+def test_a_flood_of_references_takes_a_bounded_memory_and_is_counted() -> None:
+    flood = [reference(tick, entries(knee=1.0)) for tick in range(1, 40_000)]
+
+    assert dropping(flood).dropped_references == 39_999 - 11_000
+    assembler = dropping([*STATES, *flood])
+    assert assembler.dropped_references == 39_999 - 10 - MOST_AHEAD
+    assembler.add_state(replace(STATES[0], stamp_ns=reference(30_000, entries()).stamp_ns))
+    assembler.finish()
+    assert assembler.dropped_references == 39_999 - 10
+
+
+def dropping(order: Iterable[StampedState | StampedReference]) -> TickAssembler:
+    """What has taken these things."""
+    assembler = TickAssembler(Measurement(KNOWN), RATE)
+    for thing in order:
+        if isinstance(thing, StampedState):
+            assembler.add_state(thing)
+        else:
+            assembler.add_reference(thing)
+    return assembler
+
+
+def test_between_two_episodes_there_is_no_tick() -> None:
+    states = [*STATES[:5], replace(STATES[5], effort=None), *STATES[6:]]
+
+    figures, missing = assembled([*states, *REFERENCES])
+
+    assert missing == 0
+    assert figures["ticks"] == 8
+    assert figures["state_hash"] == hash_of(*states)
+
+
+def test_a_state_that_is_no_tick_is_an_error() -> None:
+    assembler = TickAssembler(Measurement(KNOWN), RATE)
+
+    with pytest.raises(ClockError, match="12345"):
+        assembler.add_state(replace(STATES[0], stamp_ns=12345))
+
+
+# Listening to serialised messages
+
+Message = tuple[str, bytes, int]
+SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
+STATE, TORQUE = topics.JOINT_STATES.name, topics.JOINT_TORQUES.name
+REFERENCE = topics.REFERENCE.of(CONTROLLER).name
+MILLISECOND = 10**6
+PENDULUM_NAMES = character("pendulum").layout.dof_names
+
+
+def configuration_message(**given: object) -> Message:
+    whole = character("pendulum")
+    values = resolve(PARAMETERS + character_parameters(whole), given)
+    text = configuration.describe(whole, values)
+    return (
+        topics.CONFIGURATION.of(SIMULATOR).name,
+        serialize_message(String(data=text)),
+        0,
+    )
+
+
+def report(name: str, published_ns: int, **values: object) -> Message:
+    items = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    message = DiagnosticArray(status=[DiagnosticStatus(name=name, values=items)])
+    return topics.DIAGNOSTICS.name, serialize_message(message), published_ns
+
+
+def pendulum_messages(ticks: int = 20) -> list[Message]:
+    """What a pendulum's run says: in each ms a state, its reference and its torque."""
+    encoder = JointStateEncoder(PENDULUM_NAMES)
+    messages: list[Message] = []
+    with simulation("pendulum") as run:
+        for now, effort, wanted in run_together(run, controller("pendulum"), ticks):
+            told_ns = (len(messages) // 3 + 1) * MILLISECOND
+            applied = () if now.effort is None else (now.effort,)
+            messages += [
+                (
+                    STATE,
+                    encoder.encode(now.stamp_ns, now.position, now.velocity, *applied),
+                    told_ns,
+                ),
+                (
+                    REFERENCE,
+                    encoder.encode(now.stamp_ns, wanted.position, wanted.velocity),
+                    told_ns,
+                ),
+                (TORQUE, encoder.encode(now.stamp_ns, effort=effort), told_ns + 1000),
+            ]
+        last = run.state
+    assert last.effort is not None
+    raw = encoder.encode(last.stamp_ns, last.position, last.velocity, last.effort)
+    return [*messages, (STATE, raw, (ticks + 1) * MILLISECOND)]
+
+
+def heard(messages: Iterable[Message]) -> RunListener:
+    listener = RunListener()
+    for message in messages:
+        listener.take(*message)
+    return listener
+
+
+def test_a_listener_gives_the_figures_of_the_run_that_it_hears() -> None:
+    listener = heard([configuration_message(), *pendulum_messages()])
+
+    figures, series = listener.results()
+
+    assert figures["character"] == "pendulum"
+    assert listener.last_tick == 21
+    assert listener.missing_ticks == figures["missing_ticks"] == 0
+    assert figures["ticks"] == 20
+    assert figures["sim_time_s"] == pytest.approx(20 / 240, abs=1e-8)
+    assert figures["wall_time_s"] == pytest.approx(0.020 - 1e-6)  # first torque to last state
+    assert figures["rejected_commands"] is figures["duplicate_commands"] is None  # nobody said
+    mass_kg = character("pendulum").mass
+    assert figures["body_weight_n"] == pytest.approx(9.81 * mass_kg)
+    assert series.shape == (20, len(COLUMNS))
+    driver = controller("pendulum")
+    with simulation("pendulum") as run:
+        states = [now for now, _, _ in run_together(run, driver, 20)]
+        assert figures["state_hash"] == hash_of(*states, run.state)
+
+
+def test_what_came_before_the_configuration_is_not_lost() -> None:
+    early = heard([*pendulum_messages(), configuration_message()])
+
+    assert early.results()[0] == heard([configuration_message(), *pendulum_messages()]).results()[0]
+
+
+def test_a_second_configuration_starts_nothing_anew() -> None:
+    messages = pendulum_messages()
+    twice = heard(
+        [configuration_message(), *messages[:30], configuration_message(), *messages[30:]]
+    )
+
+    assert twice.results()[0] == heard([configuration_message(), *messages]).results()[0]
+
+
+def test_a_repeated_state_counts_once_and_does_not_lengthen_the_wall_time() -> None:
+    messages = pendulum_messages()
+    topic, raw, _ = messages[-1]
+
+    figures = heard([configuration_message(), *messages, (topic, raw, 10**12)]).results()[0]
+
+    assert figures == heard([configuration_message(), *messages]).results()[0]
+
+
+def test_commands_are_counted_as_the_simulator_reports_them_last() -> None:
+    messages = [
+        report(SIMULATOR, 5, rejected=1, duplicate=2, tick=3),
+        report("some_other_node", 6, rejected=70, duplicate=70),
+        report(f"other/{SIMULATOR}", 6, rejected=71, duplicate=71),  # another character's
+        report(SIMULATOR, 7, rejected=4, duplicate=5, tick=20),
+        report(SIMULATOR, 8),
+    ]
+
+    figures = heard([configuration_message(), *messages, *pendulum_messages()]).results()[0]
+
+    assert (figures["rejected_commands"], figures["duplicate_commands"]) == (4, 5)
+
+
+def test_a_simulator_that_is_started_anew_is_an_error() -> None:
+    listener = heard([configuration_message(), *pendulum_messages()])
+
+    with pytest.raises(RecordingError, match="anew"):
+        listener.take(*configuration_message(gravity=1.62))
+
+
+def test_without_a_simulator_there_are_no_figures() -> None:
+    with pytest.raises(RecordingError, match="no simulator"):
+        heard(pendulum_messages()).results()[0]
+
+
+@pytest.mark.parametrize("topic", [STATE, REFERENCE, topics.DIAGNOSTICS.name])
+@pytest.mark.parametrize("raw", [b"", b"\x00\x01\x00\x00\xff\xff\xff\xff"], ids=["no", "some"])
+def test_bytes_that_are_no_message_are_an_error_of_the_projects_own(topic: str, raw: bytes) -> None:
+    listener = heard([configuration_message(), *pendulum_messages()])
+    before = listener.results()[0]
+
+    with pytest.raises(ActuatedCharactersError):
+        listener.take(topic, raw, 0)
+
+    assert listener.results()[0] == before
+
+
+def test_bytes_that_are_no_configuration_are_an_error_of_the_projects_own() -> None:
+    with pytest.raises(ActuatedCharactersError):
+        RunListener().take(topics.CONFIGURATION.of(SIMULATOR).name, b"\x00\x01", 0)
+
+
+# What a listener must know
+
+
+@pytest.mark.parametrize("name", shipped_characters())
+def test_a_configuration_is_json_that_any_language_reads_and_says_the_same(name: str) -> None:
+    whole = character(name)
+    values = resolve(PARAMETERS + character_parameters(whole), {"session": "/a#1"})
+
+    text = configuration.describe(whole, values, session="/b#2")
+
+    json.loads(text, parse_constant=pytest.fail)  # JSON knows no Infinity and no NaN
+    known = configuration.parse(text)
+    assert known.layout.dof_names == whole.layout.dof_names
+    assert known.effort_limits.tolist() == whole.effort_limits().tolist()
+    del values["session"]  # which is of no influence
+    assert known.parameters == values
+    assert known.session == "/b#2"
+
+
+@pytest.mark.parametrize("name", shipped_characters())
+def test_a_controllers_configuration_is_json_that_any_language_reads(name: str) -> None:
+    whole = character(name)
+    values = resolve(for_controller.PARAMETERS + for_controller.character_parameters(whole), {})
+
+    text = configuration.describe(whole, values)
+
+    assert json.loads(text, parse_constant=pytest.fail)["character"] == name

@@ -1,0 +1,250 @@
+"""A recorder in bad circumstances: disks, bags that are there, pauses, and messages that are lost.
+
+Circumstances are real ones: a limit on the size of files is what a full disk is to a process, and a
+process that stands still is what a busy machine makes of it.
+"""
+
+import itertools
+import json
+import os
+import re
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from rclpy.context import Context
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Header
+
+from actuated_characters.bags.reader import read_messages
+from msgs_config.messages import topics
+from msgs_config.messages.joint_state import JointStateDecoder
+from msgs_config.messages.topics import Topic
+from msgs_config.runtime.polling import DirectSubscription
+from tests.support.ros import Client, Process, Processes, SimulatorClient, tick_of, wait_until
+
+pytestmark = pytest.mark.slow
+
+FULL_AT = 200_000  # bytes: more than the figures of a short run, less than its bag
+TICKS = 480
+LONG = 4000  # ticks
+RUN = ("run", "--character", "pendulum", "--duration", "2")
+LIMITED = (
+    "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
+    "from actuated_characters.cli import main; sys.exit(main(sys.argv[1:]))"
+)
+MOST_UNACKNOWLEDGED = 1200  # ticks: the simulator looks each 1000
+STILL = 1.0  # s without a tick, that say that the simulator waits
+SLOW = 120.0  # s that thousands of ticks may take on a machine that is busy with other things
+BEGIN, END = "before_the_flood", "after_the_flood"  # in no message definition
+FLOOD = 4000  # messages, many more than the middleware has room for while nobody takes them
+
+
+def summary_of(directory: Path) -> dict[str, Any]:
+    return dict(json.loads((directory / "summary.json").read_text()))
+
+
+# The disk
+
+
+def test_on_a_full_disk_the_simulation_goes_on_and_is_measured(
+    processes: Processes, tmp_path: Path
+) -> None:
+    run = processes.python("-c", LIMITED.format(FULL_AT), *RUN, "--output", "run")
+
+    assert run.wait(120.0) == 1
+
+    (error,) = [line for line in run.stderr.splitlines() if line.startswith("error: ")]
+    bag = tmp_path / "run" / "bag"
+    assert error == (
+        f"error: recorder failed: recording {bag} is incomplete, cannot write: File too large"
+    )
+    assert summary_of(tmp_path / "run")["ticks"] == TICKS
+    assert (bag / "bag.mcap").stat().st_size <= FULL_AT
+
+
+@pytest.mark.parametrize("where", ["below a file", "read-only"])
+def test_a_directory_that_cannot_be_written_to_is_one_clear_line(
+    processes: Processes, tmp_path: Path, where: str
+) -> None:
+    (tmp_path / "file").write_text("mine")
+    directory = {"below a file": str(tmp_path / "file" / "run"), "read-only": "/proc/run"}[where]
+
+    recorder = processes.node(topics.RECORDER_NODE, directory=directory)
+    run = processes.command(*RUN, "--output", directory)
+
+    assert recorder.wait() == run.wait() == 1
+    assert only_line(recorder).startswith(f"error: cannot create recording {directory}/bag: ")
+    assert only_line(run).startswith(f"error: cannot write to {directory}: ")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_bag_that_is_there_already_is_never_touched(processes: Processes, tmp_path: Path) -> None:
+    (tmp_path / "run" / "bag").mkdir(parents=True)
+    (tmp_path / "run" / "bag" / "bag.mcap").write_text("of years")
+
+    recorder = processes.node(topics.RECORDER_NODE, directory="run")
+
+    assert recorder.wait() == 1
+    assert "recording run/bag exists already" in only_line(recorder)
+    assert [path.name for path in (tmp_path / "run").rglob("*")] == ["bag", "bag.mcap"]
+    assert (tmp_path / "run" / "bag" / "bag.mcap").read_text() == "of years"
+
+
+def only_line(process: Process) -> str:
+    (line,) = process.stderr.splitlines()
+    return line
+
+
+def test_a_run_stores_and_compresses_its_bag_as_it_is_told(
+    processes: Processes, tmp_path: Path
+) -> None:
+    how = ("--storage", "sqlite3", "--compression", "zstd", "--exclude", "contacts")
+    run = processes.command(*RUN, *how, "--topic", "/mine", "--output", "run")
+
+    assert run.wait(120.0) == 0, run.stderr
+
+    content = yaml.safe_load((tmp_path / "run" / "bag" / "metadata.yaml").read_text())
+    information = content["rosbag2_bagfile_information"]
+    assert information["storage_identifier"] == "sqlite3"
+    assert information["compression_format"] == "zstd"
+    names = {t["topic_metadata"]["name"] for t in information["topics_with_message_count"]}
+    assert "/contacts" not in names
+    assert "nobody published on '/mine'" in (tmp_path / "run/logs/recorder.log").read_text()
+    states = read_messages(tmp_path / "run" / "bag", ["/joint_states"])
+    ticks = dict.fromkeys(tick_of(message.decode()) for message in states)
+    assert list(ticks) == list(range(1, TICKS + 2))
+
+
+# What is lost, and what is not
+
+
+def test_what_was_flushed_is_on_the_disk_before_the_recorder_says_so(
+    processes: Processes, client: SimulatorClient, tmp_path: Path
+) -> None:
+    recorder = processes.node(topics.RECORDER_NODE, directory="run", progress_period=0.1)
+    processes.simulator("pendulum", wait_for_subscribers=2)
+    state = client.answer(client.first_state(), {})
+    while tick_of(state) < 30:
+        state = client.answer(state, {})
+
+    def flushed() -> int:
+        return max(map(int, re.findall(r"^flushed (\d+)$", recorder.stdout, re.M)), default=0)
+
+    client.spin_until(lambda: flushed() >= 30, "a flush")
+    recorder.send(signal.SIGKILL)
+
+    recorder.wait()
+    assert (tmp_path / "run" / "bag" / "bag.mcap").read_bytes().count(b"hinge") >= 30
+
+
+class Watcher:
+    """Hears which tick it is, without the executor, which is slower than the loop."""
+
+    def __init__(self, context: Context) -> None:
+        self._client = Client(context, "watcher")
+        self._states = DirectSubscription(self._client.node, topics.JOINT_STATES.for_listener())
+        self._decoder = JointStateDecoder()
+        self.tick = 0
+        self.since = time.monotonic()
+
+    def close(self) -> None:
+        self._client.close()
+
+    def look(self) -> None:
+        """Take all states that have come."""
+        while (raw := self._states.take()) is not None:
+            self.tick = round(self._decoder.decode(raw).stamp_ns * 240 / 1e9)
+            self.since = time.monotonic()
+        time.sleep(0.002)
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether no state has come for a while."""
+        return time.monotonic() - self.since > STILL
+
+
+@pytest.fixture
+def watcher(context: Context) -> Iterator[Watcher]:
+    watcher = Watcher(context)
+    yield watcher
+    watcher.close()
+
+
+def test_a_recorder_that_stands_still_holds_the_simulation_and_loses_nothing(
+    processes: Processes, watcher: Watcher, tmp_path: Path
+) -> None:
+    recorder = processes.node(topics.RECORDER_NODE, directory="run")
+    processes.controller("pendulum", wait_for_subscribers=2)
+    simulator = processes.simulator("pendulum", max_ticks=LONG, wait_for_subscribers=3)
+    wait_until(lambda: watcher.tick > 300, "ticks", SLOW, watcher.look)
+
+    recorder.send(signal.SIGSTOP)
+    stopped_at = watcher.tick
+    wait_until(lambda: watcher.stands_still, "a simulator that waits", SLOW, watcher.look)
+    held_at = watcher.tick
+    recorder.send(signal.SIGCONT)
+    wait_until(lambda: simulator.exit_code is not None, "the end", SLOW, watcher.look)
+    recorder.send(signal.SIGINT)
+
+    assert held_at - stopped_at < MOST_UNACKNOWLEDGED
+    assert simulator.wait() == recorder.wait() == 0
+    assert summary_of(tmp_path / "run")["ticks"] == LONG
+    assert summary_of(tmp_path / "run")["lost_messages"] == {}
+
+
+def test_no_thread_of_a_recorder_interrupts_who_works(processes: Processes, tmp_path: Path) -> None:
+    recorder = processes.node(topics.RECORDER_NODE, directory="run")
+    wait_until((tmp_path / "run" / "bag").is_dir, "a recorder")
+
+    threads = [int(thread) for thread in os.listdir(f"/proc/{recorder.pid}/task")]
+
+    assert len(threads) > 1  # those of the middleware as well
+    assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_BATCH}
+
+
+def test_messages_that_were_lost_are_counted_by_topic_and_said(
+    processes: Processes, client: SimulatorClient, tmp_path: Path
+) -> None:
+    # Arrange: nobody sends again what a best-effort topic has lost
+    qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    flood = client.speak(Topic("flood", Header, qos))
+    recorder = processes.node(topics.RECORDER_NODE, directory="run", topics=["flood"])
+    processes.simulator("pendulum", wait_for_subscribers=2)
+    state = client.first_state()
+    client.spin_until(flood.get_subscription_count, "a recorder")
+
+    numbers = itertools.count()
+    file = tmp_path / "run" / "bag" / "bag.mcap"
+
+    def send(kind: str) -> None:
+        flood.publish(Header(frame_id=f"{kind} {next(numbers)}"))
+
+    # Act
+    client.spin_sending(
+        lambda: send(BEGIN), lambda: BEGIN.encode() in file.read_bytes(), "a message in the bag"
+    )
+    recorder.send(signal.SIGSTOP)
+    stopped = Path(f"/proc/{recorder.pid}/stat")
+    wait_until(lambda: stopped.read_text().rpartition(")")[2].split()[0] == "T", "its stop")
+    for _ in range(FLOOD):
+        send("flood")
+    recorder.send(signal.SIGCONT)
+    client.spin_sending(
+        lambda: send(END), lambda: END.encode() in file.read_bytes(), "the flood's end in the bag"
+    )
+    client.answer(state, {})
+    recorder.send(signal.SIGINT)
+
+    # Assert
+    assert recorder.wait() == 0
+    bag = read_messages(tmp_path / "run" / "bag", ["/flood"])
+    found = [int(message.decode().frame_id.split()[1]) for message in bag]
+    missing = found[-1] - found[0] + 1 - len(found)
+    assert missing > 0
+    assert summary_of(tmp_path / "run")["lost_messages"] == {"/flood": missing}
+    assert f"'/flood': {missing} messages lost" in recorder.stderr

@@ -1,0 +1,155 @@
+"""What a recorder keeps of several simulators: all of one, and nothing of the others."""
+
+import json
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header, String
+
+from actuated_characters.recorder.session_filter import Heard, SessionFilter, session_in
+from actuated_characters.recorder.topics import RecordedTopic
+from actuated_characters.replay.players.session import NewSession
+from msgs_config.messages import topics
+from msgs_config.messages.joint_state import JointStateEncoder
+from msgs_config.messages.session import ANONYMOUS, episode_text
+from msgs_config.messages.topics import Topic
+from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches, encode_wrenches
+from tests.support.ros import joint_state, stamp_ns
+
+ONE, OTHER = "/sim_node#00000000000a", "/sim_node#00000000000b"
+CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
+NAMED = (topics.EPISODE, CONFIGURATION, topics.CONTACTS, topics.JOINT_STATES, topics.JOINT_TORQUES)
+
+
+def heard(topic: Topic, session: str, number: int = 1) -> Heard:
+    """A message on a topic, of a session."""
+    if topic is topics.EPISODE:
+        raw = serialize_message(Header(frame_id=episode_text(number, session)))
+    elif topic is CONFIGURATION:
+        raw = serialize_message(String(data=json.dumps({"session": session, "n": number})))
+    elif topic is topics.CONTACTS:
+        raw = encode_wrenches(WrenchArrays.of_rows(number, [], [], [], session or "world"))
+    else:
+        message = joint_state(number, ["hinge"], effort=[0.0])
+        message.header.frame_id = session
+        raw = serialize_message(message)
+    recorded = RecordedTopic(topic, f"/{topic.name}", topic.name, "")
+    return Heard(recorded, bytes(raw), number)
+
+
+def kept(given_session: str, messages: list[Heard]) -> tuple[SessionFilter, list[Heard], list[str]]:
+    """What a filter lets through of messages, in its order, and what it says."""
+    said: list[str] = []
+    session_filter = SessionFilter(given_session, said.append)
+    passed = [each for message in messages for each in session_filter.take(message)]
+    return session_filter, passed + session_filter.finish(), said
+
+
+def content(message: Heard) -> tuple[str, bytes, int]:
+    """What can be compared of a message."""
+    return message.recorded.name, message.raw, message.published_ns
+
+
+_any_messages = st.lists(
+    st.builds(
+        heard,
+        st.sampled_from(NAMED),
+        st.sampled_from([ONE, OTHER, ANONYMOUS]),
+        st.integers(1, 1000),
+    ),
+    max_size=40,
+)
+
+
+@given(_any_messages)
+def test_of_any_interleaving_all_of_one_simulator_is_kept_and_nothing_of_others(
+    messages: list[Heard],
+) -> None:
+    session_filter, passed, said = kept("", messages)
+
+    states = [m for m in messages if m.recorded.topic is topics.JOINT_STATES]
+    if states:
+        bound = session_in(states[0])
+        own = [message for message in messages if session_in(message) in (bound, None)]
+        assert session_filter.bound == bound
+        assert sorted(map(content, passed)) == sorted(map(content, own))
+        dropped = sum(session_filter.dropped(f"/{topic.name}") for topic in NAMED)
+        assert dropped == len(messages) - len(own)
+        assert bool(said) == bool(dropped)
+    assert len({session_in(message) for message in passed} - {None}) <= 1
+
+
+@given(_any_messages)
+def test_a_session_that_is_given_is_the_only_one_from_the_first_message_on(
+    messages: list[Heard],
+) -> None:
+    _, passed, _ = kept(OTHER, messages)
+
+    assert passed == [message for message in messages if session_in(message) in (OTHER, None)]
+
+
+def test_what_came_before_the_first_state_is_kept_in_front_of_it() -> None:
+    first = [heard(CONFIGURATION, ONE), heard(topics.EPISODE, ONE), heard(topics.CONTACTS, ONE)]
+    strange = [heard(CONFIGURATION, OTHER), heard(topics.EPISODE, OTHER)]
+    state = heard(topics.JOINT_STATES, ONE)
+
+    _, passed, said = kept("", [strange[0], *first, strange[1], state])
+
+    assert passed == [*first, state]
+    assert len(said) == 1 and ONE in said[0] and OTHER in said[0]
+
+
+def test_of_a_simulator_that_has_had_no_state_yet_the_configuration_is_kept_at_the_end() -> None:
+    message = heard(CONFIGURATION, ONE)
+
+    assert kept("", [message])[1] == [message]
+
+
+def test_bytes_that_are_no_message_are_of_no_simulator_that_names_itself() -> None:
+    garbage = heard(topics.JOINT_STATES, ONE)._replace(raw=b"\x00\x01\x00\x00\xff")
+
+    assert kept(ONE, [garbage, heard(topics.JOINT_STATES, ONE)])[1] == [
+        heard(topics.JOINT_STATES, ONE)
+    ]
+
+
+# A bag that speaks in a session of its own
+
+
+@given(st.lists(st.floats(width=64), min_size=3, max_size=3), st.sampled_from(["", "world", OTHER]))
+def test_a_state_in_another_session_has_the_same_numbers_to_the_bit(
+    numbers: list[float], frame_id: str
+) -> None:
+    values = np.array(numbers)
+    encoder = JointStateEncoder(["c", "a", "b"], frame_id)
+    raw = encoder.encode(4_166_666, values, values[::-1].copy())
+
+    found = deserialize_message(NewSession(ONE).state(raw), JointState)
+
+    assert found.header.frame_id == ONE
+    assert (stamp_ns(found), list(found.name)) == (4_166_666, ["c", "a", "b"])
+    assert np.array(found.position).tobytes() == values.tobytes()
+    assert np.array(found.velocity).tobytes() == values[::-1].tobytes()
+    assert len(found.effort) == 0
+
+
+def test_what_comes_with_a_state_is_said_in_the_session_too_also_of_older_bags() -> None:
+    said = NewSession(ONE)
+    wrench = WrenchArrays.of_rows(5, ["chest"], [np.arange(6.0)], [])
+    older = String(data=json.dumps({"character": "lift"}))
+
+    contacts = decode_wrenches(said.beside_state("contacts", encode_wrenches(wrench)))
+    odometry = said.beside_state("odom", b"anything")
+    episode = deserialize_message(
+        said.episode(bytes(serialize_message(Header(frame_id="2")))), Header
+    )
+    configuration = deserialize_message(said.configuration(bytes(serialize_message(older))), String)
+
+    assert contacts.frame_id == ONE
+    assert contacts.wrenches.tolist() == wrench.wrenches.tolist()
+    assert odometry == b"anything"
+    assert episode.frame_id == f"2 {ONE}"
+    assert json.loads(configuration.data) == {"character": "lift", "session": ONE}

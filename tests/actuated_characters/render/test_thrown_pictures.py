@@ -1,0 +1,154 @@
+"""Balls in pictures and reports: where the recording has them, and what was done about them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuated_characters.bags.recording import ModeChange, Recording
+from actuated_characters.render.engine.renderer import Camera
+from actuated_characters.render.scene import make_scene
+from actuated_characters.report.reactions import (
+    ModeSpan,
+    mode_line,
+    mode_spans,
+    throw_marks,
+    thrown_line,
+)
+from actuated_characters.studies.framework.study import Case
+from msgs_config.messages.projectiles import BallStates, ball_names, decode_balls, encode_balls
+from msgs_config.messages.throw import Throw
+from tests.support.in_process import InProcessLaboratory
+from tests.support.physics import character
+
+HUMANOID = character("humanoid")
+REST = np.array(HUMANOID.rest_position)
+SIZE = (160, 160)
+ONE = Throw(2.0, 0.1, (1.0, 0.0, 1.0), (-3.0, 0.0, 4.0))
+OTHER = Throw(3.0, 0.2, (0.0, 2.0, 1.0), (0.0, -1.0, 0.0))
+
+
+def balls_at(stamp_ns: int, *centres: tuple[float, float, float]) -> BallStates:
+    rows = [(*centre, 0.0, 0.0, 0.0, 1.0, *[0.0] * 6) for centre in centres]
+    return BallStates(stamp_ns, ball_names(len(rows)), np.array(rows))
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """A recording of five ticks with a reset, in which three balls are thrown."""
+    laboratory = InProcessLaboratory(tmp_path_factory.mktemp("laboratory"))
+    case = Case("one", "humanoid", 5.0 / 240.0, {"reference": "hold"}, {}, {})
+    plain = laboratory.run(case).recording
+    effort = plain.effort.copy()
+    effort[2] = np.nan  # that tick is a reset
+    stamps = plain.stamps_ns.tolist()
+    return replace(
+        plain,
+        effort=effort,
+        throws=((), (ONE,), (), (OTHER,), (ONE,)),
+        balls=(
+            None,
+            None,
+            balls_at(stamps[2], (1.0, 0.0, 1.0)),
+            None,
+            balls_at(stamps[4], (0.0, 2.0, 1.0)),
+            balls_at(stamps[5], (0.0, 1.9, 1.0), (1.0, 0.0, 1.0)),
+        ),
+    )
+
+
+def test_where_the_balls_are_is_read_as_it_was_written() -> None:
+    rng = np.random.default_rng(1)
+    balls = BallStates(12_500_000, ball_names(3), rng.normal(size=(3, 13)))
+
+    found = decode_balls(encode_balls(balls))
+
+    assert (found.stamp_ns, found.names) == (12_500_000, ("ball_1", "ball_2", "ball_3"))
+    assert found.motion.tobytes() == balls.motion.tobytes()
+
+
+def test_a_scene_has_the_balls_of_each_state_with_their_radii(recording: Recording) -> None:
+    scene = make_scene([recording])
+
+    found = [scene.balls(row).tolist() for row in range(6)]
+
+    assert found == [
+        [],
+        [],
+        [[1.0, 0.0, 1.0, 0.1]],
+        [],
+        [[0.0, 2.0, 1.0, 0.2]],
+        [[0.0, 1.9, 1.0, 0.2], [1.0, 0.0, 1.0, 0.1]],
+    ]
+
+
+@pytest.mark.parametrize("ground", [False, True])
+def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
+    with Camera(HUMANOID, ground=ground) as camera:
+        view = camera.view(REST, size=SIZE)
+        ball = np.array([[*view.target, 0.15]])
+        ball[0, :3] += 0.8 * view.axes()[2]  # towards the camera: before the character
+
+        empty = camera.picture(REST, view=view, size=SIZE)
+        full = camera.picture(REST, view=view, size=SIZE, balls=ball)
+        again = camera.picture(REST, view=view, size=SIZE)
+
+    differs = (empty != full).any(axis=2)
+    rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
+    # a sphere's outline, seen from the distance d, has the slope r / sqrt(d^2 - r^2)
+    d = view.distance - 0.8
+    pixel = 2.0 * np.tan(0.5 * view.field_of_view) / SIZE[1]
+    radius = 0.15 / np.sqrt(d**2 - 0.15**2) / pixel
+    away = np.hypot(rows + 0.5 - 0.5 * SIZE[1], columns + 0.5 - 0.5 * SIZE[0])
+    assert differs[away < radius - 1.5].all()
+    if not ground:  # where it keeps no light off
+        assert not differs[away > radius + 1.5].any()
+    assert np.array_equal(again, empty)
+
+
+def test_a_ball_behind_the_character_is_hidden() -> None:
+    with Camera(HUMANOID, ground=False) as camera:
+        view = camera.view(REST, size=SIZE)
+        behind = np.array([[*view.target, 0.02]])
+        behind[0, :3] -= 1.0 * view.axes()[2]
+        behind[0, 2] += 0.1
+
+        empty = camera.picture(REST, view=view, size=SIZE)
+        full = camera.picture(REST, view=view, size=SIZE, balls=behind)
+
+    assert np.array_equal(empty, full)
+
+
+# What a report says
+
+
+def test_each_ball_is_told_when_it_was_let_go(recording: Recording) -> None:
+    marks = throw_marks(recording)
+
+    assert [(mark.name, mark.start) for mark in marks] == [
+        ("ball_1", pytest.approx(1 / 240.0)),
+        ("ball_1", pytest.approx(3 / 240.0)),  # of the next episode
+        ("ball_2", pytest.approx(4 / 240.0)),
+    ]
+    assert thrown_line(marks[0]) == "ball_1 thrown: 2 kg, radius 0.1 m, 5 m/s"
+
+
+def test_a_mode_lasts_until_the_next_one_or_the_end(recording: Recording) -> None:
+    stamps = recording.stamps_ns.tolist()
+    changes = (
+        ModeChange(stamps[0], "TRACK", {}),
+        ModeChange(stamps[1], "REACT", {"link": "chest", "impulse": 19.79123}),
+        ModeChange(stamps[4], "LIMP", {}),
+    )
+
+    spans = mode_spans(replace(recording, modes=changes))
+
+    tick = pytest.approx
+    assert [(span.mode, span.start, span.duration) for span in spans] == [
+        ("TRACK", 0.0, tick(1 / 240.0, abs=1e-8)),
+        ("REACT", tick(1 / 240.0, abs=1e-8), tick(3 / 240.0, abs=1e-8)),
+        ("LIMP", tick(4 / 240.0, abs=1e-8), tick(1 / 240.0, abs=1e-8)),
+    ]
+    line = mode_line(ModeSpan("REACT", 1.0, 0.25, {"link": "chest", "impulse": 19.79123}))
+    assert line == "REACT for 0.25 s: link chest, impulse 19.79"
+    assert mode_spans(replace(recording, modes=())) == []

@@ -1,0 +1,345 @@
+"""The page about a run: whole, by itself, and with the numbers that the messages give."""
+
+import re
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
+
+from actuated_characters.bags.recording import read_recording
+from actuated_characters.bags.writer import BagWriter
+from actuated_characters.cli import main
+from actuated_characters.metrics.recording_metrics import contact_series, figures
+from actuated_characters.report.decimation import decimated, span_maxima, span_means
+from actuated_characters.report.page import Chapter, Section, Table, render_page
+from actuated_characters.report.writing import default_directory, write_report
+from actuated_characters.runs.run_directory import prepare_directory
+from msgs_config.errors import RecordingError
+from msgs_config.messages import topics
+from msgs_config.messages.topics import Topic
+from tests.support.bags import Made, add_to, make_run, said_configuration, said_states, write_bag
+from tests.support.eventful import Eventful, add_timed, eventful_run
+
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
+
+HOSTILE = "/<script>alert('x')</script>&amp;"
+VOID = {"meta", "img"}
+TICKS = 120
+RESET_AFTER = 70
+WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
+
+
+@dataclass
+class Page(HTMLParser):
+    """What a browser would find: an element that is not closed is an error."""
+
+    text: str
+    open: list[str] = field(default_factory=list)
+    links: list[str] = field(default_factory=list)
+    pictures: list[str] = field(default_factory=list)
+    cells: list[list[str]] = field(default_factory=list)
+    headings: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        super().__init__()
+        self.feed(self.text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert tag != "script"
+        if tag not in VOID:
+            self.open.append(tag)
+        given = dict(attrs)
+        self.links += [str(given[name]) for name in ("src", "href") if name in given]
+        if tag == "img":
+            self.pictures.append(str(given["src"]))
+        elif tag == "tr":
+            self.cells.append([])
+        elif tag in ("td", "th"):
+            self.cells[-1].append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] in ("td", "th"):
+            self.cells[-1][-1] += data
+        elif self.open and self.open[-1] in ("h2", "h3", "p"):
+            self.headings.append(data)
+
+    def rows(self, name: str) -> list[list[str]]:
+        """The rows that begin with a name."""
+        return [row for row in self.cells if row and row[0] == name]
+
+
+@pytest.fixture(scope="module")
+def walk() -> Eventful:
+    return eventful_run(
+        "humanoid",
+        TICKS,
+        WALK,
+        pushed=[(30, 12, "chest", (300.0, 0.0, 0.0))],
+        reset_after=RESET_AFTER,
+        pause_after=100,
+        mode="realtime",
+    )
+
+
+@pytest.fixture(scope="module")
+def run(walk: Eventful, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run's directory, with a topic of a name that means harm in its bag, and its report."""
+    directory = tmp_path_factory.mktemp("walk")
+    with BagWriter(directory / "bag") as bag:
+        add_timed(bag, walk.messages())
+        bag.add_topic(HOSTILE, String, topics.STREAM_QOS)
+        bag.write(HOSTILE, serialize_message(String(data="")), walk.log_times_ns[-1])
+    assert main(["report", str(directory), "--stills", "2"]) == 0
+    return directory
+
+
+@pytest.fixture(scope="module")
+def page(run: Path) -> Page:
+    return Page((run / "report" / "index.html").read_text(encoding="utf-8"))
+
+
+# The page
+
+
+def test_the_page_is_whole_and_needs_nothing_beside_itself(page: Page) -> None:
+    assert page.links
+    for link in page.links:
+        assert link.startswith(("data:image/png;base64,", "#"))
+    style = page.text[page.text.index("<style>") : page.text.index("</style>")]
+    assert "url(" not in style and "@import" not in style
+    assert "prefers-color-scheme" in style or "color-scheme: light dark" in style
+
+
+def test_names_from_the_bag_are_texts(page: Page) -> None:
+    assert page.rows(HOSTILE)
+    assert "<script" not in page.text
+
+
+def test_the_pictures_lie_beside_the_page(run: Path, page: Page) -> None:
+    names = {path.name for path in (run / "report").iterdir()} - {"index.html"}
+
+    kinds = ("strip", "errors", "efforts", "root", "contacts", "ticks")
+    assert names == {f"{kind}.png" for kind in kinds}
+    assert len(page.pictures) == len(names)
+    for name in names:
+        content = (run / "report" / name).read_bytes()
+        assert imread(BytesIO(content)).std() > 0.0
+
+
+def test_the_table_of_errors_is_that_of_the_messages(page: Page, walk: Eventful) -> None:
+    layout = walk.plan.character.layout
+    desired = {reference.stamp_ns: reference.position for reference in walk.references}
+    known = [state for state in walk.states if state.stamp_ns in desired]
+    for name in ("left_knee", "right_elbow"):
+        entry = layout.joint(name).start
+        errors = np.abs([state.position[entry] - desired[state.stamp_ns][entry] for state in known])
+        expected = [errors.mean(), np.percentile(errors, 95), errors.max()]
+        row = next(row for row in page.rows(name) if row[1] == "rad")
+        assert row[2:] == [f"{value:.4g}" for value in expected]
+    root = [np.linalg.norm(s.position[:3] - desired[s.stamp_ns][:3]) for s in known]
+    row = next(row for row in page.rows("root") if row[1] == "m")
+    assert row[2] == f"{np.mean(root):.4g}"
+
+
+def test_the_table_of_efforts_is_that_of_the_messages(page: Page, walk: Eventful) -> None:
+    layout = walk.plan.character.layout
+    applied = np.array([s.effort for s in walk.states if s.effort is not None])
+    assert len(applied) == TICKS - 1  # but the reset
+    for name, limit in (("left_knee", 150.0), ("chest", 200.0)):
+        sizes = np.linalg.norm(applied[:, layout.joint(name).entries], axis=1)
+        row = next(row for row in page.rows(name) if row[1] == "N m")
+        assert row[2] == f"{sizes.mean():.4g}" and row[4] == f"{sizes.max():.4g}"
+        assert row[5:] == [f"{limit:g}", f"{100.0 * np.mean(sizes >= limit):.3g} %"]
+
+
+def test_the_table_of_contacts_is_that_of_the_messages(page: Page, walk: Eventful) -> None:
+    touched = [wrenches.links for wrenches in walk.contacts]
+    ever = {link for links in touched for link in links}
+    assert "right_ankle" in ever
+    for link in ever:
+        share = sum(link in links for links in touched) / len(touched)
+        assert [link, f"{100.0 * share:.3g} %"] in page.cells
+
+
+def test_what_happened_is_listed(page: Page) -> None:
+    told = {row[1] for row in page.cells if len(row) == 2}
+
+    assert "push on chest for 0.05 s: 15 N s" in told
+    assert "pause of 2 s of wall time" in told
+    assert f"episode of {RESET_AFTER / 240:.4g} s" in told
+
+
+def test_the_figures_are_those_of_the_run(tmp_path: Path) -> None:
+    made = make_run("humanoid", 0.1, WALK)
+    recording = read_recording(write_bag(tmp_path / "bag", made.messages()))
+
+    summary, series = figures(recording)
+
+    knees = [
+        abs(t.state.position[10] - t.reference.position[10]) for t in made.ticks if t.reference
+    ]
+    assert summary["ticks"] == len(made.ticks) == len(knees) == len(series)
+    assert summary["sim_time_s"] == pytest.approx(0.1)
+    assert summary["wall_time_s"] == pytest.approx(24e-9)  # as tests/support/bags.py stamps them
+    again = figures(recording)[0]
+    assert summary["state_hash"] == again["state_hash"]
+
+
+# What is not there is said
+
+
+def test_what_a_recording_lacks_is_said(tmp_path: Path) -> None:
+    made = make_run("franka_panda", 0.05)
+    messages = [said_configuration(made.plan), *said_states(made.plan, made.states)]
+    bag = write_bag(tmp_path / "bag", messages)
+
+    page = Page(write_report(bag, stills=0).read_text(encoding="utf-8"))
+
+    for words in (
+        "The recording has no reference.",
+        "The base is fixed.",
+        "The recording has no contacts",
+        "Pushes were not recorded.",
+    ):
+        assert any(words in heading for heading in page.headings)
+    assert (tmp_path / "bag-report" / "efforts.png").is_file()
+
+
+def test_one_state_is_enough(tmp_path: Path) -> None:
+    made = make_run("pendulum", 0.05)
+    messages = [said_configuration(made.plan), *said_states(made.plan, made.states[:1])]
+    bag = write_bag(tmp_path / "bag", messages)
+
+    page = Page(write_report(bag, stills=0).read_text(encoding="utf-8"))
+
+    assert "There is one state only." in page.headings
+    assert "The recording has no efforts." in page.headings
+
+
+def test_each_of_several_characters_has_its_chapter(tmp_path: Path) -> None:
+    made = make_run("pendulum", 0.05)
+    with BagWriter(tmp_path / "bag") as bag:
+        for namespace in ("left", "right"):
+            add_to(bag, made.messages(), namespace)
+
+    written = write_report(tmp_path, tmp_path / "out", stills=1)
+
+    page = Page(written.read_text(encoding="utf-8"))
+    assert [h for h in page.headings if h in ("left", "right")] == ["left", "right"]
+    names = {path.name for path in written.parent.iterdir()}
+    assert {"1-left-errors.png", "2-right-errors.png", "2-right-strip.png"} <= names
+
+
+# Where it goes
+
+
+def test_a_report_is_replaced_and_nothing_else_is(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], pendulum: Made
+) -> None:
+    bag = write_bag(tmp_path / "bag", pendulum.messages())
+    directory = default_directory(bag)
+    write_report(bag, stills=0)
+    (directory / "contacts.png").touch()  # of an earlier report
+
+    write_report(bag, stills=0)
+    assert not (directory / "contacts.png").exists()
+
+    (directory / "mine.txt").touch()
+    assert main(["report", str(bag)]) == 1
+    said = capsys.readouterr().err
+    assert "holds other files than a report's: mine.txt" in said and said.count("\n") == 1
+
+
+def test_a_report_is_one_of_a_runs_results(tmp_path: Path, pendulum: Made) -> None:
+    write_bag(tmp_path / "bag", pendulum.messages())
+    assert write_report(tmp_path, stills=0) == tmp_path / "report" / "index.html"
+
+    prepare_directory(tmp_path, overwrite=True)
+
+    assert not (tmp_path / "report").exists()
+
+
+def test_a_page_of_somebody_else_is_not_replaced(pendulum: Made, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", pendulum.messages())
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "index.html").write_text("<!DOCTYPE html><p>mine</p>")
+
+    with pytest.raises(RecordingError, match="other files"):
+        write_report(bag, tmp_path / "site")
+    assert "mine" in (tmp_path / "site" / "index.html").read_text()
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> Made:
+    return make_run("pendulum", 0.05)
+
+
+def test_a_bag_of_something_else_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    chatter = Topic("chatter", String, topics.STREAM_QOS)
+    bag = write_bag(tmp_path / "bag", [(chatter, serialize_message(String(data="hello")))])
+
+    assert main(["report", str(bag)]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not default_directory(bag).exists()
+
+
+# Parts
+
+
+def test_texts_are_escaped_wherever_they_are() -> None:
+    evil = "<img src=x onerror=alert(1)>\"'&"
+    section = Section(evil, tables=[Table([(evil,)], (evil,), evil)], notes=[evil])
+
+    page = Page(render_page(evil, [Chapter(evil, [section])]))
+
+    assert page.pictures == []
+    assert page.rows(evil) == [[evil], [evil]]
+    assert not re.search(r"onerror=alert\(1\)>", page.text)
+
+
+def test_a_long_series_keeps_its_extremes() -> None:
+    times = np.arange(100_000) / 1000.0
+    values = np.random.default_rng(1).normal(size=(100_000, 2))
+    values[12_345, 0], values[77_777, 1], values[500:900, 0] = 50.0, -60.0, np.nan
+
+    at, drawn = decimated(times, values, most=500)
+
+    assert len(at) == len(drawn) == 1000
+    assert np.nanmax(drawn[:, 0]) == 50.0 and np.nanmin(drawn[:, 1]) == -60.0
+    spike = int(np.nanargmax(drawn[:, 0]))
+    assert at[spike] == pytest.approx(12.345, abs=0.2)
+    assert np.isnan(drawn[:, 0]).sum() == 2  # one span had nothing else
+    np.testing.assert_array_equal(decimated(times[:9], values[:9], most=500)[1], values[:9])
+
+
+def test_spans_have_their_largest_and_their_mean() -> None:
+    values = np.arange(20.0).reshape(10, 2)
+
+    assert span_maxima(values, 3)[:, 0].tolist() == [4.0, 10.0, 18.0]
+    assert span_means(values, 5)[:, 1].tolist() == [2.0, 6.0, 10.0, 14.0, 18.0]
+    assert span_means(values, 50).tolist() == values.tolist()
+
+
+def test_the_ground_bears_what_all_links_say(walk: Eventful, run: Path) -> None:
+    recording = read_recording(run)
+
+    series = contact_series(recording.character, recording.contacts)
+
+    assert series is not None
+    expected = [wrenches.wrenches[:, 2].sum() for wrenches in walk.contacts]
+    np.testing.assert_array_equal(series.vertical_force, expected)
+    column = series.links.index("right_ankle")
+    assert series.touching[:, column].tolist() == ["right_ankle" in w.links for w in walk.contacts]

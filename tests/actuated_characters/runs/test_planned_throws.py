@@ -1,0 +1,451 @@
+"""Balls that are thrown at a link in a run: they hit it when they should, and are replayed."""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from actuated_characters.bags.recording import Recording, read_recording
+from actuated_characters.replay.replay import replay
+from actuated_characters.replay.through_topics import replay_commands
+from actuated_characters.runs.execution import run_in_process, run_over_topics
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.planned_throws import (
+    Aim,
+    PlannedThrow,
+    plan_throws,
+    planned_throw,
+    read_aim,
+    read_throws,
+    write_throws,
+)
+from actuated_characters.runs.planned_wrenches import planned_push
+from actuated_characters.runs.run_directory import prepare_directory, read_figures
+from controller_node.parameters import make_controller
+from msgs_config.arrays import FloatArray
+from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.messages.clock import TickClock
+from msgs_config.messages.throw import Throw, natural_radius
+from sim_node.parameters import make_role, make_settings
+from sim_node.physics.simulation import Simulation
+from sim_node.physics.sphere_sweep import find_impact
+from tests.support.physics import character
+from tests.support.ros import Processes
+
+RATE = 240
+CLOCK = TickClock(RATE)
+HUMANOID = character("humanoid")
+LINKS = [link.name for link in HUMANOID.links]
+HELD = {"reference": "hold"}
+WALK = {"reference": "clip", "clip": "walk"}
+
+
+def plan_of(
+    seconds: float = 1.0, reference: dict[str, object] | None = None, **simulator: object
+) -> Plan:
+    return make_plan("humanoid", seconds, reference or HELD, simulator, {})
+
+
+@dataclass(frozen=True)
+class Hit:
+    """What a ball does in a run of one."""
+
+    tick: int  # of the state after the step in which it first touches
+    links: tuple[str, ...]  # that it touches then
+    before: FloatArray  # (13,) its motion in the state before
+    let_go: int  # the tick of the state in which it is let go
+
+
+def first_hit(plan: Plan, planned: PlannedThrow) -> Hit:
+    """Run a plan with a throw until the ball touches something."""
+    controller = make_controller(plan.character, plan.reference, plan.controller)
+    with Simulation(
+        [make_role(plan.character, plan.simulator)], make_settings(plan.simulator)
+    ) as run:
+        (actor,) = run.actors
+        start, let_go = run.stamp_ns, run.clock.first_tick_from(planned.stamp_ns)
+        motion = np.zeros(13)
+        for _ in range(plan.ticks):
+            effort, _ = controller.answer(actor.state, start)
+            run.step([effort], None, [planned.throw] if run.tick == let_go else ())
+            touched = run._world.touched_links()
+            balls = run._world.balls._numbers
+            if balls and balls[0] in touched:
+                links = _touching(run, balls[0])
+                return Hit(run.tick, links, motion, let_go)
+            if balls:
+                motion = run.ball_motion()[0]
+    raise AssertionError("it has hit nothing")
+
+
+def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
+    """The links of the character that a ball pushes, by the engine's own list."""
+    from msgs_config.character.bullet import pybullet
+
+    body = run.actors[0]._body
+    points = pybullet.getContactPoints(ball, body._body, physicsClientId=body._client)
+    rows = {number: row for row, number in enumerate(body.links._numbers)}
+    return tuple(LINKS[rows[point[4]]] for point in points)
+
+
+# Aiming
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side", ["front", "left", "back", "right", "above", "37.5"])
+@pytest.mark.parametrize("reference", [HELD, WALK], ids=["hold", "walk"])
+def test_a_ball_hits_its_target_at_its_time_from_its_side(
+    side: str, reference: dict[str, object]
+) -> None:
+    plan = plan_of(1.0, reference)
+    speed = 6.0 if reference is HELD else 12.0  # a walk is some centimetres from its reference
+
+    planned, before = planned_throw(plan, Aim(1.0, speed, 0.8, "neck", side, radius=0.06))
+    hit = first_hit(plan, planned)
+
+    assert before == () and hit.links == ("neck",)
+    assert abs((hit.tick - 1) - 0.8 * RATE) <= 2.0
+    came = -hit.before[7:10] / np.linalg.norm(hit.before[7:10])
+    angle = {"front": 0.0, "left": 90.0, "back": 180.0, "right": 270.0}.get(side)
+    expected = np.array((0.0, 0.0, 1.0))
+    if side != "above":
+        radians = np.deg2rad(float(side) if angle is None else angle)
+        expected = np.array((np.cos(radians), np.sin(radians), 0.0))
+    slack = 0.35 if side != "above" else 0.05  # it falls on its way, and the walk sways
+    assert np.arccos(came @ expected) < slack
+
+
+@pytest.mark.parametrize(("radius", "distance"), [(0.005, 8.0), (0.0078, 20.0), (0.1, 300.0)])
+def test_a_small_ball_from_far_away_is_aimed_at_the_surface(radius: float, distance: float) -> None:
+    position = np.array(HUMANOID.rest_position)
+    ahead = np.array((1.0, 0.0, 0.0))
+
+    far = find_impact(HUMANOID, position, "chest", ahead, radius, distance)
+    near = find_impact(HUMANOID, position, "chest", ahead, radius, 1.0)
+
+    assert far.centre == pytest.approx(near.centre, abs=1e-5)
+    assert far.before == near.before == ()
+
+
+def test_a_side_turns_with_the_character() -> None:
+    turned = plan_of(placement=[1.0, 2.0, 0.0, np.pi / 2.0])
+    aim = Aim(1.0, 6.1, 0.8, "neck", "front", radius=0.06)
+
+    throw, _ = planned_throw(turned, aim)
+    plain, _ = planned_throw(plan_of(), aim)
+
+    x, y, z = plain.throw.position
+    assert throw.throw.position == pytest.approx((1.0 - y, 2.0 + x, z), abs=1e-5)
+    vx, vy, vz = plain.throw.velocity
+    assert throw.throw.velocity == pytest.approx((-vy, vx, vz), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "simulator", [{}, {"substeps": 3}, {"gravity": 0.0}, {"rate": 500}], ids=str
+)
+def test_a_ball_flies_at_its_speed_and_upwards_as_gravity_takes_away(
+    simulator: dict[str, object],
+) -> None:
+    if "rate" in simulator:
+        plan = make_plan("humanoid", 1.0, HELD, simulator, {})
+    else:
+        plan = plan_of(**simulator)
+    rate = plan.simulator.integer("rate")
+
+    planned, _ = planned_throw(plan, Aim(1.0, 5.0, 0.9, "neck", "right", 3.0, 0.06))
+
+    vx, vy, vz = planned.throw.velocity
+    time = 0.9 - (TickClock(rate).first_tick_from(planned.stamp_ns) - 1) / rate
+    step = 1.0 / (rate * plan.simulator.integer("substeps"))
+    gravity = plan.simulator.number("gravity")
+    assert (vx, vy) == pytest.approx((0.0, 5.0), abs=1e-9)
+    assert vz == pytest.approx(0.5 * gravity * (time + step), abs=1e-9)
+    # it comes to the neck's surface, which is half a hand from its middle
+    assert planned.throw.position[1] == pytest.approx(-3.0, abs=0.02)
+    assert time * 5.0 == pytest.approx(3.0, abs=0.25)
+
+
+def test_what_is_in_the_way_is_said() -> None:
+    throws, notes = plan_throws(plan_of(), ["mass=2 speed=8 at=0.8 from=right target=left_wrist"])
+
+    assert len(throws) == 1
+    (note,) = notes
+    assert "right_" in note and "in its way" in note
+
+
+# What is refused
+
+
+def test_a_throw_is_read_as_it_is_written() -> None:
+    assert read_aim("mass=2 speed=8 at=2.0 from=left target=chest") == Aim(
+        2.0, 8.0, 2.0, "chest", "left"
+    )
+    assert read_aim("at=1,speed=3,target=neck,mass=1,distance=4,radius=0.1,from=-30") == Aim(
+        1.0, 3.0, 1.0, "neck", "-30", 4.0, 0.1
+    )
+    assert Aim(7.0, 1.0, 1.0, "neck").size == natural_radius(7.0)
+
+
+GOOD = ["mass=2", "speed=8", "at=0.9", "target=chest"]
+WRONG: dict[str, tuple[str, list[str]]] = {
+    "a link that is none": ("target=chset", ["'chset'", "did you mean 'chest'?"]),
+    "no speed": ("speed=0", ["speed is 0; it must be above 0"]),
+    "hardly moving": ("speed=1e-309", ["speed is 1e-309 m/s; it must be 0.001 m/s or more"]),
+    "from another country": ("distance=2e5", ["distance is 200000 m", "from 1969.49 m at most"]),
+    "from another world": ("distance=1e300", ["distance is 1e+300 m", "at most"]),
+    "backwards": ("speed=-3", ["speed is -3"]),
+    "no mass": ("mass=0", ["mass is 0"]),
+    "too heavy": ("mass=1e9 radius=0.1", ["mass is 1e+09; it must be 0.001 to 10000"]),
+    "too fast": ("speed=5e3", ["at most 1000 m/s"]),
+    "too early": ("at=0.1", ["at is 0.1 s", "the ball needs", "let it hit later"]),
+    "before the run": ("at=-1", ["at is -1 s; it must be 0 s to less than 1 s"]),
+    "after the run": ("at=1", ["at is 1 s"]),
+    "no time": ("at=nan", ["at is 'nan'"]),
+    "from nowhere": ("from=below", ["from is 'below'", "an angle in degrees, or one of front"]),
+    "no number": ("speed=fast", ["speed is 'fast'; it must be a number"]),
+    "another key": ("velocity=3", ["'velocity'", "speed"]),
+    "no pair": ("hard", ["'hard': write it as 'mass=2"]),
+    "inside it": ("distance=0.1", ["distance is 0.1 m", "nearer than the radius"]),
+    "in the ground": ("target=right_ankle", ["in the ground", "'radius'"]),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_throw_that_cannot_be_is_refused_in_a_line(wrong: str) -> None:
+    changed, expected = WRONG[wrong]
+    text = " ".join(part for part in GOOD if part.split("=")[0] + "=" not in changed)
+
+    with pytest.raises(ConfigurationError) as caught:
+        plan_throws(plan_of(), [f"{text} {changed}"])
+
+    line = str(caught.value)
+    assert "\n" not in line and line.startswith("throw '")
+    assert all(part in line for part in expected), line
+
+
+@pytest.mark.parametrize("key", ["mass", "speed", "at", "target"])
+def test_what_a_throw_needs_is_named(key: str) -> None:
+    rest = [part for part in GOOD if not part.startswith(f"{key}=")]
+
+    with pytest.raises(ConfigurationError, match=f"'{key}' is missing; write it as"):
+        read_aim(" ".join(rest))
+    with pytest.raises(ConfigurationError, match="'from' twice"):
+        read_aim("from=left from=right")
+
+
+def test_no_more_balls_than_an_episode_may_have() -> None:
+    with pytest.raises(ConfigurationError, match="at most 100"):
+        plan_throws(plan_of(), ["mass=2 speed=8 at=0.9 target=chest"] * 101)
+
+
+# Its file
+
+
+def test_what_is_written_is_read_to_the_bit(tmp_path: Path) -> None:
+    exact = PlannedThrow(2**53 + 1, Throw(0.1, 1 / 3, (1e-300, -0.0, 1 / 7), (0.3, 0.0, -1.0)))
+    early = PlannedThrow(1, exact.throw)
+
+    write_throws(tmp_path / "throws.json", [exact, early])
+
+    found = read_throws(tmp_path / "throws.json")
+    assert [each.stamp_ns for each in found] == [1, 2**53 + 1]
+    assert found[1].throw.numbers().tobytes() == exact.throw.numbers().tobytes()
+
+
+@pytest.mark.parametrize(
+    "content", ["tomorrow", "[1]", json.dumps([{"stamp_ns": 1, "throw": {"mass": 2.0}}])]
+)
+def test_a_file_that_holds_no_throws_is_refused_in_a_line(tmp_path: Path, content: str) -> None:
+    file = tmp_path / "throws.json"
+    file.write_text(content)
+
+    with pytest.raises(RecordingError) as caught:
+        read_throws(file)
+
+    assert str(caught.value).startswith(f"{file} holds no throws: ")
+
+
+# A run
+
+
+@dataclass(frozen=True)
+class Made:
+    """A run with throws over topics, and what it has left."""
+
+    plan: Plan
+    throws: list[PlannedThrow]
+    directory: Path
+    recording: Recording
+    summary: dict[str, Any]
+
+
+THROWN = [
+    "mass=2 speed=8 at=0.5 from=front target=chest",
+    "mass=3 speed=4 at=0.6 from=back target=root distance=1",
+]
+
+
+@pytest.fixture(scope="module")
+def thrown(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    directory = tmp_path_factory.mktemp("thrown") / "run"
+    prepare_directory(directory, overwrite=False)
+    plan = make_plan("humanoid", 0.75, WALK, {"ball_lifetime": 0.25}, {"behaviour": "reactive"})
+    throws, _ = plan_throws(plan, THROWN)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("ROS_DOMAIN_ID", raising=False)
+        run_over_topics(plan, directory, write_bag=True, progress=lambda _: None, throws=throws)
+    summary, _ = read_figures(directory)
+    return Made(plan, throws, directory, read_recording(directory), summary)
+
+
+@pytest.mark.slow
+def test_the_bag_says_what_was_thrown_and_where_it_went(thrown: Made) -> None:
+    recording, throws = thrown.recording, sorted(thrown.throws, key=lambda each: each.stamp_ns)
+
+    ticks = [tick for tick, each in enumerate(recording.throws) if each]
+    assert [recording.stamps_ns[tick] for tick in ticks] == [each.stamp_ns for each in throws]
+    assert [recording.throws[tick] for tick in ticks] == [(each.throw,) for each in throws]
+    assert recording.throws_sent == 2 and thrown.summary["rejected_throws"] == 0
+    first, second = ticks
+    there = [0 if balls is None else len(balls.names) for balls in recording.balls]
+    assert there == [0] * (first + 1) + [1] * (second - first) + [2] * (181 - second - 1)
+    gone = [balls is not None and bool(balls.motion[0, 0] > 5e3) for balls in recording.balls]
+    assert gone == [row > first + 60 for row in range(181)] and gone[-1]
+
+
+@pytest.mark.slow
+def test_a_run_in_one_process_takes_the_same_throws(thrown: Made, tmp_path: Path) -> None:
+    prepare_directory(tmp_path / "run", overwrite=False)
+
+    run_in_process(thrown.plan, tmp_path / "run", progress=lambda _: None, throws=thrown.throws)
+
+    summary, _ = read_figures(tmp_path / "run")
+    assert summary["state_hash"] == thrown.summary["state_hash"]
+
+
+@pytest.mark.slow
+def test_the_bag_says_what_the_controller_did_about_it(thrown: Made) -> None:
+    changes, hit = thrown.recording.modes, CLOCK.stamp_ns(1 + round(0.5 * RATE))
+
+    first, second, *_ = changes
+    assert (first.stamp_ns, first.mode) == (thrown.recording.stamps_ns[0], "TRACK")
+    assert second.mode == "REACT" and second.facts["link"] == "chest"
+    assert 0 <= second.stamp_ns - hit <= 3 * 10**9 / RATE
+    assert second.facts["impulse"] == pytest.approx(16.0, rel=0.2)
+
+
+@pytest.mark.slow
+def test_a_replay_through_topics_sends_the_balls_as_well(thrown: Made) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("ROS_DOMAIN_ID", raising=False)
+        result = replay_commands(thrown.directory, progress=lambda _: None, tell=lambda _: None)
+
+    assert result.identical and result.states == 181
+
+
+@pytest.mark.slow
+def test_a_replay_is_identical_with_all_the_balls(thrown: Made) -> None:
+    result = replay([thrown.recording])
+
+    assert result.identical and result.states == 181 and not result.notes
+    assert result.state_hashes == {"": thrown.summary["state_hash"]}
+
+
+@pytest.mark.slow
+def test_a_replay_sees_a_ball_that_is_missing_another_or_elsewhere(thrown: Made) -> None:
+    recording = thrown.recording
+    ticks = [tick for tick, each in enumerate(recording.throws) if each]
+    one = recording.throws[ticks[0]][0]
+
+    def changed(*throws: Throw) -> Recording:
+        rows = [*recording.throws]
+        rows[ticks[0]] = throws
+        return replace(recording, throws=tuple(rows))
+
+    heavier = replay([changed(replace(one, mass=one.mass * (1.0 + 1e-12)))]).difference
+    elsewhere = replay([changed(replace(one, radius=one.radius + 1e-9))]).difference
+    x, y, z = one.position
+    moved = replay([changed(replace(one, position=(x, y, np.nextafter(z, 9.0))))]).difference
+
+    assert heavier is not None and heavier.quantity in ("position", "velocity", "ball")
+    assert heavier.tick > ticks[0] + 20  # no sooner than it hits
+    assert elsewhere is not None
+    assert moved is not None and moved.quantity == "ball" and moved.tick == ticks[0] + 2
+    assert "'ball_1': z in m was" in str(moved)
+    with pytest.raises(RecordingError, match="2 balls on 'thrown'"):
+        replay([changed()])
+
+
+@pytest.mark.slow
+def test_a_recording_of_throws_alone_is_replayed_without_them_and_says_so(thrown: Made) -> None:
+    silent = replace(thrown.recording, throws=(), balls=())
+
+    result = replay([silent])
+
+    assert any("'throw'" in note and "without balls" in note for note in result.notes)
+    assert not result.identical
+
+
+@pytest.mark.slow
+def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path: Path) -> None:
+    directory = tmp_path / "run"
+    prepare_directory(directory, overwrite=False)
+    plan = plan_of(0.25)
+    throws, _ = plan_throws(plan, ["mass=1 speed=10 at=0.2 distance=1 target=neck radius=0.05"])
+    pushes = [planned_push(plan, "chest", (10.0, 0.0, 0.0), 0.1)]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("ROS_DOMAIN_ID", raising=False)
+        run_over_topics(
+            plan,
+            directory,
+            write_bag=False,
+            progress=lambda _: None,
+            pushes=pushes,
+            throws=throws,
+        )
+
+    summary, _ = read_figures(directory)
+    assert summary["ticks"] == 60
+    assert (summary["rejected_pushes"], summary["rejected_throws"]) == (0, 0)
+    with_both = [tick.following for tick in ticks_in_process(plan, pushes, throws)]
+    with_one = [tick.following for tick in ticks_in_process(plan, pushes)]
+    assert not np.array_equal(with_both[-1].position, with_one[-1].position)  # it has hit
+    run_in_process(plan, directory, progress=lambda _: None, pushes=pushes, throws=throws)
+    again, _ = read_figures(directory)
+    assert again["state_hash"] == summary["state_hash"]
+
+
+# The command
+
+
+REFUSED = [
+    (["--throw", "mass=2 speed=8 at=0.9 target=chset"], ["throw 'mass=2", "did you mean 'chest'"]),
+    (
+        ["--behaviour", "ragdoll", "--set", "controller_node.behaviour:=reactive"],
+        ["--behaviour is ragdoll", "reactive", "give one of them"],
+    ),
+    (
+        ["--behaviour", "reactive", "--set", "controller_node.hit.threshold:=50"],
+        ["'limp.threshold' is 30 N s", "50 N s"],
+    ),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("arguments", "expected"), REFUSED)
+def test_the_command_refuses_in_a_line(
+    arguments: list[str], expected: list[str], tmp_path: Path, processes: Processes
+) -> None:
+    output = ["--output", str(tmp_path / "run"), "--duration", "1", "--in-process"]
+
+    run = processes.command("run", *arguments, *output)
+
+    assert run.wait() == 1
+    (line,) = run.stderr.splitlines()
+    assert line.startswith("error: ") and all(part in line for part in expected), line
+    assert not (tmp_path / "run").exists()

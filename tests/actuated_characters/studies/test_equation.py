@@ -1,0 +1,94 @@
+"""The study `equation`: what is left of the equation of motion, and what shows that it is right."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuated_characters.bags.recording import Recording
+from actuated_characters.studies.catalogue import load_study
+from actuated_characters.studies.equation import TickTime, close
+from actuated_characters.studies.framework.study import Case, Findings
+from msgs_config.messages.wrenches import WrenchArrays
+from tests.support.in_process import InProcessLaboratory
+
+pytestmark = pytest.mark.slow
+
+ROUNDING = 1e-10
+NOTICED = 1e-3
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory: pytest.TempPathFactory) -> InProcessLaboratory:
+    return InProcessLaboratory(tmp_path_factory.mktemp("equation"))
+
+
+@pytest.fixture(scope="module")
+def findings(laboratory: InProcessLaboratory) -> Findings:
+    return load_study("equation").conduct(laboratory)
+
+
+@pytest.fixture(scope="module")
+def stood(laboratory: InProcessLaboratory) -> Recording:
+    """Half a second of standing with assistance, its contacts recorded."""
+    return laboratory.run(Case("short", "humanoid", 0.5, contacts=True)).recording
+
+
+def test_the_equation_closes_in_every_tick_and_not_without_the_contacts(
+    findings: Findings,
+) -> None:
+    rows = {str(row[0]): dict(zip(findings.columns, row, strict=True)) for row in findings.rows}
+
+    assert set(rows) == {"walk", "stand", "fall"}
+    for row in rows.values():
+        largest, without = row["largest"], row["p50 without contacts"]
+        assert isinstance(largest, float) and isinstance(without, float)
+        assert largest < ROUNDING
+        assert without > 0.1
+
+
+def test_standing_still_ground_and_assistance_carry_the_weight(stood: Recording) -> None:
+    # Arrange: the last quarter, when it has come to rest
+    ticks = range(90, 120)
+    weight = 9.81 * stood.character.mass
+
+    for tick in ticks:
+        # Act
+        touching = stood.contacts[tick]
+        assert touching is not None
+        carried = touching.wrenches[:, 2].sum() + stood.effort[tick, 2]
+
+        # Assert
+        assert carried == pytest.approx(weight, rel=0.02)
+
+
+@pytest.mark.parametrize("what", ["contact", "effort", "velocity"])
+def test_what_was_not_so_shows(stood: Recording, what: str) -> None:
+    # Arrange
+    assert close(stood).relative.max() < ROUNDING
+    effort, velocity, contacts = stood.effort.copy(), stood.velocity.copy(), list(stood.contacts)
+    tick, chest = 60, stood.layout.dof_names.index("chest_x")
+
+    # Act
+    if what == "contact":
+        touching = contacts[tick]
+        assert touching is not None
+        contacts[tick] = WrenchArrays(
+            touching.stamp_ns, touching.links, 1.1 * touching.wrenches, touching.points
+        )
+    elif what == "effort":
+        effort[tick, chest] += 5.0
+    else:
+        velocity[tick + 1, chest] += 0.01
+    altered = replace(stood, effort=effort, velocity=velocity, contacts=tuple(contacts))
+    relative = close(altered).relative
+
+    # Assert: in that tick, and, of a velocity, in the next one that begins with it
+    shown = np.flatnonzero(relative > NOTICED).tolist()
+    assert shown == ([tick, tick + 1] if what == "velocity" else [tick])
+
+
+def test_the_parts_of_a_tick_add_up_to_it() -> None:
+    tick = TickTime(physics=120.0, control=60.0, over_topics=700.0)
+
+    assert tick.physics + tick.control + tick.transport == tick.over_topics

@@ -1,0 +1,345 @@
+"""The studies of tracking: their measures against theory, and what the lecture expects of runs."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuated_characters.studies import assistance, clips, delay, gains
+from actuated_characters.studies.framework.study import Case, Cell, Findings, Outcome
+from actuated_characters.studies.framework.tracking import (
+    delayed_spectral_radius,
+    errors_by_joint,
+    fall_time,
+    inertialess_response,
+    lag,
+    overshoot,
+)
+from controller_node.control_laws import stable_pd_effort
+from msgs_config.arrays import FloatArray
+from msgs_config.character.bullet import pybullet
+from msgs_config.geometry import rotations
+from sim_node.physics.world import WorldSettings
+from tests.support.in_process import InProcessLaboratory
+from tests.support.physics import LoneWorld, character
+
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
+
+PERIOD = 1.0 / 240  # s
+
+
+# The measures
+
+
+def test_a_joints_error_is_the_angle_of_the_turn_between() -> None:
+    layout = character("humanoid").layout
+    rng = np.random.default_rng(4)
+    position, angles = rng.uniform(-1.0, 1.0, (5, layout.size)), []
+    desired = position.copy()
+    for joint in layout.joints[1:]:
+        angle = rng.uniform(0.1, 3.0)
+        axis = rng.normal(size=3)
+        if joint.rotation is None:
+            desired[:, joint.start] -= angle
+        else:
+            turn = rotations.exp(angle * axis / np.linalg.norm(axis))
+            turned = rotations.multiply(rotations.exp(position[:, joint.rotation]), turn)
+            desired[:, joint.rotation] = rotations.log(turned)
+        angles.append(angle)
+    desired[:, :6] += 1.0  # the root is no joint
+
+    errors = errors_by_joint(layout, position, desired)
+
+    np.testing.assert_allclose(errors, np.tile(angles, (5, 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.4, 0.7])
+def test_overshoot_of_a_step_is_that_of_a_second_order_system(ratio: float) -> None:
+    """exp(-pi z / sqrt(1 - z^2)) at damping ratio z (Ogata, Modern Control Engineering)."""
+    damped = np.sqrt(1.0 - ratio**2)
+    phase = np.linspace(0.0, 40.0, 100_000)
+    decay = np.exp(-ratio * phase)
+    response = 1.0 - decay * (np.cos(damped * phase) + ratio / damped * np.sin(damped * phase))
+    step = np.ones_like(phase)
+    step[0] = 0.0
+
+    assert overshoot(response, step) == pytest.approx(np.exp(-np.pi * ratio / damped), rel=1e-6)
+    assert overshoot(-response, -step) == pytest.approx(np.exp(-np.pi * ratio / damped), rel=1e-6)
+
+
+def test_overshoot_is_negative_within_the_reference() -> None:
+    reference = np.array([0.0, 2.0, 0.0, 2.0])
+
+    assert overshoot(0.5 * reference + 0.5, reference) == pytest.approx(-0.25)
+
+
+@pytest.mark.parametrize("late", [-0.0613, 0.0, 0.0021, 0.1, 0.2501])
+def test_lag_of_a_signal_that_comes_late(late: float) -> None:
+    """Also by a part of a sample, smaller, and about another mean."""
+    times = np.linspace(0.0, 960 * PERIOD, 960, endpoint=False)
+
+    def signal(time: FloatArray) -> FloatArray:
+        return np.sin(5.0 * time) + 0.4 * np.sin(10.0 * time + 1.0)
+
+    assert lag(0.3 * signal(times - late) - 2.0, signal(times), PERIOD, 0.4) == pytest.approx(
+        late, abs=1e-4
+    )
+
+
+@pytest.mark.parametrize("time_constant", [0.01, 0.1, 1.0])
+@pytest.mark.parametrize("follows", [True, False])
+def test_a_joint_without_inertia_lags_as_a_first_order_filter(
+    time_constant: float, follows: bool
+) -> None:
+    """T (q(k) - q(k-1)) / h + q(k) = r(k), and T r'(k) on the right if the velocity is followed."""
+    speed = 5.0  # rad/s
+    times = np.arange(0.0, 30.0, PERIOD)
+    reference, velocity = np.sin(speed * times), speed * np.cos(speed * times)
+
+    angle = inertialess_response(
+        reference, velocity if follows else 0.0 * velocity, 500.0, 500.0 * time_constant, PERIOD
+    )
+
+    settled = times > 15.0
+    measured = lag(angle[settled], reference[settled], PERIOD, 0.4)
+    filtered = 1.0 + time_constant * (1.0 - np.exp(-1j * speed * PERIOD)) / PERIOD
+    desired = 1.0 + 1j * speed * time_constant * follows
+    late = (np.angle(filtered) - np.angle(desired)) / speed
+    assert measured == pytest.approx(late, abs=1e-4)  # s; samples are 4 ms apart
+
+
+def test_a_slow_motion_lags_by_damping_over_stiffness() -> None:
+    times = np.arange(0.0, 3.0, PERIOD)
+
+    angle = inertialess_response(0.2 * times, np.zeros_like(times), 500.0, 50.0, PERIOD)
+
+    assert 0.2 * times[-1] - angle[-1] == pytest.approx(0.2 * 50.0 / 500.0, rel=1e-6)
+
+
+def test_a_fall_is_below_half_of_a_reference_that_stands() -> None:
+    times = np.arange(5.0)
+    lying, standing = np.full(5, 0.4), np.full(5, 0.9)
+    height = np.array([0.9, 0.5, 0.44, 0.1, 0.9])
+
+    assert fall_time(times, height, standing) == 2.0
+    assert fall_time(times, height, lying) is None
+    assert fall_time(times, standing, standing) is None
+
+
+@pytest.mark.parametrize("delay_ticks", [1, 2, 3, 4])
+def test_delayed_damping_is_stable_up_to_the_bound_of_levin_and_may(delay_ticks: int) -> None:
+    """v(k+1) = v(k) - a v(k-d) is stable for 0 < a < 2 cos(d pi / (2 d + 1)) (1976)."""
+    bound = 2.0 * np.cos(delay_ticks * np.pi / (2 * delay_ticks + 1))
+    for factor in (0.97, 1.03):
+        share = factor * bound  # of a = kd h / (m + kd h), which is below 1
+        if share >= 1.0:
+            continue
+        damping = share / (1.0 - share) / PERIOD
+        radius = delayed_spectral_radius(
+            np.eye(1), np.zeros(1), np.array([damping]), PERIOD, delay_ticks=delay_ticks
+        )
+        assert (radius > 1.0 + 1e-9) == (factor > 1.0)  # 1: where it stands is free
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.02])
+def test_without_delay_it_is_stable_where_stable_pd_is(factor: float) -> None:
+    """One mass: 3 kp h^2 < 4 m + 2 kd h."""
+    mass, damping = 2.0, 5.0
+    stiffness = factor * (4.0 * mass + 2.0 * damping * PERIOD) / (3.0 * PERIOD**2)
+
+    radius = delayed_spectral_radius(
+        np.array([[mass]]), np.array([stiffness]), np.array([damping]), PERIOD, delay_ticks=0
+    )
+
+    assert (radius < 1.0) == (factor < 1.0)
+
+
+@pytest.mark.parametrize(("delay_ticks", "substeps"), [(0, 1), (1, 1), (2, 4), (4, 3)])
+def test_growth_is_that_of_the_controllers_own_law_stepped_with_delay(
+    delay_ticks: int, substeps: int
+) -> None:
+    rng = np.random.default_rng(7)
+    root = rng.normal(size=(3, 3))
+    mass = root @ root.T + 0.1 * np.eye(3)
+    stiffness, damping = np.array([500.0, 100.0, 900.0]), np.array([50.0, 5.0, 20.0])
+    position, velocity, waiting = rng.normal(size=3), np.zeros(3), [np.zeros(3)] * delay_ticks
+    sizes, scale = [], 0.0
+
+    def solve(force: FloatArray, added: FloatArray) -> FloatArray:
+        return np.array(np.linalg.solve(mass + np.diag(added), force), dtype=float)
+
+    for _ in range(3000):
+        effort = stable_pd_effort(
+            solve,
+            np.zeros(3),
+            stiffness,
+            damping,
+            -position,
+            velocity,
+            np.zeros(3),
+            PERIOD,
+        )
+        waiting = [*waiting, effort]
+        acceleration = np.linalg.solve(mass, waiting.pop(0))
+        for _ in range(substeps):
+            velocity = velocity + acceleration * PERIOD / substeps
+            position = position + velocity * PERIOD / substeps
+        size = np.linalg.norm([position, velocity])
+        position, velocity = position / size, velocity / size
+        waiting = [each / size for each in waiting]
+        scale += np.log(size)
+        sizes.append(scale)
+
+    radius = delayed_spectral_radius(
+        mass, stiffness, damping, PERIOD, delay_ticks=delay_ticks, substeps=substeps
+    )
+
+    assert np.log(radius) == pytest.approx((sizes[-1] - sizes[999]) / 2000, abs=2e-3)
+
+
+def test_clearances_are_the_engines_distances_to_the_ground() -> None:
+    whole = character("humanoid")
+    rng = np.random.default_rng(2)
+    position = np.array(whole.rest_position)
+    position[2:] += rng.uniform(-0.3, 0.3, whole.layout.size - 2)
+    position[2] = 2.0
+    heights = clips.clearances(whole, position[np.newaxis])
+
+    world = LoneWorld(whole, WorldSettings())
+    with world:
+        world.body.set_state(position, np.zeros(whole.layout.size))
+        client, body = world.body._client, world.body._body
+        ground = 1 - body
+        pybullet.performCollisionDetection(physicsClientId=client)
+        count = pybullet.getNumJoints(body, physicsClientId=client)
+        infos = [pybullet.getJointInfo(body, k, physicsClientId=client) for k in range(count)]
+        numbers = {info[12].decode(): info[0] for info in infos}
+        for name, height in heights.items():
+            found = pybullet.getClosestPoints(
+                body, ground, 10.0, linkIndexA=numbers[name], physicsClientId=client
+            )
+            assert height[0] == pytest.approx(min(point[8] for point in found), abs=1e-4)
+
+
+# What the lecture expects of runs
+
+
+def by_key(findings: Findings, keys: int) -> Mapping[tuple[Cell, ...], dict[str, Cell]]:
+    """The table's rows by their first cells, each by the names of its columns."""
+    return {
+        tuple(row[:keys]): dict(zip(findings.columns, row, strict=True)) for row in findings.rows
+    }
+
+
+def number(cell: object) -> float:
+    assert isinstance(cell, int | float)
+    return float(cell)
+
+
+def test_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gains, "_DURATION", 2.5)
+    monkeypatch.setattr(gains, "_PICTURES", 1)
+    laboratory = InProcessLaboratory(tmp_path)
+
+    findings = gains.STUDY.conduct(laboratory)
+
+    table = by_key(findings, 2)
+    error, late, theory = "joint error (rad)", "knee lag (ms)", "by theory (ms)"
+    following = {name: table[name, "clip"] for name, _ in table}
+    normal = following["normal stiffness"]
+    assert number(following["small stiffness"][error]) > 2.0 * number(normal[error])
+    assert number(following["large stiffness"][error]) < 0.5 * number(normal[error])
+    assert number(following["large damping"][error]) > 2.0 * number(normal[error])
+    assert all(abs(number(row[late])) < 30.0 for row in following.values())
+    # without the reference's velocity it lags by what the damping holds back
+    for name in ("normal stiffness", "small damping"):
+        row = table[name, "zero"]
+        assert number(row[late]) == pytest.approx(number(row[theory]), abs=15.0)
+        assert number(row[error]) > number(following[name][error])
+    assert number(table["normal stiffness", "zero"][late]) > 60.0
+    assert len(laboratory.cases) == gains.STUDY.runs
+    assert set(findings.figures) == {"gains", "gains_poses"}
+
+
+def test_delay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delay, "_DURATION", 1.0)
+    monkeypatch.setattr(delay, "_RATES", (240, 960))
+    monkeypatch.setattr(delay, "_DELAYS", (0, 1, 4))
+
+    findings = delay.STUDY.conduct(InProcessLaboratory(tmp_path))
+
+    table = by_key(findings, 2)
+    error, growth = "mean joint error (rad)", "growth a tick by theory"
+    stable = {key for key, row in table.items() if number(row[growth]) < 1.0}
+    assert stable == {(240, 0), (960, 0), (960, 1)}
+    assert all(number(table[key][error]) < 0.1 for key in stable)
+    for rate, late in set(table) - stable:
+        assert number(table[rate, late][error]) > 1.3 * number(table[rate, 0][error])
+    assert [key for key, row in table.items() if row["diverged"]] == [(240, 4), (960, 4)]
+    assert table[240, 4]["delay (ms)"] == pytest.approx(1000.0 / 60.0)
+
+
+def test_assistance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(assistance, "_DURATION", 1.1)
+    monkeypatch.setattr(assistance, "_STRENGTHS", (1.0, 0.01, 0.0))
+    monkeypatch.setattr(assistance, "_PICTURES", 1)
+    laboratory = InProcessLaboratory(tmp_path)
+
+    findings = assistance.STUDY.conduct(laboratory)
+
+    table = by_key(findings, 1)
+    falls, force = "falls at (s)", "root force / weight until then"
+    assert table["x 1",][falls] is None
+    assert 0.5 < number(table["none",][falls]) <= number(table["x 0.01",][falls]) < 1.1
+    assert number(table["x 1",][force]) > number(table["x 0.01",][force]) > 0.0
+    assert table["none",][force] == 0.0
+    # a root that is commanded, by nothing, and one that may not be
+    assert list(table["x 0",].values())[1:] == list(table["none",].values())[1:]
+    assert any("the same states" in note for note in findings.notes)
+
+
+def test_weaker_assistance_keeps_its_damping_ratio() -> None:
+    whole = character("humanoid")
+    full, weak = (assistance.weakened(whole, strength) for strength in (1.0, 0.04))
+
+    for name in ("root", "root_r"):
+        p, d = f"gains.{name}.p", f"gains.{name}.d"
+        assert full[p] == whole.gains[name].stiffness
+        assert number(weak[p]) == pytest.approx(0.04 * number(full[p]))
+        # kd^2 / kp
+        assert number(weak[d]) ** 2 / number(weak[p]) == pytest.approx(
+            number(full[d]) ** 2 / number(full[p])
+        )
+
+
+def test_clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clips, "_DURATION", 3.0)
+    monkeypatch.setattr(clips, "_PICTURES", 1)
+    monkeypatch.setattr(clips, "available_clips", lambda _: ["crawl", "kick", "walk"])
+
+    findings = clips.STUDY.conduct(InProcessLaboratory(tmp_path))
+
+    table = by_key(findings, 1)
+    for row in table.values():
+        assert 0.01 < number(row["mean joint error (rad)"]) <= number(row["bound (rad)"])
+        assert number(row["largest joint error (rad)"]) > number(row["mean joint error (rad)"])
+        assert row["fell"] is False
+    assert {clip for (clip,), row in table.items() if row["down in the capture"]} == {"crawl"}
+    assert {clip for (clip,), row in table.items() if row["loops"]} == {"crawl", "walk"}
+
+
+def test_a_clip_without_assistance_is_told_to_fall(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = character("humanoid")
+    laboratory = InProcessLaboratory(tmp_path)
+    run = laboratory.run
+
+    def unassisted(case: Case) -> Outcome:
+        return run(replace(case, duration=1.5, controller={"root_assistance": False}))
+
+    monkeypatch.setattr(laboratory, "run", unassisted)
+
+    assert clips._track(laboratory, whole, "walk").falls

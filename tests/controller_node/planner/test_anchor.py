@@ -1,0 +1,115 @@
+"""The reference's place: it gives way to a character that was pushed, and comes back."""
+
+import math
+
+import numpy as np
+import pytest
+
+from controller_node.planner.anchor import Anchor, Balance, balance_of
+from controller_node.planner.contact_model import ContactModel
+from msgs_config.arrays import FloatArray
+from msgs_config.geometry import rotations
+from tests.support.physics import character
+
+PERIOD = 0.05
+HUMANOID = character("humanoid")
+MODEL = ContactModel(HUMANOID, period_s=1 / 240, gravity=9.81, friction=0.45)
+STILL = Balance(0j, 0j, 0.0)
+
+
+def pushed(error: complex, *, heading: float = 0.0, velocity: complex = 0j) -> Balance:
+    """A character away from a reference that stands at the origin."""
+    return Balance(error, velocity, heading)
+
+
+def random_state(seed: int) -> tuple[FloatArray, FloatArray]:
+    """MuJoCo's position (q,) and velocity (n,)."""
+    draw = np.random.default_rng(seed)
+    position = np.array(HUMANOID.rest_position) + draw.normal(size=HUMANOID.layout.size)
+    return MODEL.position_of(position), draw.normal(size=HUMANOID.layout.size)
+
+
+def test_undisturbed_it_stays_where_it_is_to_the_last_bit() -> None:
+    anchor = Anchor()
+    for tick in range(200):
+        anchor = anchor.follow(pushed(0.2 + 0.1j, velocity=0.4j), STILL, tick * PERIOD, PERIOD)
+    position, velocity = random_state(0)
+
+    seen, moving = anchor.into(position, velocity)
+
+    assert anchor == Anchor()
+    assert seen is position
+    assert moving is velocity
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_state_is_seen_from_the_references_world(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    anchor = Anchor(complex(*draw.normal(size=2)), draw.normal())
+    position, velocity = random_state(seed)
+
+    seen, moving = anchor.into(position, velocity)
+
+    turn = rotations.about_z(anchor.yaw)
+    shift = np.array((anchor.place.real, anchor.place.imag, 0.0))
+    np.testing.assert_allclose(rotations.rotate(turn, seen[:3]) + shift, position[:3], atol=1e-12)
+    np.testing.assert_allclose(rotations.rotate(turn, moving[:3]), velocity[:3], atol=1e-12)
+    turned = rotations.multiply(turn, rotations.xyzw_from_wxyz(seen[3:7]))
+    again = rotations.angle_between(turned, rotations.xyzw_from_wxyz(position[3:7]))
+    assert float(again) == pytest.approx(0.0, abs=1e-7)
+    assert seen[7:].tobytes() == position[7:].tobytes()
+    assert moving[3:].tobytes() == velocity[3:].tobytes()
+
+
+def test_pushed_away_it_follows_and_turns() -> None:
+    # Arrange: the character stays where it was pushed to, in the world
+    where, heading = 0.6 + 0.5j, 0.8
+    anchor = Anchor()
+
+    def look(time: float) -> Anchor:
+        inside = (where - anchor.place) * complex(math.cos(anchor.yaw), -math.sin(anchor.yaw))
+        return anchor.follow(pushed(inside, heading=heading - anchor.yaw), STILL, time, PERIOD)
+
+    # Act
+    places, yaws = [0j], [0.0]
+    for tick in range(200):
+        anchor = look(tick * PERIOD)
+        places.append(anchor.place)
+        yaws.append(anchor.yaw)
+
+    # Assert: it comes near, and never further off than what it takes for calm
+    assert min(abs(where - place) for place in places) < 0.05
+    assert abs(where - places[-1]) < 0.3
+    assert 0.3 < max(yaws) < heading
+
+
+def test_the_way_back_leads_to_the_clips_own_place_and_heading() -> None:
+    anchor = Anchor(0.5 - 0.3j, 0.7)
+    walking, away = 0j, list[complex]()
+    for tick in range(400):
+        walking += 1.2 * PERIOD
+        at_ease = Balance(walking, 1.2, 0.0)
+        turn = complex(math.cos(anchor.yaw), math.sin(anchor.yaw))
+        before = turn * walking + anchor.place
+        anchor = anchor.follow(at_ease, at_ease, tick * PERIOD, PERIOD)
+        turn = complex(math.cos(anchor.yaw), math.sin(anchor.yaw))
+        away.append(turn * walking + anchor.place - walking)
+        assert abs(away[-1] + walking - before) <= 0.15 * PERIOD + 1e-12
+
+    assert abs(anchor.yaw) < 0.02
+    assert abs(away[-1]) < 0.05
+
+
+def test_a_balance_is_read_off_a_state() -> None:
+    position, _ = random_state(5)
+    root = rotations.multiply(rotations.about_z(0.4), rotations.ABOUT_X_QUARTER_TURN_XYZW)
+    position[3:7] = rotations.wxyz_from_xyzw(root)
+
+    found = balance_of(position, np.array((3.0, 4.0, 5.0)), np.array((1.0, 2.0, 0.9)))
+
+    assert found.centre == 1.0 + 2.0j
+    assert found.velocity == 3.0 + 4.0j
+    upright = position.copy()
+    upright[3:7] = rotations.wxyz_from_xyzw(rotations.ABOUT_X_QUARTER_TURN_XYZW)
+    straight = balance_of(upright, np.zeros(3), np.zeros(3))
+    assert found.heading - straight.heading == pytest.approx(0.4)

@@ -1,0 +1,50 @@
+"""The soak in short: what `make soak` does for half a million ticks."""
+
+import itertools
+
+import pytest
+
+from msgs_config.runtime.polling import DirectSubscription
+from tests.endurance import soak as soak_module
+from tests.endurance import soak_findings
+from tests.endurance.soak import soak
+
+
+@pytest.mark.slow
+def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del domain  # the processes inherit it
+    monkeypatch.setattr(soak_findings, "SETTLED", 2_000)
+    for module in (soak_module, soak_findings):
+        monkeypatch.setattr(module, "MEMORY_PERIOD", 500)
+
+    found = soak(5_000, seed=2, progress=lambda tick: None)
+
+    assert found.problems == []
+    assert found.ticks == 5_000
+    assert all(len(samples) == 11 for samples in found.memory.values())
+    assert set(found.growth) == {"sim_node", "controller_node"}
+    assert set(found.disturbances) == {"push", "pause", "reset", "set_gain", "set_duration"}
+
+
+def test_a_tick_that_is_lost_is_found(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    del domain
+
+    class Leaky(DirectSubscription):
+        """Loses the 300th message that it takes."""
+
+        def __init__(self, *arguments: object) -> None:
+            super().__init__(*arguments)
+            self._taken = itertools.count(1)
+
+        def take(self) -> bytes | None:
+            raw = super().take()
+            return super().take() if raw is not None and next(self._taken) == 300 else raw
+
+    monkeypatch.setattr(soak_module, "DirectSubscription", Leaky)
+
+    found = soak(600, seed=2, progress=lambda tick: None)
+
+    (problem,) = found.problems
+    assert problem.startswith("after tick 299 comes")

@@ -1,0 +1,52 @@
+"""A subscription whose messages are taken one by one: what it keeps, and what it says it drops."""
+
+import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import String
+
+from msgs_config.messages.joint_state import decode
+from msgs_config.messages.topics import Topic
+from msgs_config.runtime.polling import DirectSubscription, Spinner
+from tests.support.ros import wait_until
+
+DEPTH = 5
+
+
+@pytest.mark.parametrize(("depth", "said"), [(DEPTH, True), (1, False)])
+def test_of_more_than_it_keeps_the_oldest_go_and_that_is_said_once(
+    context: Context, capfd: pytest.CaptureFixture[str], depth: int, said: bool
+) -> None:
+    # Arrange
+    topic = Topic("flood", String, QoSProfile(depth=depth))
+    speaker, listener = (Node(name, context=context) for name in ("speaker", "listener"))
+    publisher = speaker.create_publisher(String, "flood", QoSProfile(depth=100))
+    subscription, spinner = DirectSubscription(listener, topic), Spinner(listener)
+    try:
+        wait_until(publisher.get_subscription_count, "a listener", step=spinner.serve_pending)
+
+        # Act: the executor takes what nobody takes from it
+        for number in range(4 * DEPTH):
+            publisher.publish(String(data=str(number)))
+            wait_until(
+                lambda number=number: newest(subscription) == number,
+                f"message {number}",
+                step=spinner.serve_pending,
+            )
+
+        # Assert
+        kept = [int(decode(raw, String).data) for raw in iter(subscription.take, None)]
+    finally:
+        spinner.close()
+        for node in (speaker, listener):
+            node.destroy_node()
+    assert kept == list(range(4 * DEPTH))[-depth:]
+    assert subscription.dropped == (3 * DEPTH if said else 0)
+    assert capfd.readouterr().err.count("the oldest are dropped") == said
+
+
+def newest(subscription: DirectSubscription) -> int | None:
+    """The number in the newest message that waits; None if none does."""
+    waiting = subscription._pending
+    return int(decode(waiting[-1].raw, String).data) if waiting else None

@@ -1,0 +1,45 @@
+"""Every golden run has the states that the table says, on this machine as on every other."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.support import golden
+
+TABLE = golden.golden()
+QUICK = {"kuka_hold", "pendulum", "walk_reconstructed"}
+OVER_TOPICS = ["reactive_hit", "walk_480_delay", "panda_sine", "walk_reconstructed"]  # of each kind
+
+pytestmark = pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT)
+
+
+def test_the_engines_are_those_of_the_table() -> None:
+    expected = {name: TABLE["made_with"][name] for name in golden.ENGINES}
+
+    assert golden.engines() == expected, "another engine may have other bits: make hashes"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in TABLE["runs"]],
+)
+def test_a_golden_run_has_the_states_of_the_table(name: str, tmp_path: Path) -> None:
+    summary = golden.summary_here(TABLE["runs"][name]["arguments"], tmp_path / "run")
+
+    assert_as_in_the_table(name, summary)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OVER_TOPICS)
+def test_over_topics_it_has_them_too(name: str, domain: int, tmp_path: Path) -> None:
+    del domain
+
+    summary = golden.summary_over_topics(TABLE["runs"][name]["arguments"], tmp_path / "run")
+
+    assert_as_in_the_table(name, summary)
+
+
+def assert_as_in_the_table(name: str, summary: dict[str, object]) -> None:
+    wanted = {key: value for key, value in TABLE["runs"][name].items() if key != "arguments"}
+    found = {key: summary[key] for key in wanted}
+    assert found == wanted, f"made with {TABLE['made_with']}, here {golden.made_with()}"

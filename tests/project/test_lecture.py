@@ -1,0 +1,29 @@
+"""docs/lecture.md: what it points at is there, and every study is in it."""
+
+import re
+from pathlib import Path
+
+from actuated_characters.studies.catalogue import NAMES
+
+PROJECT = Path(__file__).parents[2]
+TEXT = (PROJECT / "docs/lecture.md").read_text("utf-8")
+
+
+def test_every_picture_is_there() -> None:
+    pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", TEXT)
+
+    assert len(pictures) >= len(NAMES)
+    assert [name for name in pictures if not (PROJECT / "docs" / name).is_file()] == []
+
+
+def test_every_study_is_in_it() -> None:
+    assert [name for name in NAMES if f"study {name}`" not in TEXT] == []
+
+
+def test_every_file_that_it_names_exists() -> None:
+    files = re.findall(
+        r"`((?:controller|sim)_node/[\w/]+\.py|actuated_characters/[\w/]+\.py)`", TEXT
+    )
+
+    assert len(files) > 5
+    assert [file for file in files if not (PROJECT / file).is_file()] == []

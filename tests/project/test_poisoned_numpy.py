@@ -1,0 +1,71 @@
+"""Golden runs keep their states whatever kernels numpy has: poisoned ones, or other ones."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support import golden
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT),
+]
+
+TABLE = golden.golden()["runs"]
+OF_EVERY_KIND = ["walk_480_delay", "reactive_hit", "panda_sine", "walk_reconstructed"]
+SENSITIVE = "walk_explicit_pd_2khz"  # blows up the last bits of a rotation
+FEATURES: list[str] = np._core._multiarray_umath.__cpu_dispatch__
+
+# Every function whose last bits are numpy's choice gives the next double but one.
+POISON = """
+import math
+import numpy as np
+
+ELEMENTARY = (
+    "sin cos tan sinh cosh tanh arcsin arccos arctan arctan2 exp exp2 expm1 log log2 log10 log1p "
+    "power float_power hypot cbrt"
+).split()
+PRODUCTS = "dot vdot inner matmul tensordot einsum trace convolve interp".split()
+
+def poisoned(function):
+    def off(*arguments, **options):
+        result = function(*arguments, **options)
+        if getattr(result, "dtype", None) == float:
+            result = result * (1.0 + 2.0**-51)
+        return result
+    return off
+
+for owner, names in (
+    (np, ELEMENTARY + PRODUCTS),
+    (np.linalg, [name for name in np.linalg.__all__ if name.islower()]),
+):
+    for name in names:
+        setattr(owner, name, poisoned(getattr(owner, name)))
+assert np.sin(np.float64(1.0)) != math.sin(1.0)
+assert np.linalg.norm(np.ones(1)) != 1.0
+"""
+
+
+@pytest.mark.parametrize("name", OF_EVERY_KIND)
+def test_no_kernel_that_is_numpys_choice_takes_part(name: str, tmp_path: Path) -> None:
+    summary = golden.summary_apart(TABLE[name]["arguments"], tmp_path / "run", before=POISON)
+
+    assert summary["state_hash"] == TABLE[name]["state_hash"]
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        *({"NPY_DISABLE_CPU_FEATURES": " ".join(FEATURES[at:])} for at in range(len(FEATURES))),
+        {"OPENBLAS_CORETYPE": "Nehalem"},
+        {"OPENBLAS_CORETYPE": "Haswell"},
+    ],
+    ids=lambda environment: "-".join(environment.values()).replace(" ", "-"),
+)
+def test_the_processors_kernels_do_not_matter(environment: dict[str, str], tmp_path: Path) -> None:
+    run = TABLE[SENSITIVE]
+
+    summary = golden.summary_apart(run["arguments"], tmp_path / "run", environment=environment)
+
+    assert summary["state_hash"] == run["state_hash"]

@@ -1,0 +1,66 @@
+"""The README says what the code does: its topics, its commands, its controller in 40 lines."""
+
+import math
+import re
+import shlex
+import signal
+from pathlib import Path
+
+import pytest
+
+from actuated_characters.bags.reader import read_messages
+from actuated_characters.cli import _parser
+from msgs_config.messages import topics
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+DESIGN = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+
+
+def _type_name(message_type):
+    return f"{message_type.__module__.split('.')[0]}/{message_type.__name__}"
+
+
+@pytest.mark.parametrize("text", [README, DESIGN], ids=["README", "design"])
+def test_every_topic_stands_in_the_table_with_its_type(text):
+    for topic in vars(topics).values():
+        if isinstance(topic, topics.Topic):
+            row = rf"\| `{re.escape(topic.name)}` \| {_type_name(topic.message_type)} \|"
+            assert re.search(row, text), topic.name
+
+
+def test_every_command_line_of_the_readme_is_one_that_the_parser_takes():
+    text = README.replace("\\\n", " ")  # a line that goes on
+    lines = re.findall(r"^\.venv/bin/actuated_characters ([^#\n]*)", text, flags=re.MULTILINE)
+    assert len(lines) >= 5
+    for line in lines:
+        assert _parser().parse_args(shlex.split(line)).command
+
+
+def test_every_make_target_of_the_readme_exists():
+    targets = set(re.findall(r"^make (\w+)", README, flags=re.MULTILINE))
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert targets >= {"demo", "test", "bench"}
+    for target in targets:
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+@pytest.mark.slow
+def test_the_controller_of_the_readme_holds_the_pendulum_at_its_target(tmp_path, processes):
+    code = re.search(r"```python\n(.*?)```", README, flags=re.DOTALL)[1]
+    assert len(code.splitlines()) <= 40
+    (tmp_path / "swing.py").write_text(code, encoding="utf-8")
+
+    processes.python("swing.py")
+    recorder = processes.node("recorder", directory=str(tmp_path / "recording"))
+    simulator = processes.simulator(max_ticks=1200, wait_for_subscribers=2)
+    assert simulator.wait() == 0
+    recorder.send(signal.SIGINT)
+    assert recorder.wait() == 0
+
+    messages = read_messages(tmp_path / "recording" / "bag", ["/joint_states"])
+    last = [message.decode() for message in messages][-1]
+    # where PD with gravity, m g l / 2 sin(angle) = kp (target - angle), comes to rest
+    angle = last.position[0]
+    assert last.velocity[0] == pytest.approx(0.0, abs=1e-6)
+    assert 50.0 * (1.0 - angle) == pytest.approx(9.81 * 0.5 * math.sin(angle), rel=1e-6)

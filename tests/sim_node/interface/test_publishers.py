@@ -1,0 +1,432 @@
+"""What the simulator publishes beside the states, checked against them and by other means."""
+
+import itertools
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from rclpy.context import Context
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import Marker
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.model import ShapeType
+from msgs_config.messages import topics
+from msgs_config.messages.clock import TickClock
+from tests.support.physics import FLOATING_TURNED_FRAMES, character, simulation
+from tests.support.ros import Inbox, Processes, SimulatorClient, stamp_ns, tick_of, wrench_message
+
+CLOCK = TickClock(240)
+SOON = 0.05  # s, a republish period for tests that wait for repeated states
+STEADY = 1e-9  # of numbers of order one that are computed in two ways
+
+
+def turn_matrix(rotation_vector: FloatArray) -> FloatArray:
+    """The rotation matrix (3, 3), by Rodrigues' formula."""
+    angle = float(np.linalg.norm(rotation_vector))
+    x, y, z = rotation_vector / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix: FloatArray = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return matrix
+
+
+def quaternion_matrix(x: float, y: float, z: float, w: float) -> FloatArray:
+    """The rotation matrix (3, 3) of a quaternion."""
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def vector(message: object) -> FloatArray:
+    """A Point or a Vector3."""
+    return np.array([getattr(message, axis) for axis in "xyz"])
+
+
+def orientation(message: object) -> FloatArray:
+    return np.array([getattr(message, axis) for axis in "xyzw"])
+
+
+# Odometry
+
+
+def test_odometry_is_the_base_link_its_twist_in_its_own_frame(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    whole = character(FLOATING_TURNED_FRAMES)
+    rng = np.random.default_rng(1)
+    velocity = rng.uniform(-2.0, 2.0, whole.layout.size)
+    position = np.array(whole.rest_position)
+    position[:6] += rng.uniform(-1.0, 1.0, 6)
+    odometry = client.listen(topics.ODOM)
+    processes.simulator(
+        FLOATING_TURNED_FRAMES,
+        initial_position=position.tolist(),
+        initial_velocity=velocity.tolist(),
+        wait_for_subscribers=1,
+    )
+
+    client.drive(client.first_state(), 30, rng)
+    client.spin_until(lambda: 31 in odometry.ticks(), "odometry")
+
+    states = client.states.by_tick()
+    assert set(odometry.ticks()) >= set(range(10, 32))
+    for message in odometry.messages:
+        state = states[tick_of(message)]
+        assert (message.header.frame_id, message.child_frame_id) == ("world", whole.links[0].name)
+        turn = turn_matrix(np.array(state.position[3:6]))
+        pose, twist = message.pose.pose, message.twist.twist
+        np.testing.assert_allclose(vector(pose.position), state.position[:3], atol=STEADY)
+        np.testing.assert_allclose(
+            quaternion_matrix(*orientation(pose.orientation)), turn, atol=STEADY
+        )
+        np.testing.assert_allclose(
+            turn @ vector(twist.linear), np.array(state.velocity[:3]), atol=STEADY
+        )
+        np.testing.assert_allclose(vector(twist.angular), state.velocity[3:6], atol=STEADY)
+
+
+def test_odometry_of_a_fixed_base_stands_still_where_it_was_placed(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    odometry = client.listen(topics.ODOM)
+    processes.simulator(placement=[1.0, 2.0, 3.0, 0.5], wait_for_subscribers=1)
+
+    client.drive(client.first_state(), 10, np.random.default_rng(1))
+    client.spin_until(lambda: 11 in odometry.ticks(), "odometry")
+
+    pose, twist = odometry.last.pose.pose, odometry.last.twist.twist
+    np.testing.assert_allclose(vector(pose.position), (1.0, 2.0, 3.0), atol=STEADY)
+    quarter = (0.0, 0.0, np.sin(0.25), np.cos(0.25))
+    np.testing.assert_allclose(orientation(pose.orientation), quarter, atol=STEADY)
+    assert not any((*vector(twist.linear), *vector(twist.angular)))
+
+
+# Contacts, and what a tick consists of
+
+
+def test_contacts_name_the_links_that_touch_and_carry_the_weight(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    contacts = client.listen(topics.CONTACTS)
+    processes.simulator("humanoid", wait_for_subscribers=2)
+    processes.controller("humanoid", root_assistance=False)
+    client.state(60)
+
+    client.spin_until(lambda: 60 in contacts.ticks(), "contacts")
+
+    whole = character("humanoid")
+    by_tick = contacts.by_tick()
+    settled = [by_tick[tick] for tick in range(20, 60)]
+    assert {name for message in settled for name in message.joint_names} == {
+        "left_ankle",
+        "right_ankle",
+    }
+    assert {message.header.frame_id for message in settled} == {client.state(1).header.frame_id}
+    forces = [sum(vector(wrench.force) for wrench in message.wrench) for message in settled]
+    weight = whole.mass * 9.81
+    assert np.mean(forces, axis=0)[2] == pytest.approx(weight, rel=0.2)
+
+
+@pytest.mark.parametrize("substeps", [1, 2])
+def test_contacts_carry_the_whole_wrench_on_each_link(
+    processes: Processes, client: SimulatorClient, substeps: int
+) -> None:
+    contacts = client.listen(topics.CONTACTS)
+    processes.simulator("humanoid", substeps=substeps, wait_for_subscribers=1)
+
+    client.drive(client.first_state(), 60, np.random.default_rng(3))
+    client.spin_until(lambda: 61 in contacts.ticks(), "contacts")
+
+    names = [link.name for link in character("humanoid").links]
+    by_tick, rng, largest = contacts.by_tick(), np.random.default_rng(3), 0.0
+    with simulation("humanoid", substeps=substeps) as run:
+        run.watches_contacts = True
+        for tick in range(2, 62):
+            effort = np.zeros(run.layout.size)
+            effort[6:] = rng.uniform(-20.0, 20.0, run.layout.size - 6)
+            run.advance(effort)
+            if tick not in by_tick:  # before the simulator knew of the listener
+                continue
+            expected = run.actor.contacts
+            assert expected is not None
+            rows = [names.index(name) for name in by_tick[tick].joint_names]
+            assert rows == np.flatnonzero(expected.touching).tolist()
+            for row, wrench in zip(rows, by_tick[tick].wrench, strict=True):
+                assert vector(wrench.force).tolist() == expected.wrenches[row, :3].tolist()
+                assert vector(wrench.torque).tolist() == expected.wrenches[row, 3:].tolist()
+                largest = max(largest, float(np.abs(vector(wrench.torque)).max()))
+    assert largest > 1.0
+
+
+def test_contacts_come_at_every_tick_also_where_nothing_touches(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    contacts = client.listen(topics.CONTACTS)
+    processes.simulator(FLOATING_TURNED_FRAMES, wait_for_subscribers=1)
+
+    client.drive(client.first_state(), 20, np.random.default_rng(1))
+    client.spin_until(lambda: 21 in contacts.ticks(), "contacts")
+
+    assert set(contacts.ticks()) >= set(range(10, 22))
+    assert not any(message.joint_names or message.wrench for message in contacts.messages)
+
+
+def test_a_tick_is_published_in_the_order_clock_contacts_pushes_state(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    inboxes = [client.listen(topics.CONTACTS), client.listen(topics.APPLIED_WRENCH), client.states]
+    processes.simulator("humanoid", wait_for_subscribers=1)
+
+    client.drive(client.first_state(), 40, np.random.default_rng(1))
+    for inbox in inboxes:
+        client.spin_until(lambda inbox=inbox: 41 in inbox.ticks(), "all of a tick")
+
+    sent = [dict(zip(inbox.ticks(), inbox.sent_ns, strict=True)) for inbox in inboxes]
+    clock = {
+        round((m.clock.sec + 1e-9 * m.clock.nanosec) * 240): sent_ns
+        for m, sent_ns in zip(client.clock.messages, client.clock.sent_ns, strict=True)
+    }
+    for tick in range(20, 42):  # every one of them
+        times = [clock[tick], *(of_topic[tick] for of_topic in sent)]
+        assert times == sorted(times)
+    stamps = [{stamp_ns(m) for m in inbox.messages if tick_of(m) >= 20} for inbox in inboxes]
+    assert stamps[0] == stamps[1] == stamps[2]
+
+
+# What is shown
+
+
+@pytest.mark.parametrize("name", ["pendulum", "humanoid"])
+def test_the_robot_description_is_latched_where_the_urdf_is_a_legal_one(
+    processes: Processes, client: SimulatorClient, name: str
+) -> None:
+    processes.simulator(name)
+    client.first_state()
+    descriptions = client.listen(topics.ROBOT_DESCRIPTION)
+
+    client.spin_until(lambda: client.configuration.messages, "what else is latched")
+    if name == "humanoid":  # it has ball joints
+        assert not client.node.get_publishers_info_by_topic("/robot_description")
+        return
+
+    client.spin_until(lambda: descriptions.messages, "the description")
+    assert descriptions.last.data.startswith("<robot")
+    assert 'name="hinge"' in descriptions.last.data
+
+
+TYPES = {
+    ShapeType.BOX: [Marker.CUBE],
+    ShapeType.SPHERE: [Marker.SPHERE],
+    ShapeType.CYLINDER: [Marker.CYLINDER],
+    ShapeType.CAPSULE: [Marker.CYLINDER, Marker.SPHERE, Marker.SPHERE],
+    ShapeType.MESH: [Marker.MESH_RESOURCE],
+}
+
+
+@pytest.mark.parametrize("name", ["pendulum", "humanoid", "franka_panda"])
+def test_markers_are_the_shapes_of_the_links_where_the_other_engine_has_them(
+    processes: Processes, client: SimulatorClient, name: str
+) -> None:
+    markers = client.listen(topics.VISUALIZATION)
+    processes.simulator(name, republish_period=SOON, wait_for_subscribers=1)
+    whole = character(name)
+
+    state = client.drive(client.first_state(), 40, np.random.default_rng(1))
+    shown = client.spin_until(lambda: _of_stamp(markers, state), "markers of the last state")
+
+    shapes = [(row, shape) for row, link in enumerate(whole.links) for shape in link.shapes]
+    assert [m.type for m in shown] == [t for _, shape in shapes for t in TYPES[shape.type]]
+    assert len({(m.ns, m.id) for m in shown}) == len(shown)
+    assert {(m.header.frame_id, m.action) for m in shown} == {("world", Marker.ADD)}
+    assert all(m.color.a > 0.0 and min(vector(m.scale)) > 0.0 for m in shown)
+    model = DynamicsModel(whole)
+    model.update(np.array(state.position), np.array(state.velocity))
+    origins, turns = model.link_poses()
+    firsts = itertools.accumulate((len(TYPES[shape.type]) for _, shape in shapes), initial=0)
+    for (row, shape), first in zip(shapes, firsts, strict=False):
+        axes = quaternion_matrix(*turns[row])
+        place = origins[row] + axes @ np.array(shape.pose.position)
+        turn = axes @ quaternion_matrix(*shape.pose.orientation_xyzw)
+        pose = shown[first].pose
+        np.testing.assert_allclose(vector(pose.position), place, atol=1e-6)
+        np.testing.assert_allclose(
+            quaternion_matrix(*orientation(pose.orientation)), turn, atol=1e-6
+        )
+        if shape.type is ShapeType.CAPSULE:
+            radius, length = shape.size
+            ends = [vector(m.pose.position) for m in shown[first + 1 : first + 3]]
+            np.testing.assert_allclose((ends[0] + ends[1]) / 2.0, place, atol=1e-6)
+            np.testing.assert_allclose(ends[0] - ends[1], turn[:, 2] * length, atol=1e-6)
+            assert vector(shown[first].scale) == pytest.approx([2 * radius, 2 * radius, length])
+            assert vector(shown[first + 1].scale) == pytest.approx([2 * radius] * 3)
+
+
+def _of_stamp(markers: Inbox, state: JointState) -> list[Marker] | None:
+    stamp = stamp_ns(state)
+    found = [m.markers for m in markers.messages if stamp_ns(m.markers[0]) == stamp]
+    return found[-1] if found else None
+
+
+def test_markers_come_at_their_own_rate_of_simulated_time(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    markers = client.listen(topics.VISUALIZATION)
+    processes.simulator(display_rate=24.0, republish_period=60.0, wait_for_subscribers=1)
+
+    client.drive(client.first_state(), 60, np.random.default_rng(1))
+
+    client.spin_until(lambda: tick_of(markers.last.markers[0]) == 60, "the last markers")
+    ticks = [tick_of(message.markers[0]) for message in markers.messages]
+    assert set(ticks) <= {1, 10, 20, 30, 40, 50, 60}
+    assert ticks[-4:] == [30, 40, 50, 60]
+
+
+# Diagnostics
+
+
+def test_the_diagnostics_say_how_it_goes(processes: Processes, client: SimulatorClient) -> None:
+    processes.simulator("humanoid", max_ticks=30, real_time_factor=1.0, wait_for_subscribers=1)
+    state = client.first_state()
+    client.wrenches.publish(wrench_message(CLOCK.stamp_ns(20), [("chest", [1.0] * 6)]))
+    for _ in range(30):
+        state = client.answer(state, {"right_knee": -1000.0, "chest_x": 150.0, "chest_y": 150.0})
+
+    status = client.reported(tick=31, accepted=30, accepted_pushes=1, rejected_pushes=0)
+
+    values = {item.key: item.value for item in status.values}
+    assert (status.name, status.level, status.message) == ("sim_node", status.OK, "running")
+    assert (values["episode"], values["paused"], values["timeouts"]) == ("1", "False", "0")
+    assert values["saturated_ticks"] == "60"
+    assert set(values["saturated"].split()) == {"chest", "right_knee"}
+    for name in ("duplicate", "conflict", "stale", "future", "rejected"):
+        assert values[name] == "0"
+    for name in ("ticks_per_s", "tick_us_p50", "tick_us_p99", "late_us_p50", "late_us_p99"):
+        assert float(values[name]) >= 0.0
+    assert int(values["missed_deadlines"]) >= 0
+
+
+# Several characters
+
+
+@contextmanager
+def beside(context: Context, name: str) -> Iterator[SimulatorClient]:
+    other = SimulatorClient(context, f"beside_{name}", below=name)
+    try:
+        yield other
+    finally:
+        other.close()
+
+
+def two(**parameters: object) -> dict[str, object]:
+    """Parameters of a simulator of a humanoid on the left and a pendulum on the right."""
+    return {
+        "characters": ["left", "right"],
+        "left.character": "humanoid",
+        "right.character": "pendulum",
+        "right.placement": [2.0, 0.0, 0.0, 0.0],
+        "wait_for_subscribers": 1,
+        **parameters,
+    }
+
+
+def test_several_characters_have_topics_of_their_own_and_one_barrier_and_clock(
+    processes: Processes, context: Context
+) -> None:
+    with beside(context, "left") as left, beside(context, "right") as right:
+        processes.node(topics.SIM_NODE, **two(republish_period=SOON))
+        first_left, first_right = left.first_state(), right.first_state()
+
+        state = first_left
+        for tick in range(1, 6):
+            motors = [name for name in state.name if not name.startswith("root_")]
+            left.command(stamp_ns(state), dict.fromkeys(motors, 0.5))
+            enough = len(left.states) + 3  # republished: it waits for the other
+            left.spin_until(lambda enough=enough: len(left.states) >= enough, "repeated states")
+            assert tick_of(left.states.last) == tick
+            right.command(stamp_ns(state), {"hinge": -0.25})
+            state = left.state(tick + 1)
+            assert stamp_ns(right.state(tick + 1)) == stamp_ns(state)
+
+        assert tuple(first_left.name) == character("humanoid").layout.dof_names
+        assert list(first_right.name) == ["hinge"]
+        assert list(right.state(6).effort) == [-0.25]
+        assert set(left.state(6).effort) == {0.0, 0.5}
+        clock = [(m.clock.sec, m.clock.nanosec) for m in left.clock.messages]
+        assert len(clock) == len(set(clock))  # not one a character
+        assert len(left.node.get_publishers_info_by_topic("/clock")) == 1
+        for one, name, whole in ((left, "left", "humanoid"), (right, "right", "pendulum")):
+            one.spin_until(lambda one=one: one.configuration.messages, "configuration")
+            content = json.loads(one.configuration.last.data)
+            assert content["character"] == whole
+            assert len(content["parameters"]["initial_position"]) == len(one.states.last.name)
+            assert stamp_ns(one.episodes.last) == CLOCK.stamp_ns(1)
+            status = one.spin_until(lambda one=one, name=name: _status(one, name), "its report")
+            assert status.level == status.OK
+
+
+def _status(client: SimulatorClient, name: str) -> object:
+    statuses = [status for m in client.diagnostics.messages for status in m.status]
+    return next((s for s in statuses if s.name == f"{name}/sim_node"), None)
+
+
+def test_each_of_several_characters_is_pushed_shown_and_driven_by_its_own(
+    processes: Processes, context: Context
+) -> None:
+    with beside(context, "left") as left, beside(context, "right") as right:
+        applied = left.listen(topics.APPLIED_WRENCH.under("left"))
+        others = right.listen(topics.APPLIED_WRENCH.under("right"))
+        odometry = right.listen(topics.ODOM.under("right"))
+        simulator = processes.node(
+            topics.SIM_NODE, **two(max_ticks=120, wait_for_subscribers=2, wrench_duration=0.0)
+        )
+        left.spin_until(left.wrenches.get_subscription_count, "a simulator that listens")
+        left.wrenches.publish(wrench_message(CLOCK.stamp_ns(60), [("chest", [1.0] * 6)]))
+
+        processes.controller("humanoid", namespace="left", root_assistance=False)
+        processes.controller("pendulum", namespace="right", placement=[2.0, 0.0, 0.0, 0.0])
+
+        left.spin_until(lambda: 121 in left.states.ticks(), "the last state")
+        right.spin_until(lambda: 121 in right.states.ticks(), "the last state")
+        assert simulator.wait() == 0
+        left.spin_until(lambda: 121 in applied.ticks(), "the pushes")
+        right.spin_until(lambda: 121 in others.ticks(), "the pushes")
+        right.spin_until(lambda: odometry.messages, "odometry")
+        assert [tick_of(m) for m in applied.messages if m.joint_names] == [61]
+        assert not any(m.joint_names for m in others.messages)
+        assert odometry.last.child_frame_id == f"right/{character('pendulum').links[0].name}"
+        assert odometry.last.pose.pose.position.x == pytest.approx(2.0)
+
+
+# Nobody's listening changes anything
+
+
+def test_the_states_are_the_same_whether_all_or_nothing_else_is_listened_to(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    for topic in (
+        topics.CONTACTS,
+        topics.APPLIED_WRENCH,
+        topics.ODOM,
+        topics.VISUALIZATION,
+    ):
+        client.listen(topic)
+    processes.simulator("humanoid", display_rate=240.0, substeps=2, wait_for_subscribers=1)
+
+    client.drive(client.first_state(), 150, np.random.default_rng(3))  # it falls
+
+    rng = np.random.default_rng(3)
+    messages = client.states.by_tick()
+    with simulation("humanoid", substeps=2) as run:
+        for tick in range(2, 152):
+            effort = np.zeros(run.layout.size)
+            effort[6:] = rng.uniform(-20.0, 20.0, run.layout.size - 6)
+            state = run.advance(effort)
+            assert list(messages[tick].position) == state.position.tolist()
+            assert list(messages[tick].velocity) == state.velocity.tolist()

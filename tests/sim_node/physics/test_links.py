@@ -1,0 +1,766 @@
+"""Links in the engine: where they are, what a push does to them, and what touches them.
+
+The oracles are MuJoCo's kinematics and Jacobians, and Newton's laws.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.character.bullet import pybullet
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.loading import load_character
+from msgs_config.character.model import Character, Loading
+from msgs_config.geometry import rotations
+from sim_node.physics.body import Body
+from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.wrenches import Push
+from tests.support.physics import (
+    EVERY_CHARACTER,
+    INSTANT,
+    TURNED_FRAMES,
+    LoneWorld,
+    advance,
+    character,
+    character_id,
+    free_random_state,
+    momentum,
+    simulation,
+    still_world,
+    without_self_collision,
+)
+
+ROUNDING = 1e-11
+"""Of poses of order one, which need no difference quotient."""
+
+NOISE = 1e-8
+"""Of accelerations: the rounding of speeds of order one, over an instant."""
+
+PUSHED = ["humanoid", "franka_panda", *TURNED_FRAMES]
+
+every_character = pytest.mark.parametrize("name", EVERY_CHARACTER, ids=character_id)
+pushed_characters = pytest.mark.parametrize("name", PUSHED, ids=character_id)
+
+
+# --- frames --------------------------------------------------------------------------------------
+
+
+def frames_differ(world: LoneWorld, whole: Character, model: DynamicsModel) -> tuple[float, float]:
+    """By how much, m and rad, link frames at the present state are not where MuJoCo has them."""
+    position, velocity = world.body.read()
+    model.update(position, velocity)
+    expected_origins, expected_turns = model.link_poses()
+    origins, turns = world.body.links.frames()
+    far = np.abs(origins - expected_origins).max()
+    return float(far), float(np.max(rotations.angle_between(turns, expected_turns)))
+
+
+@every_character
+def test_link_frames_are_where_mujoco_has_them(name: str) -> None:
+    # Arrange
+    whole = without_self_collision(name)
+    model, rng = DynamicsModel(whole), np.random.default_rng(1)
+    with still_world(whole) as world:
+        for _ in range(30):
+            free_random_state(world.body, whole, rng)
+
+            # Act
+            far, turned = frames_differ(world, whole, model)
+
+            # Assert
+            assert far < ROUNDING
+            assert turned < ROUNDING
+
+
+@every_character
+def test_link_frames_are_those_of_the_state_after_a_step_too(name: str) -> None:
+    # Arrange: from a random state to the ground
+    whole = without_self_collision(name)
+    model, rng = DynamicsModel(whole), np.random.default_rng(2)
+    with LoneWorld(whole, WorldSettings()) as world:
+        free_random_state(world.body, whole, rng)
+        for _ in range(240):
+            advance(world, rng.uniform(-0.5, 0.5, whole.layout.size))
+
+            # Act
+            far, turned = frames_differ(world, whole, model)
+
+            # Assert
+            assert far < ROUNDING
+            assert turned < ROUNDING
+
+
+def test_there_is_one_frame_a_link_in_the_characters_order() -> None:
+    # Arrange
+    whole = character("humanoid")
+    row = {link.name: index for index, link in enumerate(whole.links)}
+    with still_world(whole) as world:
+        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
+
+        # Act
+        origins, turns = world.body.links.frames()
+
+    # Assert
+    assert origins.shape == (len(whole.links), 3)
+    assert turns.shape == (len(whole.links), 4)
+    assert origins[row["neck"], 2] > origins[row["chest"], 2] > origins[row["root"], 2] > 0.8
+    assert origins[row["left_ankle"], 1] > 0.05 > -0.05 > origins[row["right_ankle"], 1]
+
+
+@pytest.mark.slow
+@every_character
+def test_looking_at_links_changes_no_bit_of_what_follows(name: str) -> None:
+    # Arrange
+    rng = np.random.default_rng(3)
+    size = character(name).layout.size
+    efforts = [rng.uniform(-0.5, 0.5, size) for _ in range(240)]
+    with simulation(name) as blind, simulation(name) as watched:
+        for effort in efforts:
+            expected = blind.advance(effort)
+
+            # Act
+            watched.actor.link_frames()
+            state = watched.advance(effort)
+            watched.actor.link_frames()
+
+            # Assert
+            assert state.position.tobytes() == expected.position.tobytes()
+            assert state.velocity.tobytes() == expected.velocity.tobytes()
+
+
+# --- pushes --------------------------------------------------------------------------------------
+
+
+def generalised_force(
+    model: DynamicsModel,
+    link: int,
+    force: FloatArray,
+    torque: FloatArray,
+    point: FloatArray,
+) -> FloatArray:
+    """MuJoCo's generalised force (n,) of a push at a point of the link frame."""
+    origins, turns = model.link_poses()
+    at = origins[link] + rotations.matrix(turns[link]) @ point
+    result = np.zeros(len(model.bias_force()))
+    mujoco.mj_applyFT(model._model, model._data, force, torque, at, link + 1, result)
+    return result
+
+
+def as_push(row: int, force: FloatArray, torque: FloatArray, point: FloatArray) -> Push:
+    """A push of one tick."""
+    return Push(row, np.concatenate((force, torque)), point, first_tick=1, ticks=1)
+
+
+@dataclass
+class Pushing:
+    """A body in a random state without gravity, and MuJoCo's model in the same."""
+
+    world: LoneWorld
+    whole: Character
+    model: DynamicsModel
+    rng: np.random.Generator
+
+    def draw(self) -> None:
+        """Go to another random state."""
+        position, velocity = free_random_state(self.world.body, self.whole, self.rng)
+        self.state = position, velocity
+        self.model.update(position, velocity)
+
+    def acceleration(self, *pushes: tuple[int, FloatArray, FloatArray, FloatArray]) -> FloatArray:
+        """What pushes add to the acceleration (n,) in one instant."""
+        velocities = []
+        for present in (pushes, ()):
+            self.world.body.set_state(*self.state)
+            self.world.body.apply(np.zeros(self.whole.layout.size))
+            self.world.body.links.push([as_push(*push) for push in present])
+            self.world.step()
+            velocities.append(self.world.body.read()[1])
+        return (velocities[0] - velocities[1]) / INSTANT
+
+    def check(self, measured: FloatArray, generalised: FloatArray) -> None:
+        """The acceleration is that of a generalised force, by MuJoCo's mass matrix.
+
+        A force that nothing yields to, as one along a base that is fixed, leaves only rounding.
+        """
+        mass_matrix = self.model.mass_matrix()
+        predicted = np.linalg.solve(mass_matrix, generalised)
+        assert np.abs(measured - predicted).max() < 1e-6 * np.abs(predicted).max() + NOISE
+        force = mass_matrix @ measured
+        assert np.abs(force - generalised).max() < 1e-5 * np.abs(generalised).max() + NOISE
+
+
+@pytest.fixture
+def pushing(name: str) -> Iterator[Pushing]:
+    whole = without_self_collision(name)
+    with still_world(whole) as world:
+        yield Pushing(world, whole, DynamicsModel(whole, gravity=0.0), np.random.default_rng(4))
+
+
+ZERO = np.zeros(3)
+
+
+@pushed_characters
+def test_a_force_at_any_point_of_any_link_accelerates_as_mujoco_says(pushing: Pushing) -> None:
+    for link in range(len(pushing.whole.links)):
+        for _ in range(5):
+            pushing.draw()
+            force, point = pushing.rng.uniform(-50.0, 50.0, 3), pushing.rng.uniform(-0.5, 0.5, 3)
+
+            measured = pushing.acceleration((link, force, ZERO, point))
+
+            pushing.check(measured, generalised_force(pushing.model, link, force, ZERO, point))
+
+
+@pushed_characters
+def test_a_torque_on_any_link_accelerates_as_mujoco_says_wherever_it_acts(
+    pushing: Pushing,
+) -> None:
+    for link in range(len(pushing.whole.links)):
+        pushing.draw()
+        torque, point = pushing.rng.uniform(-50.0, 50.0, 3), pushing.rng.uniform(-0.5, 0.5, 3)
+
+        measured = pushing.acceleration((link, ZERO, torque, point))
+
+        pushing.check(measured, generalised_force(pushing.model, link, ZERO, torque, ZERO))
+
+
+@pushed_characters
+def test_a_force_off_the_centre_of_mass_is_one_at_it_and_its_moment(pushing: Pushing) -> None:
+    for link, described in enumerate(pushing.whole.links):
+        pushing.draw()
+        centre = np.array(described.inertial_pose.position)
+        force, torque, point = pushing.rng.uniform(-5.0, 5.0, (3, 3))
+        turn = pushing.model.link_poses()[1][link]
+        moment = np.cross(rotations.matrix(turn) @ (point - centre), force)
+
+        off_centre = pushing.acceleration((link, force, torque, point))
+        at_centre = pushing.acceleration((link, force, torque + moment, centre))
+
+        largest = np.abs(at_centre).max()
+        assert np.abs(off_centre - at_centre).max() < 1e-6 * largest + NOISE, described.name
+
+
+@pushed_characters
+def test_pushes_on_several_links_at_once_and_twice_on_one_add_up(pushing: Pushing) -> None:
+    # Arrange
+    pushing.draw()
+    last = len(pushing.whole.links) - 1
+    pushes = [(link, *pushing.rng.uniform(-5.0, 5.0, (3, 3))) for link in (0, last, last, last - 1)]
+
+    # Act
+    measured = pushing.acceleration(*pushes)
+
+    # Assert
+    total = sum(generalised_force(pushing.model, *push) for push in pushes)
+    pushing.check(measured, np.asarray(total))
+
+
+@pushed_characters
+def test_a_push_lasts_one_engine_step(pushing: Pushing) -> None:
+    # Arrange
+    body, world = pushing.world.body, pushing.world
+    for link in range(len(pushing.whole.links)):
+        pushing.draw()
+        body.set_state(pushing.state[0], np.zeros(pushing.whole.layout.size))
+        body.links.push(
+            [as_push(link, np.array([30.0, -20.0, 10.0]), np.array([1.0, 2.0, 3.0]), ZERO)]
+        )
+        world.step()
+        pushed = body.read()[1]
+
+        # Act
+        world.step()
+
+        # Assert
+        assert np.abs(body.read()[1] - pushed).max() <= 1e-4 * np.abs(pushed).max()
+
+
+def test_a_push_on_a_fixed_base_moves_nothing() -> None:
+    # Arrange
+    whole = without_self_collision("franka_panda")
+    position = np.array(whole.rest_position)
+    with still_world(whole, step_s=1e-3) as world:
+        world.body.set_state(position, np.zeros_like(position))
+
+        # Act
+        world.body.links.push(
+            [as_push(0, np.array([1e4, 1e4, 1e4]), np.array([1e4, 0.0, 0.0]), np.ones(3))]
+        )
+        world.step()
+        origins, _ = world.body.links.frames()
+
+    # Assert
+    expected = whole.links[0].joint.pose_in_parent.position
+    np.testing.assert_allclose(origins[0], expected, rtol=0.0, atol=ROUNDING)
+
+
+def test_a_pushed_character_gains_the_pushs_momentum() -> None:
+    # Arrange
+    whole = without_self_collision("humanoid")
+    hand = [link.name for link in whole.links].index("left_wrist")
+    force, torque, point = np.array([100.0, -50.0, 25.0]), np.array([4.0, 5.0, 6.0]), np.ones(3)
+    with still_world(whole) as world:
+        position, _ = free_random_state(world.body, whole, np.random.default_rng(5))
+        world.body.set_state(position, np.zeros_like(position))
+        origins, turns = world.body.links.frames()
+        at = origins[hand] + rotations.matrix(turns[hand]) @ point
+
+        # Act
+        world.body.links.push([as_push(hand, force, torque, point)])
+        world.step()
+        linear, angular = momentum(world.body, whole)
+
+    # Assert
+    np.testing.assert_allclose(linear / INSTANT, force, rtol=1e-6)
+    np.testing.assert_allclose(angular / INSTANT, torque + np.cross(at, force), rtol=1e-6)
+
+
+# --- contacts ------------------------------------------------------------------------------------
+
+BOX_MASS = 2.0
+BOX_URDF = """
+<robot name="box"><link name="box">
+  <inertial>
+    <mass value="2"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+  </inertial>
+  <collision><geometry><box size="0.5 0.5 0.2"/></geometry></collision>
+</link></robot>
+"""
+SLOPE_URDF = """
+<robot name="slope"><link name="slope">
+  <collision>
+    <origin xyz="0 0 0" rpy="{roll} {pitch} 0"/><geometry><box size="10 10 1"/></geometry>
+  </collision>
+</link></robot>
+"""
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Character:
+    """A box of 2 kg, 0.2 m high."""
+    (tmp_path / "box.urdf").write_text(BOX_URDF)
+    (tmp_path / "box.yaml").write_text("urdf: box.urdf\ninertia: file\n")
+    return load_character(str(tmp_path / "box.yaml"))
+
+
+def at_height(z: float, x: float = 0.0) -> FloatArray:
+    return np.array([x, 0.0, z, 0.0, 0.0, 0.0])
+
+
+def contact_wrenches(world: World, body: Body, centres: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Contact wrenches (links, 6) of the last step, about the centres of mass before."""
+    return body.links.contact_wrenches(world.touched_links(), centres)
+
+
+def contact_forces(world: World, body: Body) -> tuple[FloatArray, BoolArray]:
+    """Contact forces (links, 3) of the last step."""
+    wrenches, touching = contact_wrenches(world, body, body.links.centres())
+    return wrenches[:, :3], touching
+
+
+def about_origin(wrenches: FloatArray, centres: FloatArray) -> FloatArray:
+    """The sum (6,) of wrenches on links, its torque about the world's origin."""
+    forces, torques = wrenches[:, :3], wrenches[:, 3:]
+    return np.concatenate((forces.sum(axis=0), (np.cross(centres, forces) + torques).sum(axis=0)))
+
+
+def test_in_the_air_nothing_touches(box: Character) -> None:
+    with LoneWorld(box, WorldSettings()) as world:
+        world.body.set_state(at_height(1.0), np.zeros(6))
+        world.step()
+        forces, touching = contact_forces(world, world.body)
+
+    np.testing.assert_array_equal(forces, np.zeros((1, 3)))
+    np.testing.assert_array_equal(touching, [False])
+
+
+@pytest.mark.parametrize("gap", [1e-4, 1e-3, 5e-3, 1e-2])
+def test_what_is_only_near_does_not_touch(box: Character, gap: float) -> None:
+    with LoneWorld(box, WorldSettings(gravity=0.0)) as world:
+        world.body.set_state(at_height(0.1 + gap), np.zeros(6))
+        world.step()
+        forces, touching = contact_forces(world, world.body)
+
+    np.testing.assert_array_equal(forces, np.zeros((1, 3)))
+    assert not touching.any()
+
+
+def test_the_ground_carries_the_weight_of_a_box_at_rest(box: Character) -> None:
+    # Arrange
+    with LoneWorld(box, WorldSettings()) as world:
+        world.body.set_state(at_height(0.1), np.zeros(6))
+
+        # Act
+        advance(world, np.zeros(6), 480)
+        forces, touching = contact_forces(world, world.body)
+
+    # Assert
+    np.testing.assert_allclose(forces, [[0.0, 0.0, BOX_MASS * 9.81]], rtol=0.0, atol=1e-9)
+    assert touching.all()
+
+
+@pytest.mark.parametrize(("roll", "pitch"), [(0.2, 0.0), (0.0, 0.2), (-0.1, -0.2)])
+def test_a_slope_carries_the_weight_too_by_pressure_and_friction(
+    box: Character, tmp_path: Path, roll: float, pitch: float
+) -> None:
+    # Arrange
+    text = SLOPE_URDF.format(roll=roll, pitch=pitch)
+    terrain = Loading(tmp_path / "slope.urdf", text, fixed_base=True)
+    settings = WorldSettings(friction=2.0, link_friction=1.0, ground=False, terrain=terrain)
+    start = at_height(0.62)
+    turn = rotations.multiply(
+        rotations.exp(np.array([0.0, pitch, 0.0])), rotations.exp(np.array([roll, 0.0, 0.0]))
+    )
+    start[3:] = rotations.log(turn)
+    with LoneWorld(box, settings) as world:
+        world.body.set_state(start, np.zeros(6))
+
+        # Act
+        advance(world, np.zeros(6), 960)
+        forces, _ = contact_forces(world, world.body)
+        speed = np.abs(world.body.read()[1]).max()
+
+    # Assert
+    assert speed < 1e-2
+    np.testing.assert_allclose(forces, [[0.0, 0.0, BOX_MASS * 9.81]], rtol=0.0, atol=0.05)
+
+
+def test_the_friction_of_a_sliding_box_is_against_its_motion(box: Character) -> None:
+    # Arrange
+    settings = WorldSettings(step_s=1e-3, friction=0.4, link_friction=0.5)
+    with LoneWorld(box, settings) as world:
+        world.body.set_state(at_height(0.1), np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        advance(world, np.zeros(6), 200)
+        pulls = []
+        for _ in range(200):
+            before = world.body.read()[1]
+
+            # Act
+            world.step()
+            forces, _ = contact_forces(world, world.body)
+
+            # Assert: it is what slows the box, and in the mean it is Coulomb's
+            pulls.append(forces[0, 0])
+            slowing = BOX_MASS * (world.body.read()[1][0] - before[0]) / settings.step_s
+            assert forces[0, 0] == pytest.approx(slowing, abs=1e-9)
+    assert np.mean(pulls) == pytest.approx(-0.4 * 0.5 * BOX_MASS * 9.81, rel=1e-2)
+
+
+def test_contacts_and_gravity_are_all_that_changes_the_momentum_of_a_tumbling_box(
+    box: Character,
+) -> None:
+    # Arrange: it falls on an edge, spinning and with speed along the ground, and rolls over
+    step_s, weight = 1.0 / 240.0, np.array([0.0, 0.0, -BOX_MASS * 9.81])
+    start = np.array([0.3, -0.2, 0.6, 0.4, 0.5, 0.2])
+    turned = 0.0
+    with LoneWorld(box, WorldSettings(link_friction=1.0)) as world:
+        world.body.set_state(start, np.array([1.0, 0.5, -1.0, 3.0, 4.0, -2.0]))
+        for _ in range(240):
+            before = np.concatenate(momentum(world.body, box))
+            centres = world.body.links.centres()
+
+            # Act
+            advance(world, np.zeros(6))
+            wrenches, _ = contact_wrenches(world, world.body, centres)
+
+            # Assert: Newton's and Euler's law, about the world's origin
+            rate = (np.concatenate(momentum(world.body, box)) - before) / step_s
+            gravity = np.concatenate((weight, np.cross(centres[0], weight)))
+            total = about_origin(wrenches, centres) + gravity
+            np.testing.assert_allclose(total, rate, rtol=1e-9, atol=1e-9)
+            turned = max(turned, float(np.abs(wrenches[:, 3:]).max()))
+    assert turned > 10.0
+
+
+@pytest.mark.parametrize("lower_first", [True, False])
+def test_of_two_boxes_on_each_other_the_lower_is_pressed_by_its_own_weight_alone(
+    box: Character, lower_first: bool
+) -> None:
+    # Arrange
+    with World(WorldSettings()) as world:
+        bodies = [world.add(box), world.add(box)]
+        lower, upper = bodies if lower_first else reversed(bodies)
+        lower.set_state(at_height(0.1), np.zeros(6))
+        upper.set_state(at_height(0.3), np.zeros(6))
+
+        # Act
+        for _ in range(960):
+            world.step()
+        carried, _ = contact_forces(world, lower)
+        resting, _ = contact_forces(world, upper)
+
+    # Assert: from below by both weights, from above by one
+    weight = BOX_MASS * 9.81
+    np.testing.assert_allclose(resting, [[0.0, 0.0, weight]], rtol=0.0, atol=1e-3)
+    np.testing.assert_allclose(carried, [[0.0, 0.0, weight]], rtol=0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_two_boxes_that_collide_press_equally_in_opposite_directions(
+    box: Character, order: int
+) -> None:
+    # Arrange: one falls aslant onto the other's corner, and neither has weight
+    step_s, touched = 1.0 / 240.0, 0
+    with World(WorldSettings(gravity=0.0, ground=False)) as world:
+        resting, coming = [world.add(box), world.add(box)][::order]
+        resting.set_state(np.zeros(6), np.zeros(6))
+        coming.set_state(
+            np.array([0.3, 0.2, 0.25, 0.1, 0.2, 0.3]), np.array([0.5, 0.1, -1.0, 0.3, 0.2, 0.0])
+        )
+        for _ in range(60):
+            before = momenta(box, resting, coming)
+
+            # Act
+            world.step()
+            forces = [contact_forces(world, body)[0][0] for body in (resting, coming)]
+
+            # Assert: Newton's third law, and his second for each
+            rates = (momenta(box, resting, coming) - before) / step_s
+            touched += bool(np.abs(forces[0]).max() > 1.0)
+            np.testing.assert_allclose(forces[0], -forces[1], rtol=0.0, atol=1e-9)
+            np.testing.assert_allclose(forces, rates, rtol=0.0, atol=1e-9)
+    assert touched
+
+
+def momenta(whole: Character, *bodies: Body) -> FloatArray:
+    """Linear momentum (bodies, 3) of each body, N s."""
+    return np.array([momentum(body, whole)[0] for body in bodies])
+
+
+RawState = tuple[Any, Any, Any]
+
+
+def raw_state(body: Body) -> RawState:
+    """The engine's own state of a body: base pose, base velocity, joints."""
+    client = {"physicsClientId": body._client}
+    return (
+        pybullet.getBasePositionAndOrientation(body._body, **client),
+        pybullet.getBaseVelocity(body._body, **client),
+        pybullet.getJointStatesMultiDof(body._body, body._joints, **client),
+    )
+
+
+def put_raw_state(body: Body, pose: RawState, motion: RawState) -> None:
+    """Put a body into the pose of one state with the velocities of another."""
+    client = {"physicsClientId": body._client}
+    pybullet.resetBasePositionAndOrientation(body._body, *pose[0], **client)
+    pybullet.resetBaseVelocity(body._body, *motion[1], **client)
+    for joint, where, moving in zip(body._joints, pose[2], motion[2], strict=True):
+        pybullet.resetJointStateMultiDof(
+            body._body, joint, targetValue=where[0], targetVelocity=moving[1], **client
+        )
+
+
+class Untouched:
+    """The same character where nothing can touch it: what contacts alone did to the momentum.
+
+    Momentum is `M(q) v`. The step from `q` gave `v_touched`; without contacts it gives `v_free`.
+    By Newton and Euler, the contacts' impulse is the momentum of `v_touched - v_free` in the pose
+    `q`; what the links do to one another takes no part in it.
+    """
+
+    def __init__(self, name: str, settings: WorldSettings) -> None:
+        self._whole = without_self_collision(name)
+        self._step_s = settings.step_s
+        self._world = LoneWorld(self._whole, settings)
+
+    def close(self) -> None:
+        self._world.close()
+
+    def wrench(self, before: RawState, after: RawState) -> FloatArray:
+        """The wrench (6,) over a step of all that touched, N, and N m about the world's origin."""
+        body = self._world.body
+        put_raw_state(body, before, before)
+        self._world.body.apply(np.zeros(self._whole.layout.size))
+        self._world.step()
+        free = raw_state(body)
+        momenta = []
+        for motion in (after, free):
+            put_raw_state(body, before, motion)
+            momenta.append(np.concatenate(momentum(body, self._whole)))
+        return (momenta[0] - momenta[1]) / self._step_s
+
+
+def in_the_void(gravity: float = 9.81) -> WorldSettings:
+    return WorldSettings(gravity=gravity, ground=False)
+
+
+@pytest.mark.slow
+def test_the_contact_wrenches_of_a_falling_humanoid_are_what_changes_its_momentum() -> None:
+    # Arrange: limp, moving over the ground and turning, so that there is friction; it lies in the
+    # end, with links of its own on each other
+    whole = character("humanoid")
+    velocity = np.zeros(whole.layout.size)
+    velocity[:2] = 1.0, 0.5
+    velocity[5] = 2.0
+    untouched = Untouched("humanoid", in_the_void())
+    largest = np.zeros(6)
+    with LoneWorld(whole, WorldSettings()) as world:
+        world.body.set_state(np.array(whole.rest_position), velocity)
+        for _ in range(480):
+            before, centres = raw_state(world.body), world.body.links.centres()
+
+            # Act
+            advance(world, np.zeros(whole.layout.size))
+            wrenches, touching = contact_wrenches(world, world.body, centres)
+
+            # Assert
+            expected = untouched.wrench(before, raw_state(world.body))
+            total = about_origin(wrenches, centres)
+            np.testing.assert_allclose(total, expected, rtol=1e-9, atol=1e-7)
+            assert not wrenches[~touching].any()
+            largest = np.maximum(largest, np.abs(expected))
+    untouched.close()
+    assert (largest > 200.0).all()
+
+
+def test_the_torque_of_a_standing_humanoids_contacts_is_about_each_foots_centre_of_mass() -> None:
+    # Arrange: what presses on a sole, 0.177 m by 0.09 m, acts on it, and not beside it
+    whole = character("humanoid")
+    half_length, half_width = 0.0885, 0.045
+    with LoneWorld(whole, WorldSettings()) as world:
+        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
+        advance(world, np.zeros(whole.layout.size), 9)
+        centres = world.body.links.centres()
+
+        # Act
+        advance(world, np.zeros(whole.layout.size))
+        wrenches, touching = contact_wrenches(world, world.body, centres)
+
+    # Assert
+    for row in np.flatnonzero(touching):
+        (fx, fy, fz), (tx, ty, _) = wrenches[row, :3], wrenches[row, 3:]
+        height = centres[row][2]
+        ahead, aside = (-ty - height * fx) / fz, (tx - height * fy) / fz
+        assert abs(ahead) < half_length + 1e-3
+        assert abs(aside) < half_width + 1e-3
+
+
+def test_a_fallen_humanoid_that_has_come_to_rest_weighs_what_it_weighs() -> None:
+    # Arrange
+    whole = character("humanoid")
+    with LoneWorld(whole, WorldSettings()) as world:
+        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
+        advance(world, np.zeros(whole.layout.size), 960)
+        start = momentum(world.body, whole)[0]
+        total = np.zeros(3)
+
+        # Act
+        for _ in range(240):
+            advance(world, np.zeros(whole.layout.size))
+            total += contact_forces(world, world.body)[0].sum(axis=0) / 240.0
+        gained = momentum(world.body, whole)[0] - start
+
+    # Assert: the mean over a second
+    weight = np.array([0.0, 0.0, whole.mass * 9.81])
+    np.testing.assert_allclose(total, gained + weight, rtol=0.0, atol=0.01 * whole.mass * 9.81)
+
+
+def test_a_standing_humanoid_touches_the_ground_with_its_feet_alone() -> None:
+    # Arrange
+    whole = character("humanoid")
+    with LoneWorld(whole, WorldSettings()) as world:
+        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
+
+        # Act
+        advance(world, np.zeros(whole.layout.size), 10)
+        forces, touching = contact_forces(world, world.body)
+
+    # Assert
+    names = {whole.links[row].name for row in np.flatnonzero(touching)}
+    assert names == {"left_ankle", "right_ankle"}
+    assert (forces[touching, 2] > 0.0).all()
+
+
+def test_a_contact_is_the_links_own_whatever_the_order_of_the_urdf(tmp_path: Path) -> None:
+    # Arrange: only `foot` is low; the file lists it last, the character right after `left`
+    inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    inertial = f'<inertial><mass value="1"/>{inertia}</inertial>'
+    block = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    links = "".join(
+        f'<link name="{name}">{inertial}{block}</link>'
+        for name in ("base", "left", "right", "foot")
+    )
+    joints = "".join(
+        f'<joint name="to_{child}" type="fixed"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{place}"/></joint>'
+        for parent, child, place in (
+            ("base", "left", "0 0.5 0"),
+            ("base", "right", "0 -0.5 0"),
+            ("left", "foot", "0 0 -0.5"),
+        )
+    )
+    (tmp_path / "tower.urdf").write_text(f'<robot name="tower">{links}{joints}</robot>')
+    (tmp_path / "tower.yaml").write_text("urdf: tower.urdf\ninertia: file\n")
+    whole = load_character(str(tmp_path / "tower.yaml"))
+    with LoneWorld(whole, WorldSettings()) as world:
+        world.body.set_state(at_height(0.549), np.zeros(6))
+
+        # Act
+        world.step()
+        forces, touching = contact_forces(world, world.body)
+
+    # Assert
+    assert [link.name for link in whole.links] == ["base", "left", "foot", "right"]
+    np.testing.assert_array_equal(touching, [False, False, True, False])
+    assert forces[2, 2] > 0.0
+
+
+def test_contacts_inside_a_character_cancel() -> None:
+    # Arrange: in the void the knees and elbows are folded until the limbs press on each other
+    whole = character("humanoid")
+    rng, pressed = np.random.default_rng(6), 0
+    motors = np.concatenate((np.zeros(6), np.ones(whole.layout.size - 6)))
+    effort = 15.0 * motors * rng.normal(size=whole.layout.size)
+    with LoneWorld(whole, in_the_void(gravity=0.0)) as world:
+        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
+        for _ in range(120):
+            # Act
+            advance(world, effort)
+            forces, touching = contact_forces(world, world.body)
+
+            # Assert
+            largest = np.abs(forces).max()
+            pressed += bool(largest > 10.0)
+            assert np.abs(forces.sum(axis=0)).max() <= 1e-12 * max(largest, 1.0)
+            assert touching.sum() != 1
+    assert pressed
+
+
+def test_two_humanoids_that_collide_press_equally_in_opposite_directions() -> None:
+    # Arrange: they fly at each other, and neither has weight
+    whole = character("humanoid")
+    size = whole.layout.size
+    untouched = Untouched("humanoid", in_the_void(gravity=0.0))
+    starts = [np.array(whole.rest_position) for _ in range(2)]
+    starts[1][:2] = 0.6, 0.1
+    motions = np.zeros((2, size))
+    motions[:, 0] = 1.0, -1.0
+    largest = 0.0
+    with World(in_the_void(gravity=0.0)) as world:
+        bodies = [world.add(whole) for _ in range(2)]
+        for body, position, velocity in zip(bodies, starts, motions, strict=True):
+            body.set_state(position, velocity)
+        for _ in range(120):
+            before = [raw_state(body) for body in bodies]
+            for body in bodies:
+                body.apply(np.zeros(size))
+
+            # Act
+            world.step()
+            forces = [contact_forces(world, body)[0].sum(axis=0) for body in bodies]
+
+            # Assert: Newton's third law, and his second for each
+            for body, state, force in zip(bodies, before, forces, strict=True):
+                expected = untouched.wrench(state, raw_state(body))[:3]
+                np.testing.assert_allclose(force, expected, rtol=1e-9, atol=1e-7)
+            np.testing.assert_allclose(forces[0], -forces[1], rtol=1e-9, atol=1e-7)
+            largest = max(largest, float(np.abs(forces).max()))
+    untouched.close()
+    assert largest > 100.0

@@ -1,0 +1,104 @@
+"""What follows a saved state is what followed it, to the last bit."""
+
+import pickle
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from actuated_characters.runs.plan import Plan, make_plan
+from controller_node.parameters import make_controller
+from msgs_config.arrays import FloatArray
+from sim_node.parameters import make_role, make_settings
+from sim_node.physics.simulation import Simulation
+
+TICKS = 36
+CASES: dict[str, tuple[str, dict[str, object], dict[str, object]]] = {
+    # falls within the second, with soft limits and all kinds of contacts
+    "humanoid": ("humanoid", {"reference": "clip", "clip": "walk"}, {}),
+    "delayed": (
+        "humanoid",
+        {"reference": "clip", "clip": "roll"},
+        {"rate": 480, "command_delay_ticks": 1},
+    ),
+    "damped": ("tests/data/damped.yaml", {"reference": "hold"}, {"substeps": 2}),
+    "laikago": ("laikago", {"reference": "hold"}, {}),
+}
+
+
+@pytest.fixture(params=CASES, scope="module")
+def plan(request: pytest.FixtureRequest) -> Plan:
+    name, reference, simulator = CASES[request.param]
+    return make_plan(name, 10.0, reference, simulator, {"root_assistance": False})
+
+
+@pytest.fixture
+def simulation(plan: Plan) -> Iterator[Simulation]:
+    with fresh(plan) as simulation:
+        yield simulation
+
+
+def fresh(plan: Plan) -> Simulation:
+    return Simulation([make_role(plan.character, plan.simulator)], make_settings(plan.simulator))
+
+
+def advance(plan: Plan, simulation: Simulation, ticks: int, noise: float = 0.0) -> FloatArray:
+    """Advance under control with some noise (N m); what the states and efforts were (ticks, 3n)."""
+    controller = make_controller(plan.character, plan.reference, plan.controller)
+    (actor,), rng = simulation.actors, np.random.default_rng(3)
+    episode_ns, rows = simulation.clock.stamp_ns(1), []
+    for _ in range(ticks):
+        effort, _ = controller.answer(actor.state, episode_ns)
+        effort = effort + noise * rng.normal(size=len(effort))
+        simulation.step([np.where(actor.commanded, effort, 0.0)])
+        assert actor.state.effort is not None
+        rows.append(
+            np.concatenate((actor.state.position, actor.state.velocity, actor.state.effort))
+        )
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("ticks", [1, 90])
+def test_a_simulation_returns_to_what_it_saved(
+    plan: Plan, simulation: Simulation, ticks: int
+) -> None:
+    advance(plan, simulation, ticks)
+    saved, stamp = simulation.save(), simulation.stamp_ns
+    counts = simulation.actors[0].saturated_ticks.copy()
+    followed = advance(plan, simulation, TICKS)
+    advance(plan, simulation, TICKS, noise=1.0)
+
+    for _ in range(2):
+        simulation.restore(saved)
+
+        assert simulation.stamp_ns == stamp == simulation.actors[0].state.stamp_ns
+        np.testing.assert_array_equal(simulation.actors[0].saturated_ticks, counts)
+        assert advance(plan, simulation, TICKS).tobytes() == followed.tobytes()
+
+
+@pytest.mark.parametrize("dirty", [False, True])
+def test_another_simulation_goes_on_from_a_snapshot(
+    plan: Plan, simulation: Simulation, dirty: bool
+) -> None:
+    advance(plan, simulation, 90)
+    snapshot = pickle.loads(pickle.dumps(simulation.snapshot()))
+    followed = advance(plan, simulation, TICKS)
+
+    with fresh(plan) as other:
+        advance(plan, other, 20 if dirty else 0, noise=1.0)
+        other.take_over(snapshot)
+
+        assert other.tick == 91
+        assert advance(plan, other, TICKS).tobytes() == followed.tobytes()
+
+
+def test_what_is_forgotten_cannot_be_restored(plan: Plan, simulation: Simulation) -> None:
+    kept, saved = simulation.save(), simulation.save()
+    followed = advance(plan, simulation, 3)
+
+    simulation.forget(saved)
+
+    simulation.restore(kept)
+    assert advance(plan, simulation, 3).tobytes() == followed.tobytes()
+    with pytest.raises(Exception, match="restore"):
+        simulation.restore(saved)

@@ -1,0 +1,73 @@
+"""When the simulator waits for slow subscribers. That it helps is in `test_recorder.py`."""
+
+from sim_node.timing.flow_control import BackPressure
+
+
+class Subscribers:
+    """Acknowledge, or do not."""
+
+    def __init__(self) -> None:
+        self.have_all = True
+        self.waits: list[float] = []  # s that each question may take
+
+    def __call__(self, seconds: float) -> bool:
+        self.waits.append(seconds)
+        return self.have_all
+
+
+def pressure_of(subscribers: Subscribers) -> BackPressure:
+    return BackPressure(subscribers, every_ticks=100, longest=1.0, turn=0.5)
+
+
+def test_subscribers_that_follow_are_asked_only_now_and_then() -> None:
+    subscribers = Subscribers()
+    pressure = pressure_of(subscribers)
+
+    held = [pressure.holds(tick, now=0.0) for tick in range(1, 301)]
+
+    assert not any(held)
+    assert len(subscribers.waits) == 3
+
+
+def test_it_holds_until_they_have_all() -> None:
+    subscribers = Subscribers()
+    pressure = pressure_of(subscribers)
+    subscribers.have_all = False
+
+    held = [pressure.holds(tick, now=5.0) for tick in range(1, 101)]
+
+    assert held == [False] * 99 + [True]
+    assert pressure.holds(100, now=5.9)
+    subscribers.have_all = True
+    assert not pressure.holds(100, now=5.95)
+    assert pressure.complaint is None
+    assert subscribers.waits == [0.5, 0.5, 0.5]
+
+
+def test_who_never_acknowledges_is_waited_for_once() -> None:
+    subscribers = Subscribers()
+    pressure = pressure_of(subscribers)
+    subscribers.have_all = False
+
+    assert pressure.holds(100, now=5.0)
+    assert not pressure.holds(100, now=6.0)
+    assert "within 1 s" in str(pressure.complaint)
+    assert not any(pressure.holds(tick, now=7.0) for tick in range(101, 400))
+    assert subscribers.waits == [0.5, 0.5, 0.0, 0.0]
+
+
+def test_who_has_caught_up_is_waited_for_again() -> None:
+    subscribers = Subscribers()
+    pressure = pressure_of(subscribers)
+    subscribers.have_all = False
+    assert pressure.holds(100, now=5.0)
+    assert not pressure.holds(100, now=6.0)
+
+    subscribers.have_all = True
+    assert not pressure.holds(200, now=7.0)
+    assert pressure.complaint is None
+    subscribers.have_all = False
+
+    assert pressure.holds(300, now=8.0)
+    assert pressure.holds(300, now=8.9)
+    assert not pressure.holds(300, now=9.0)

@@ -1,0 +1,275 @@
+"""A simulation runs, is paused, or takes some steps; a fault stops it, and only some can go on."""
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from msgs_config.errors import CommandError
+from sim_node.timing.run_state import RunControl
+
+
+@pytest.fixture
+def control() -> RunControl:
+    return RunControl()
+
+
+def paused(fault: str | None = None, *, stuck: bool = False) -> RunControl:
+    control = RunControl()
+    control.pause(fault, stuck=stuck)
+    return control
+
+
+# Pausing
+
+
+def test_at_first_it_runs_without_a_fault(control: RunControl) -> None:
+    assert control.runs
+    assert not control.paused
+    assert not control.is_stuck
+    assert control.fault is None
+    assert control.steps_left == 0
+
+
+def test_a_pause_stops_it_and_resuming_lets_it_go_on(control: RunControl) -> None:
+    control.pause()
+    assert not control.runs
+    assert control.paused
+    assert control.fault is None
+
+    control.resume()
+    assert control.runs
+    assert not control.paused
+
+
+def test_resuming_what_runs_changes_nothing(control: RunControl) -> None:
+    control.resume()
+
+    assert control.runs
+    assert control.fault is None
+
+
+def test_a_fault_is_remembered_until_it_goes_on() -> None:
+    control = paused("a conflict")
+    assert control.fault == "a conflict"
+
+    control.pause()  # by hand, on top of it
+    assert control.fault == "a conflict"
+    control.pause("another conflict")
+    assert control.fault == "another conflict"
+
+    control.resume()
+    assert control.fault is None
+
+
+def test_a_tick_while_it_runs_is_no_step(control: RunControl) -> None:
+    assert not control.tick()
+    assert control.steps_left == 0
+    assert control.runs
+
+
+# Steps
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_it_takes_as_many_steps_as_it_should_and_is_paused_again(count: int) -> None:
+    control = paused()
+
+    control.begin_steps(count)
+    last = []
+    while control.runs:
+        last.append(control.tick())
+
+    assert last == [False] * (count - 1) + [True]
+    assert control.paused
+    assert control.steps_left == 0
+
+
+def test_steps_forget_the_fault_that_they_go_on_from() -> None:
+    control = paused("a conflict")
+
+    control.begin_steps(1)
+
+    assert control.fault is None
+
+
+def test_steps_are_refused_while_it_runs(control: RunControl) -> None:
+    with pytest.raises(CommandError, match="not paused"):
+        control.begin_steps(3)
+
+    assert control.runs
+    assert control.steps_left == 0
+
+
+def test_steps_are_refused_while_others_are_not_done() -> None:
+    control = paused()
+    control.begin_steps(3)
+    control.tick()
+
+    with pytest.raises(CommandError, match="2 steps of another call are not done"):
+        control.begin_steps(5)
+
+    assert control.steps_left == 2
+
+
+def test_steps_can_follow_steps() -> None:
+    control = paused()
+    for _ in range(3):
+        control.begin_steps(1)
+        assert control.tick()
+
+
+@pytest.mark.parametrize("fault", [None, "a conflict"])
+def test_a_pause_ends_the_steps(fault: str | None) -> None:
+    control = paused()
+    control.begin_steps(3)
+
+    control.pause(fault)
+
+    assert not control.runs
+    assert control.steps_left == 0
+    assert control.fault == fault
+
+
+def test_resuming_ends_the_steps_and_runs_on() -> None:
+    control = paused()
+    control.begin_steps(3)
+
+    control.resume()
+
+    assert not control.paused
+    assert control.steps_left == 0
+    assert [control.tick() for _ in range(4)] == [False] * 4
+
+
+# Stuck
+
+
+def test_what_is_stuck_neither_goes_on_nor_takes_a_step_and_says_why() -> None:
+    control = paused("diverged at tick 7", stuck=True)
+    assert control.is_stuck
+
+    for go_on in (control.resume, lambda: control.begin_steps(1)):
+        with pytest.raises(CommandError, match="only ~/reset: diverged at tick 7"):
+            go_on()
+
+    assert not control.runs
+    assert control.fault == "diverged at tick 7"
+
+
+def test_a_pause_by_hand_does_not_loosen_what_is_stuck() -> None:
+    control = paused("diverged at tick 7", stuck=True)
+
+    control.pause()
+
+    assert control.is_stuck
+    with pytest.raises(CommandError, match="diverged at tick 7"):
+        control.resume()
+
+
+def test_a_divergence_during_steps_is_stuck_too() -> None:
+    control = paused()
+    control.begin_steps(3)
+
+    control.pause("diverged at tick 7", stuck=True)
+
+    assert not control.runs
+    with pytest.raises(CommandError):
+        control.begin_steps(1)
+
+
+# Reset
+
+
+def test_a_reset_loosens_what_was_stuck_and_leaves_it_paused() -> None:
+    control = paused("diverged at tick 7", stuck=True)
+
+    control.reset()
+
+    assert not control.is_stuck
+    assert control.fault is None
+    assert control.paused
+    control.begin_steps(2)
+    assert control.runs
+
+
+def test_a_reset_ends_the_steps() -> None:
+    control = paused()
+    control.begin_steps(3)
+
+    control.reset()
+
+    assert not control.runs
+    assert control.steps_left == 0
+    control.begin_steps(1)  # a new episode's
+
+
+def test_what_runs_goes_on_through_a_reset(control: RunControl) -> None:
+    control.reset()
+
+    assert control.runs
+
+
+# Everything at once
+
+
+class AnyCalls(RuleBasedStateMachine):
+    """All calls in any order keep it in one of four conditions: runs, paused, steps, stuck."""
+
+    @initialize()
+    def begin(self) -> None:
+        self.control = RunControl()
+        self.condition = "runs"
+        self.left = 0
+
+    @rule(stuck=st.booleans())
+    def pause(self, stuck: bool) -> None:
+        self.control.pause("a fault" if stuck else None, stuck=stuck)
+        self.condition = "stuck" if stuck or self.condition == "stuck" else "paused"
+        self.left = 0
+
+    @rule()
+    def resume(self) -> None:
+        if self.condition == "stuck":
+            with pytest.raises(CommandError):
+                self.control.resume()
+            return
+        self.control.resume()
+        self.condition, self.left = "runs", 0
+
+    @rule(count=st.integers(1, 3))
+    def begin_steps(self, count: int) -> None:
+        if self.condition != "paused":
+            with pytest.raises(CommandError):
+                self.control.begin_steps(count)
+            return
+        self.control.begin_steps(count)
+        self.condition, self.left = "steps", count
+
+    @precondition(lambda self: self.condition in ("runs", "steps"))
+    @rule()
+    def tick(self) -> None:
+        self.left = max(self.left - 1, 0)
+        assert self.control.tick() == (self.condition == "steps" and self.left == 0)
+        if self.condition == "steps" and self.left == 0:
+            self.condition = "paused"
+
+    @rule()
+    def reset(self) -> None:
+        self.control.reset()
+        self.left = 0
+        if self.condition != "runs":
+            self.condition = "paused"
+
+    @invariant()
+    def it_is_as_the_rules_say(self) -> None:
+        assert self.control.runs == (self.condition in ("runs", "steps"))
+        assert self.control.paused == (self.condition != "runs")
+        assert self.control.is_stuck == (self.condition == "stuck")
+        assert self.control.steps_left == self.left
+        if self.condition == "stuck":
+            assert self.control.fault
+
+
+TestAnyCalls = AnyCalls.TestCase
+TestAnyCalls.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)

@@ -1,0 +1,97 @@
+"""Bags for tests, written as a recorder writes them, of states that were made in the process."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
+
+from actuated_characters.bags.writer import BagWriter
+from actuated_characters.metrics.run_metrics import Tick
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import Plan, make_plan
+from msgs_config.messages import configuration, topics
+from msgs_config.messages.joint_state import JointStateEncoder
+from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.messages.topics import Topic
+from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
+
+REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE)
+CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
+
+Said = tuple[Topic, bytes]
+"""A topic and a message on it, serialised."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """A run that was made in the process."""
+
+    plan: Plan
+    ticks: list[Tick]
+
+    @property
+    def states(self) -> list[StampedState]:
+        """The states, each once."""
+        return [self.ticks[0].state, *(tick.following for tick in self.ticks)]
+
+    def messages(self) -> list[Said]:
+        """What a recorder hears of it."""
+        references = [tick.reference for tick in self.ticks if tick.reference is not None]
+        return [
+            said_configuration(self.plan),
+            *said_states(self.plan, self.states),
+            *said_references(self.plan, references),
+        ]
+
+
+def make_run(
+    character: str,
+    duration: float,
+    reference: dict[str, object] | None = None,
+    **simulator: object,
+) -> Made:
+    """Run simulator and controller in this process."""
+    plan = make_plan(character, duration, reference or {"reference": "hold"}, simulator, {})
+    return Made(plan, list(ticks_in_process(plan)))
+
+
+def said_configuration(plan: Plan, name: str = "", characters: Sequence[str] = ()) -> Said:
+    text = configuration.describe(plan.character, plan.simulator, name=name, characters=characters)
+    return CONFIGURATION, serialize_message(String(data=text))
+
+
+def said_states(plan: Plan, states: Iterable[StampedState]) -> list[Said]:
+    encoder = JointStateEncoder(plan.character.layout.dof_names)
+    said = []
+    for state in states:
+        effort = () if state.effort is None else (state.effort,)
+        raw = encoder.encode(state.stamp_ns, state.position, state.velocity, *effort)
+        said.append((topics.JOINT_STATES, raw))
+    return said
+
+
+def said_references(plan: Plan, references: Iterable[StampedReference]) -> list[Said]:
+    encoder = JointStateEncoder(plan.character.layout.dof_names)
+    return [(REFERENCE, encoder.encode(r.stamp_ns, r.position, r.velocity)) for r in references]
+
+
+def said_wrenches(topic: Topic, wrenches: Iterable[WrenchArrays]) -> list[Said]:
+    return [(topic, encode_wrenches(each)) for each in wrenches]
+
+
+def write_bag(path: Path, messages: Sequence[Said], namespace: str = "") -> Path:
+    """Write a bag of messages in the order given; the directory."""
+    with BagWriter(path) as bag:
+        add_to(bag, messages, namespace)
+    return path
+
+
+def add_to(bag: BagWriter, messages: Sequence[Said], namespace: str = "") -> None:
+    """Write messages into a bag that is open, all their topics in one namespace."""
+    names = {f"/{topic.under(namespace).name}": topic for topic, _ in messages}
+    for name, topic in names.items():
+        bag.add_topic(name, topic.message_type, topic.qos)
+    for number, (topic, raw) in enumerate(messages):
+        bag.write(f"/{topic.under(namespace).name}", raw, 1_000_000 + number)

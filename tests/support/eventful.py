@@ -1,0 +1,138 @@
+"""Runs in which something happens, made in the process: pushes, contacts, a reset, a pause."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
+
+from actuated_characters.bags.writer import BagWriter
+from actuated_characters.runs.plan import Plan, make_plan
+from controller_node.parameters import make_controller
+from msgs_config.messages import configuration, topics
+from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches, select
+from msgs_config.parameters import Values
+from sim_node.parameters import make_role, make_settings
+from sim_node.physics.simulation import Simulation
+from sim_node.physics.wrenches import Push
+from tests.support.bags import Said, said_configuration, said_references, said_states
+
+CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE)
+START_NS = 1_700_000_000_000_000_000  # of the log times
+MS = 1_000_000
+
+
+@dataclass
+class Eventful:
+    """A run, and what a recorder hears of it, each with the wall time at which it came."""
+
+    plan: Plan
+    states: list[StampedState] = field(default_factory=list)
+    references: list[StampedReference] = field(default_factory=list)
+    contacts: list[WrenchArrays] = field(default_factory=list)
+    pushes: list[WrenchArrays] = field(default_factory=list)
+    log_times_ns: list[int] = field(default_factory=list)  # of the states
+    said_by_controller: list[Said] = field(default_factory=list)
+
+    def messages(self, *, contacts: bool = True) -> list[tuple[Said, int]]:
+        """All messages with their wall times."""
+        first, times = self.log_times_ns[0], self.log_times_ns
+        by_stamp = {s.stamp_ns: t for s, t in zip(self.states, times, strict=True)}
+        timed = [(said_configuration(self.plan), first - 2 * MS)]
+        timed += [(said, first - MS) for said in self.said_by_controller]
+        timed += list(zip(said_states(self.plan, self.states), times, strict=True))
+        references = said_references(self.plan, self.references)
+        timed += [
+            (said, by_stamp[reference.stamp_ns])
+            for said, reference in zip(references, self.references, strict=True)
+        ]
+        for topic, wrenches in (
+            (topics.APPLIED_WRENCH, self.pushes),
+            (topics.CONTACTS, self.contacts if contacts else []),
+        ):
+            timed += [((topic, encode_wrenches(w)), by_stamp[w.stamp_ns]) for w in wrenches]
+        return sorted(timed, key=lambda each: each[1])
+
+
+def eventful_run(
+    character: str,
+    ticks: int,
+    reference: dict[str, object] | None = None,
+    *,
+    pushed: Sequence[tuple[int, int, str, tuple[float, float, float]]] = (),
+    reset_after: int | None = None,
+    pause_after: int | None = None,
+    pause_s: float = 2.0,
+    tick_ns: int = MS,
+    **simulator: object,
+) -> Eventful:
+    """Run simulator and controller in this process.
+
+    `pushed` is first tick (from 0), ticks, link and force; the others are counts of ticks.
+    """
+    plan = make_plan(character, 1.0, reference or {"reference": "hold"}, simulator, {})
+    run = Eventful(plan)
+    controller = make_controller(plan.character, plan.reference, plan.controller)
+    names = [link.name for link in plan.character.links]
+    role = make_role(plan.character, plan.simulator)
+    now = START_NS
+    with Simulation([role], make_settings(plan.simulator)) as simulation:
+        simulation.watches_contacts = True
+        (actor,) = simulation.actors
+        episode_ns = actor.state.stamp_ns
+        run.states.append(actor.state)
+        run.log_times_ns.append(now)
+        for tick in range(ticks):
+            now += tick_ns + (round(1e9 * pause_s) if tick == pause_after else 0)
+            if tick == reset_after:
+                simulation.reset()
+                episode_ns = simulation.stamp_ns
+            else:
+                effort, desired = controller.answer(actor.state, episode_ns)
+                run.references.append(desired)
+                acting = [
+                    Push(names.index(link), np.array((*force, 0.0, 0.0, 0.0)), np.zeros(3), 0, 1)
+                    for first, count, link, force in pushed
+                    if first <= tick < first + count
+                ]
+                simulation.step([np.where(actor.commanded, effort, 0.0)], [acting])
+            run.states.append(actor.state)
+            run.log_times_ns.append(now)
+            stamp = actor.state.stamp_ns
+            run.pushes.append(
+                WrenchArrays.of_rows(
+                    stamp,
+                    [names[push.link] for push in actor.pushes],
+                    [push.wrench for push in actor.pushes],
+                    [push.point for push in actor.pushes],
+                )
+            )
+            assert actor.contacts is not None
+            wrenches, touching = actor.contacts.wrenches, actor.contacts.touching
+            run.contacts.append(select(stamp, names, wrenches, touching))
+    run.said_by_controller.append(said_controller(plan, plan.controller))
+    return run
+
+
+def said_controller(plan: Plan, values: Values, since_ns: int | None = None) -> Said:
+    text = configuration.describe(plan.character, values, since_ns)
+    return CONTROLLER, serialize_message(String(data=text))
+
+
+def write_timed(path: Path, messages: Sequence[tuple[Said, int]], namespace: str = "") -> Path:
+    """Write a bag of messages with their wall times, in the order given; the directory."""
+    with BagWriter(path) as bag:
+        add_timed(bag, messages, namespace)
+    return path
+
+
+def add_timed(bag: BagWriter, messages: Sequence[tuple[Said, int]], namespace: str = "") -> None:
+    """Write messages with their wall times into a bag that is open."""
+    names = {f"/{topic.under(namespace).name}": topic for (topic, _), _ in messages}
+    for name, topic in names.items():
+        bag.add_topic(name, topic.message_type, topic.qos)
+    for (topic, raw), log_time_ns in messages:
+        bag.write(f"/{topic.under(namespace).name}", raw, log_time_ns)

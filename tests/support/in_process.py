@@ -1,0 +1,167 @@
+"""A laboratory whose runs are made in this process, without ROS; bit-identical to the nodes'."""
+
+from pathlib import Path
+
+import numpy as np
+
+from actuated_characters.bags.recording import ModeChange, Recording
+from actuated_characters.metrics.run_metrics import Measurement, Tick
+from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.planned_throws import plan_throws
+from actuated_characters.studies.framework.study import Case, Outcome
+from controller_node.behaviours.base import ModeReport
+from controller_node.parameters import make_controller
+from msgs_config.errors import SimulationError
+from msgs_config.messages import configuration
+from msgs_config.messages.projectiles import BallStates, ball_names
+from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.messages.throw import Throw
+from msgs_config.messages.wrenches import WrenchArrays, select
+from sim_node.parameters import make_role, make_settings, push_ticks
+from sim_node.physics.simulated_character import Actor
+from sim_node.physics.simulation import Simulation
+from sim_node.physics.throws import ThrowSchedule
+from sim_node.physics.wrenches import PushSchedule
+
+
+class InProcessLaboratory:
+    """Runs a study's cases one by one; files that they need go to a directory."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self.cases: list[Case] = []  # that were run
+
+    def run(self, case: Case) -> Outcome:
+        """Run a case to its end, or until it diverges."""
+        self.cases.append(case)
+        plan = make_plan(
+            case.character, case.duration, case.reference, case.simulator, case.controller
+        )
+        run = _Run(plan, case)
+        diverged = ""
+        try:
+            run.go_on()
+        except SimulationError as error:
+            diverged = str(error)
+        return Outcome(run.recording(), run.summary(), diverged)
+
+    def write(self, name: str, text: str) -> str:
+        """Write a file; returns its path."""
+        path = self._directory / name
+        path.write_text(text, encoding="utf-8")
+        return str(path)
+
+
+class _Run:
+    """One run, and what a bag would hold of it."""
+
+    def __init__(self, plan: Plan, case: Case) -> None:
+        self._plan, self._case = plan, case
+        self._states: list[StampedState] = []
+        self._references: list[StampedReference] = []
+        self._contacts: list[WrenchArrays] = []
+        self._pushes: list[WrenchArrays] = []
+        self._modes: list[ModeReport] = []
+        self._throws: list[tuple[Throw, ...]] = []
+        self._balls: list[BallStates | None] = [None]
+
+    def go_on(self) -> None:
+        """Run to the end. Raises SimulationError if it diverges."""
+        plan = self._plan
+        controller = make_controller(plan.character, plan.reference, plan.controller)
+        role = make_role(plan.character, plan.simulator)
+        with Simulation([role], make_settings(plan.simulator)) as simulation:
+            simulation.watches_contacts = self._case.contacts or controller.needs_contacts
+            balls = self._throw_schedule(simulation)
+            schedule, (actor,) = self._schedule(simulation), simulation.actors
+            episode_ns = actor.state.stamp_ns
+            self._states.append(actor.state)
+            for _ in range(plan.ticks):
+                touched = None if actor.contacts is None else actor.contacts.wrenches
+                effort, reference = controller.answer(actor.state, episode_ns, touched)
+                self._references.append(reference)
+                if controller.mode is not None and controller.mode not in self._modes[-1:]:
+                    self._modes.append(controller.mode)
+                pushes, throws = schedule.take(simulation.tick), balls.take(simulation.tick)
+                simulation.step([np.where(actor.commanded, effort, 0.0)], [pushes], throws)
+                self._add(actor)
+                self._add_balls(simulation)
+
+    def _throw_schedule(self, simulation: Simulation) -> ThrowSchedule:
+        schedule = ThrowSchedule()
+        for each in plan_throws(self._plan, self._case.throws)[0]:
+            schedule.add(each.throw, simulation.clock.first_tick_from(each.stamp_ns))
+        return schedule
+
+    def _add_balls(self, simulation: Simulation) -> None:
+        self._throws.append(simulation.throws)
+        names = ball_names(len(simulation.balls))
+        there = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
+        self._balls.append(there if names else None)
+
+    def _schedule(self, simulation: Simulation) -> PushSchedule:
+        """The pushes as the simulator's node takes them: from the first tick not before a stamp."""
+        schedule = PushSchedule(self._plan.character)
+        for push in self._case.pushes:
+            arrays = push.arrays()
+            schedule.add(
+                arrays.links,
+                arrays.wrenches,
+                arrays.points,
+                first_tick=simulation.clock.first_tick_from(push.stamp_ns),
+                ticks=push_ticks(self._plan.simulator),
+            )
+        return schedule
+
+    def _add(self, actor: Actor) -> None:
+        state, names = actor.state, [link.name for link in actor.character.links]
+        self._states.append(state)
+        self._pushes.append(
+            WrenchArrays.of_rows(
+                state.stamp_ns,
+                [names[push.link] for push in actor.pushes],
+                [push.wrench for push in actor.pushes],
+                [push.point for push in actor.pushes],
+            )
+        )
+        if actor.contacts is not None:
+            wrenches, touching = actor.contacts.wrenches, actor.contacts.touching
+            self._contacts.append(select(state.stamp_ns, names, wrenches, touching))
+
+    def recording(self) -> Recording:
+        """What a bag would hold of it; a state without an answer has no reference."""
+        states, size = self._states, self._plan.character.layout.size
+        missing = np.full(size, np.nan)
+        references = self._references[: len(states)]
+        nothing = [missing] * (len(states) - len(references))
+        return Recording(
+            character=self._plan.character,
+            parameters=self._plan.simulator,
+            stamps_ns=np.array([state.stamp_ns for state in states], dtype=np.intp),
+            published_ns=np.arange(len(states), dtype=np.intp),
+            position=np.stack([state.position for state in states]),
+            velocity=np.stack([state.velocity for state in states]),
+            effort=np.array([state.effort for state in states[1:]]).reshape(-1, size),
+            reference_position=np.stack([*(r.position for r in references), *nothing]),
+            reference_velocity=np.stack([*(r.velocity for r in references), *nothing]),
+            contacts=tuple(self._contacts),
+            applied_wrench=tuple(self._pushes),
+            commands=((),) * len(states),
+            modes=tuple(
+                ModeChange(each.stamp_ns, each.phase.mode.value, dict(each.phase.facts))
+                for each in self._modes
+            ),
+            throws=tuple(self._throws),
+            balls=tuple(self._balls),
+        )
+
+    def summary(self) -> dict[str, object]:
+        """The figures of summary.json, as far as they are measured."""
+        plan = self._plan
+        known = configuration.parse(configuration.describe(plan.character, plan.simulator))
+        measurement = Measurement(known)
+        for state in self._states:
+            measurement.add_state(state)
+        for row, state in enumerate(self._states[1:]):
+            measurement.add_tick(Tick(self._states[row], state, self._references[row]))
+        return {"character": plan.character.name, **measurement.summary(wall_time=1.0)}

@@ -1,0 +1,282 @@
+"""What the tests of the physics share: characters, random states, and the engine's own numbers.
+
+What a test compares with is computed here anew, from what the engine says of each link's inertial
+frame: none of the conversions under test is used, save for quaternion products.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from controller_node import parameters as for_controller
+from controller_node.controller import Controller
+from controller_node.references.factory import make_motion
+from msgs_config.arrays import FloatArray
+from msgs_config.character.bullet import pybullet
+from msgs_config.character.file import shipped_characters
+from msgs_config.character.layout import JointType
+from msgs_config.character.loading import load_character
+from msgs_config.character.model import Character
+from msgs_config.geometry import rotations
+from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.parameters import resolve
+from sim_node import parameters as for_simulator
+from sim_node.physics.body import Body
+from sim_node.physics.simulated_character import Role
+from sim_node.physics.simulation import Simulation, SimulationSettings
+from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.wrenches import Push
+
+DATA = Path(__file__).parents[1] / "data"
+TURNED_FRAMES = [str(path) for path in sorted(DATA.glob("turned_frames*.yaml"))]
+FLOATING_TURNED_FRAMES = str(DATA / "turned_frames.yaml")
+SIMPLE_BODIES = [str(DATA / "free_box.yaml"), str(DATA / "wheel.yaml")]
+DAMPED = str(DATA / "damped.yaml")
+EVERY_CHARACTER = [*shipped_characters(), *TURNED_FRAMES, *SIMPLE_BODIES, DAMPED]
+FLOATING_CHARACTERS = ["humanoid", FLOATING_TURNED_FRAMES]
+
+INSTANT = 1e-7
+"""An engine step, s, so short that a difference quotient over it is a derivative."""
+
+_HEIGHT = 3.0  # m, where a floating base is out of reach of the ground and near the origin
+_WIDEST = 2.0  # rad or m, where a joint has no limits
+
+
+def character_id(name_or_path: str) -> str:
+    """A short name for a test's parameter."""
+    return Path(name_or_path).stem
+
+
+@lru_cache
+def character(name_or_path: str) -> Character:
+    """A character, loaded once for all tests."""
+    return load_character(name_or_path)
+
+
+def without_self_collision(name_or_path: str) -> Character:
+    """A character whose links pass through each other."""
+    whole = character(name_or_path)
+    return replace(whole, loading=replace(whole.loading, self_collision=False))
+
+
+def random_state(whole: Character, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """A position (n,) within the limits and a velocity (n,), high above the ground."""
+    layout = whole.layout
+    lower, upper = whole.position_bounds()
+    position = rng.uniform(np.maximum(lower, -_WIDEST), np.minimum(upper, _WIDEST))
+    for joint in layout.joints:
+        if joint.rotation is not None:
+            position[joint.rotation] = random_rotation_vector(rng)
+        if joint.type is JointType.FLOATING:
+            position[joint.start + 2] += _HEIGHT
+    return position, rng.uniform(-2.0, 2.0, layout.size)
+
+
+def random_rotation_vector(rng: np.random.Generator) -> FloatArray:
+    """A rotation vector (3,) of any direction, its angle up to nearly pi."""
+    direction = rng.normal(size=3)
+    return direction / np.linalg.norm(direction) * rng.uniform(0.0, 3.14)
+
+
+def touches(body: Body) -> bool:
+    """Whether any link is in contact with anything, or about to be."""
+    pybullet.performCollisionDetection(physicsClientId=body._client)
+    return bool(pybullet.getContactPoints(physicsClientId=body._client))
+
+
+def free_random_state(
+    body: Body, whole: Character, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """A random state that the body is put into, drawn again until it touches nothing."""
+    for _ in range(100):
+        position, velocity = random_state(whole, rng)
+        body.set_state(position, velocity)
+        if not touches(body):
+            return position, velocity
+    raise AssertionError("no state without contact was found")
+
+
+class LoneWorld(World):
+    """A world of one character."""
+
+    def __init__(self, whole: Character, settings: WorldSettings) -> None:
+        super().__init__(settings)
+        self.body = self.add(whole)
+
+
+class LoneSimulation(Simulation):
+    """A simulation of one actor."""
+
+    def __init__(self, role: Role, settings: SimulationSettings) -> None:
+        super().__init__([role], settings)
+        (self.actor,) = self.actors
+        self.layout = self.actor.layout
+
+    @property
+    def state(self) -> StampedState:
+        """Its present state."""
+        return self.actor.state
+
+    def advance(self, effort: FloatArray, *pushes: Push) -> StampedState:
+        """Advance one tick; the next state."""
+        self.step([effort], [pushes])
+        return self.actor.state
+
+
+def acceleration(world: LoneWorld, effort: FloatArray) -> FloatArray:
+    """What an effort does to the velocity (n,) in one instant; the world must step by INSTANT."""
+    before = world.body.read()[1]
+    advance(world, effort)
+    return (world.body.read()[1] - before) / INSTANT
+
+
+@dataclass(frozen=True)
+class LinkMotion:
+    """How one link moves in the world, about its centre of mass; m, rad, s."""
+
+    mass: float
+    centre: FloatArray
+    turn_xyzw: FloatArray  # of the inertial frame
+    velocity: FloatArray
+    angular_velocity: FloatArray
+    inertia: FloatArray  # (3, 3) in world axes
+
+    @property
+    def kinetic_energy(self) -> float:
+        """In J."""
+        linear = self.mass * self.velocity @ self.velocity
+        angular = self.angular_velocity @ self.inertia @ self.angular_velocity
+        return float(0.5 * (linear + angular))
+
+    @property
+    def angular_momentum(self) -> FloatArray:
+        """About the world's origin, N m s."""
+        orbital = np.cross(self.centre, self.mass * self.velocity)
+        return orbital + self.inertia @ self.angular_velocity
+
+
+def link_motions(body: Body, whole: Character) -> list[LinkMotion]:
+    """The motion of every link, in the character's order, by the engine's numbers."""
+    motions = []
+    for link, number in zip(whole.links, link_numbers(body, whole), strict=True):
+        if number < 0:
+            centre, turn = pybullet.getBasePositionAndOrientation(
+                body._body, physicsClientId=body._client
+            )
+            velocity, angular = pybullet.getBaseVelocity(body._body, physicsClientId=body._client)
+        else:
+            centre, turn, *_, velocity, angular = pybullet.getLinkState(
+                body._body,
+                number,
+                computeLinkVelocity=1,
+                computeForwardKinematics=1,
+                physicsClientId=body._client,
+            )
+        axes = rotations.matrix(np.array(turn))
+        motions.append(
+            LinkMotion(
+                mass=link.mass,
+                centre=np.array(centre),
+                turn_xyzw=np.array(turn),
+                velocity=np.array(velocity),
+                angular_velocity=np.array(angular),
+                inertia=axes @ np.diag(link.inertia_diagonal) @ axes.T,
+            )
+        )
+    return motions
+
+
+def link_numbers(body: Body, whole: Character) -> list[int]:
+    """The engine's number of every link, in the character's order; -1 is the base."""
+    count = pybullet.getNumJoints(body._body, physicsClientId=body._client)
+    infos = [
+        pybullet.getJointInfo(body._body, i, physicsClientId=body._client) for i in range(count)
+    ]
+    numbers = {info[12].decode(): info[0] for info in infos}
+    return [-1, *(numbers[link.name] for link in whole.links[1:])]
+
+
+def link_number(body: Body, whole: Character, joint_name: str) -> int:
+    """The engine's number of the link that a joint moves."""
+    index = [link.joint.name for link in whole.links].index(joint_name)
+    return link_numbers(body, whole)[index]
+
+
+def link_poses(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
+    """Origins (links, 3) and quaternions xyzw (links, 4) of the link frames in the world.
+
+    From the inertial frames: what the engine says of link frames has single precision.
+    """
+    origins, turns = [], []
+    for link, motion in zip(whole.links, link_motions(body, whole), strict=True):
+        inertial_turn = np.array(link.inertial_pose.orientation_xyzw)
+        turn = rotations.multiply(motion.turn_xyzw, rotations.conjugate(inertial_turn))
+        turns.append(turn)
+        offset = rotations.matrix(turn) @ np.array(link.inertial_pose.position)
+        origins.append(motion.centre - offset)
+    return np.array(origins), np.array(turns)
+
+
+def kinetic_energy(body: Body, whole: Character) -> float:
+    """Kinetic energy of all links, J."""
+    return sum(motion.kinetic_energy for motion in link_motions(body, whole))
+
+
+def momentum(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
+    """Linear (N s) and angular momentum (N m s, about the world's origin) of all links."""
+    motions = link_motions(body, whole)
+    linear = sum(motion.mass * motion.velocity for motion in motions)
+    angular = sum(motion.angular_momentum for motion in motions)
+    return np.asarray(linear), np.asarray(angular)
+
+
+def still_world(whole: Character, step_s: float = INSTANT) -> LoneWorld:
+    """A world without gravity."""
+    return LoneWorld(whole, WorldSettings(step_s=step_s, gravity=0.0))
+
+
+def advance(world: LoneWorld, effort: FloatArray, steps: int = 1) -> None:
+    """Apply an effort anew at each of some steps."""
+    for _ in range(steps):
+        world.body.apply(effort)
+        world.step()
+
+
+def simulation(name: str, **given: object) -> LoneSimulation:
+    """A simulation with the parameters given, the others at their defaults."""
+    whole = character(name)
+    parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
+    values = resolve(parameters, given)
+    return LoneSimulation(
+        for_simulator.make_role(whole, values), for_simulator.make_settings(values)
+    )
+
+
+def joint_simulation(given: Mapping[str, object]) -> Simulation:
+    """A simulation of several characters, with the parameters given."""
+    cast = for_simulator.make_cast(given)
+    roles = [for_simulator.make_role(p.character, p.values, p.name) for p in cast.parts]
+    return Simulation(roles, for_simulator.make_settings(cast.values))
+
+
+def controller(name: str, **given: object) -> Controller:
+    """A controller with the parameters given, the others at their defaults."""
+    whole = character(name)
+    parameters = for_controller.PARAMETERS + for_controller.character_parameters(whole)
+    values = resolve(parameters, given)
+    return for_controller.make_controller(whole, make_motion(whole, values).reference, values)
+
+
+def run_together(
+    run: LoneSimulation, driver: Controller, ticks: int
+) -> Iterator[tuple[StampedState, FloatArray, StampedReference]]:
+    """Both sides in one process: each tick's state, the effort that answers it, the reference."""
+    episode_ns = run.state.stamp_ns
+    for _ in range(ticks):
+        state = run.state
+        effort, reference = driver.answer(state, episode_ns)
+        yield state, effort, reference
+        run.advance(effort)
