@@ -18,8 +18,14 @@ from benchmarks.support.ratios import Ratio
 from msgs_config.arrays import FloatArray
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
-from msgs_config.runtime.polling import DirectSubscription, Spinner
-from sim_node.parameters import Cast, Part, make_cast, make_role, make_settings
+from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
+from sim_node.parameters import (
+    CharacterParameters,
+    SimulatorParameters,
+    load_parameters,
+    make_character_setup,
+    make_settings,
+)
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.world import World
 
@@ -90,14 +96,14 @@ def humanoids(count: int) -> dict[str, object]:
     return {"character": "humanoid", "characters": names, **places}
 
 
-def make_simulation(cast: Cast) -> Simulation:
+def make_simulation(cast: SimulatorParameters) -> Simulation:
     """The simulation of a cast, without ROS."""
-    roles = [make_role(part.character, part.values, part.name) for part in cast.parts]
+    roles = [make_character_setup(part.character, part.values, part.name) for part in cast.parts]
     return Simulation(roles, make_settings(cast.values))
 
 
 def _measure(label: str, given: Mapping[str, object]) -> Cost:
-    cast = make_cast(given)
+    cast = load_parameters(given)
     dofs = sum(part.character.layout.size for part in cast.parts)
     with timed_engine() as engine:
         alone = np.median(1e6 * step_durations(cast))
@@ -120,7 +126,7 @@ def timed_engine() -> Iterator[list[float]]:
         yield durations
 
 
-def step_durations(cast: Cast) -> FloatArray:
+def step_durations(cast: SimulatorParameters) -> FloatArray:
     """Durations (ticks,) in s of the steps of a simulation without ROS and without efforts."""
     with make_simulation(cast) as simulation:
         efforts = [np.zeros(actor.layout.size) for actor in simulation.actors]
@@ -131,13 +137,13 @@ def step_durations(cast: Cast) -> FloatArray:
     return np.diff(times)[_WARM_UP:]
 
 
-def _over_topics(cast: Cast, given: Mapping[str, object]) -> float:
+def _over_topics(cast: SimulatorParameters, given: Mapping[str, object]) -> float:
     """Median duration in µs of the ticks of `sim_node`, whose states are answered by zeros."""
     ticks = _WARM_UP + _TICKS
     with Nodes() as nodes:
         nodes.start(topics.SIM_NODE, {**given, "max_ticks": ticks})
         nodes.wait_until(lambda: nodes.reports)
-        spinner = Spinner(nodes.node)
+        spinner = PollingExecutor(nodes.node)
         limp = [_LimpController(nodes, part) for part in cast.parts]
 
         def answer() -> None:
@@ -155,7 +161,7 @@ def _over_topics(cast: Cast, given: Mapping[str, object]) -> float:
 class _LimpController:
     """Answers the states of one character with zeros, at the least cost."""
 
-    def __init__(self, nodes: Nodes, part: Part) -> None:
+    def __init__(self, nodes: Nodes, part: CharacterParameters) -> None:
         names = [n for n in part.character.layout.dof_names if not n.startswith("root_")]
         self._states = DirectSubscription(nodes.node, topics.JOINT_STATES.under(part.name))
         self._torques = topics.create_publisher(nodes.node, topics.JOINT_TORQUES.under(part.name))

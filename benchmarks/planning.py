@@ -22,7 +22,7 @@ from controller_node.planner.search.rollouts import Rollouts
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.messages.clock import TickClock
-from sim_node.parameters import make_role, make_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 
 _RATE = 240  # Hz
@@ -134,7 +134,7 @@ class _World:
         controller = Controller(
             self._plan.character, self._plan.reference, self._control, rate_hz=_RATE, gravity=9.81
         )
-        role = make_role(self._plan.character, values)
+        role = make_character_setup(self._plan.character, values)
         with Simulation([role], make_settings(values)) as simulation:
             (actor,) = simulation.actors
             for tick in range(_HORIZON):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.geometry import rotations
 
 
@@ -31,7 +31,7 @@ class Actuation:
 
 
 def net_wrench(
-    layout: JointLayout, configuration: Configuration, effort: FloatArray
+    layout: JointLayout, configuration: GeneralizedPosition, effort: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Force (3,) in N and torque (3,) in N m of all efforts (n,) on the character as a whole.
 

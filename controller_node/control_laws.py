@@ -46,7 +46,7 @@ def pid_effort(
     return pd_effort(stiffness, damping, error, velocity_error) + integral_gain * integral
 
 
-def winds_up(
+def anti_windup_mask(
     effort: FloatArray,  # (n,) that the integral takes part in, not clipped
     clipped: FloatArray,  # (n,) what the limits leave of it
     error: FloatArray,  # (n,)

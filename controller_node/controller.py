@@ -8,22 +8,22 @@ import numpy as np
 from controller_node.balance import Balance, BalanceGains
 from controller_node.behaviours.base import ModeReport, Observation, Phase
 from controller_node.behaviours.factory import BehaviourChoice
-from controller_node.behaviours.targets import AS_IT_IS, Way
+from controller_node.behaviours.targets import AS_IT_IS, Target
 from controller_node.effort_series import EffortSeries
-from controller_node.laws import HAS_BIAS, GainArrays, Instant, Law, Plant, make_law
+from controller_node.laws import HAS_BIAS, GainArrays, Law, LawContext, TrackingInput, make_law
 from controller_node.model_check import check_agreement
 from controller_node.planner.base import Planner
 from controller_node.planner.outlook import Outlook
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
-from controller_node.references.transformed import Carry, MovedReference
+from controller_node.references.transformed import PlanarTransform, TransformedReference
 from controller_node.strength import Strengths, StrengthSchedule, weakened
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError, ConfigurationError
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.probe import Probe
+from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.state import StampedReference, StampedState
 
 
@@ -39,7 +39,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class _Drive:
+class _EffectiveGains:
     """How firmly it is driven, as long as nothing changes."""
 
     said: FloatArray  # (b,) the strengths that messages say
@@ -85,13 +85,13 @@ class Controller:
         self._episode_ns: int | None = None
         self._model = DynamicsModel(character, gravity)
         self._check_inertia(character)
-        self._plant = Plant(self.layout, self._model, self.clock.period_s, series)
+        self._plant = LawContext(self.layout, self._model, self.clock.period_s, series)
         self._balance = Balance(character, character.feet) if character.feet else None
         self._law: Law = make_law(settings.law, self._plant)
         self._planner = planner
         self.check(settings)
         self._settings = settings
-        self._drive: _Drive | None = None
+        self._drive: _EffectiveGains | None = None
         self._next: tuple[float, ReferenceState] | None = None
         self._behaviour = self._choice.make()
         self._way = AS_IT_IS
@@ -159,7 +159,7 @@ class Controller:
                 f"{character.file}: nothing with mass or inertia moves at '{name}'"
             )
 
-    def check_agreement(self, probe: Probe) -> None:
+    def check_agreement(self, probe: DynamicsSample) -> None:
         """Raise CharacterError if a simulator's probe is not what the model expects; says why."""
         check_agreement(self._model, self.layout, probe)
 
@@ -177,18 +177,18 @@ class Controller:
         """
         self._enter_episode(episode_ns)
         carry, before = self._behaviour.carry, self._reference
-        if carry != Carry():
-            before = MovedReference(self.layout, before, carry)
+        if carry != PlanarTransform():
+            before = TransformedReference(self.layout, before, carry)
         if not isinstance(before, TrajectoryReference):
             before = TrajectoryReference(self._character, before)
         start, now = self._time(start_ns), self._time(now_ns)
         self._reference = before.replaced(points, start, now)
-        self._behaviour.carry = Carry()
+        self._behaviour.carry = PlanarTransform()
         self._next = None
         if self._planner is not None:
             self._planner.change_reference()
 
-    def weaken(self, strengths: Strengths, *, episode_ns: int) -> None:
+    def set_strengths(self, strengths: Strengths, *, episode_ns: int) -> None:
         """Take strengths that count from their stamp on, until the next ones or the episode's end.
 
         Raises:
@@ -270,7 +270,7 @@ class Controller:
         )
         self._report(directive.phase, told.stamp_ns)
         self._take(directive.way)
-        instant = Instant(
+        instant = TrackingInput(
             time=time,
             position=state.position,
             velocity=state.velocity,
@@ -295,7 +295,7 @@ class Controller:
         stamp_ns = self.clock.stamp_ns(tick + late.delay_ticks)
         return StampedState(stamp_ns, position, velocity, state.effort)
 
-    def _drive_at(self, stamp_ns: int) -> _Drive:
+    def _drive_at(self, stamp_ns: int) -> _EffectiveGains:
         """What drives it at a stamp: worked out anew where the settings or the strengths change."""
         said = self._strengths.at(stamp_ns)
         if self._drive is None or self._drive.said is not said:
@@ -306,7 +306,7 @@ class Controller:
             gains = weakened(self.layout, gains, said)
             root = gains.stiffness[:6].any() or gains.damping[:6].any()
             assisted = self.layout.has_floating_base and bool(root)
-            self._drive = _Drive(said, gains, strengths, assisted)
+            self._drive = _EffectiveGains(said, gains, strengths, assisted)
         return self._drive
 
     def _report(self, phase: Phase, stamp_ns: int) -> None:
@@ -314,14 +314,14 @@ class Controller:
         if self.mode is None or self.mode.phase is not phase:
             self.mode = ModeReport(phase, stamp_ns)
 
-    def _take(self, way: Way) -> None:
+    def _take(self, way: Target) -> None:
         """Track another way from now on."""
         if way is not self._way:
             self._way = way
             if self._planner is not None:
                 self._planner.change_reference()
 
-    def _effort(self, instant: Instant, gains: GainArrays) -> FloatArray:
+    def _effort(self, instant: TrackingInput, gains: GainArrays) -> FloatArray:
         """The effort (n,) of law and balance, within the limits."""
         effort = self._law(instant, gains)
         if self._settings.balance is not None and self._balance is not None:

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from controller_node.control_laws import pd_effort, pid_effort, stable_pd_effort, winds_up
+from controller_node.control_laws import anti_windup_mask, pd_effort, pid_effort, stable_pd_effort
 from controller_node.effort_series import EffortSeries
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
@@ -27,7 +27,7 @@ class GainArrays:
 
 
 @dataclass(frozen=True)
-class Plant:
+class LawContext:
     """What a law controls, and by which means."""
 
     layout: JointLayout
@@ -37,7 +37,7 @@ class Plant:
 
 
 @dataclass(frozen=True)
-class Instant:
+class TrackingInput:
     """What a law looks at in one tick."""
 
     time: float  # s since the episode's first state
@@ -53,11 +53,11 @@ class Instant:
         return error if self.response is None else error + self.response
 
 
-Law: TypeAlias = Callable[[Instant, GainArrays], FloatArray]
+Law: TypeAlias = Callable[[TrackingInput, GainArrays], FloatArray]
 """The effort (n,) that answers a state, not clipped yet."""
 
 
-def make_law(name: str, plant: Plant) -> Law:
+def make_law(name: str, plant: LawContext) -> Law:
     """The law of that name, one of `LAWS`, at the beginning of its work.
 
     Raises:
@@ -70,47 +70,47 @@ def make_law(name: str, plant: Plant) -> Law:
     return partial(_MEMORYLESS[name], plant)
 
 
-def _zero(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
+def _zero(plant: LawContext, instant: TrackingInput, gains: GainArrays) -> FloatArray:
     return np.zeros(plant.layout.size)
 
 
-def _feedforward(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
+def _feedforward(plant: LawContext, instant: TrackingInput, gains: GainArrays) -> FloatArray:
     assert plant.series is not None
     return plant.series.at(instant.time)
 
 
-def _p(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
+def _p(plant: LawContext, instant: TrackingInput, gains: GainArrays) -> FloatArray:
     error, velocity_error = _errors(plant, instant)
     return pd_effort(gains.stiffness, np.zeros(plant.layout.size), error, velocity_error)
 
 
-def _pd(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
+def _pd(plant: LawContext, instant: TrackingInput, gains: GainArrays) -> FloatArray:
     return pd_effort(gains.stiffness, gains.damping, *_errors(plant, instant))
 
 
-def _pd_gravity(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
+def _pd_gravity(plant: LawContext, instant: TrackingInput, gains: GainArrays) -> FloatArray:
     plant.model.update(instant.position, instant.velocity)
     return _pd(plant, instant, gains) + plant.model.gravity_force()
 
 
-def _stable_pd(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
+def _stable_pd(plant: LawContext, instant: TrackingInput, gains: GainArrays) -> FloatArray:
     plant.model.update(instant.position, instant.velocity)
     return _implicit(plant, instant, gains, 0.0)
 
 
-def _computed_torque(plant: Plant, instant: Instant, gains: GainArrays) -> FloatArray:
+def _computed_torque(plant: LawContext, instant: TrackingInput, gains: GainArrays) -> FloatArray:
     plant.model.update(instant.position, instant.velocity)
     return _implicit(plant, instant, gains, plant.model.inverse_dynamics(instant.now.acceleration))
 
 
-def _errors(plant: Plant, instant: Instant) -> tuple[FloatArray, FloatArray]:
+def _errors(plant: LawContext, instant: TrackingInput) -> tuple[FloatArray, FloatArray]:
     """Errors (n,) of configuration and velocity, of the reference against the state."""
     error = instant.error(plant.model, instant.now)
     return error, instant.now.velocity - instant.velocity
 
 
 def _implicit(
-    plant: Plant, instant: Instant, gains: GainArrays, feedforward: FloatArray | float
+    plant: LawContext, instant: TrackingInput, gains: GainArrays, feedforward: FloatArray | float
 ) -> FloatArray:
     period, model = plant.period, plant.model
     return stable_pd_effort(
@@ -129,12 +129,12 @@ def _implicit(
 class Pid:
     """PID: the one law that remembers. One is made for each episode, its integral at zero."""
 
-    def __init__(self, plant: Plant) -> None:
+    def __init__(self, plant: LawContext) -> None:
         self._plant = plant
         self._integral = np.zeros(plant.layout.size)
         self._last_time: float | None = None
 
-    def __call__(self, instant: Instant, gains: GainArrays) -> FloatArray:
+    def __call__(self, instant: TrackingInput, gains: GainArrays) -> FloatArray:
         """The effort (n,), with the error up to the present in its integral."""
         error, velocity_error = _errors(self._plant, instant)
         if self._last_time is not None:
@@ -150,7 +150,7 @@ class Pid:
         grown = self._integral + elapsed * error
         effort = self._effort(error, velocity_error, grown, gains)
         clipped = layout.clipped(effort, gains.effort_limits)
-        stays = winds_up(effort, clipped, error, layout)
+        stays = anti_windup_mask(effort, clipped, error, layout)
         self._integral = np.where(stays, self._integral, grown)
 
     def _effort(
@@ -161,7 +161,7 @@ class Pid:
         )
 
 
-_MEMORYLESS: dict[str, Callable[[Plant, Instant, GainArrays], FloatArray]] = {
+_MEMORYLESS: dict[str, Callable[[LawContext, TrackingInput, GainArrays], FloatArray]] = {
     "stable_pd": _stable_pd,
     "computed_torque": _computed_torque,
     "pd_gravity": _pd_gravity,

@@ -6,13 +6,13 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import fixed_order
-from msgs_config.messages.probe import Probe
+from msgs_config.messages.probe import DynamicsSample
 
 _LARGEST = 0.01  # where the two engines themselves differ by less than a millionth
 _TINY = 1e-150  # keeps 0 / 0 away
 
 
-def check_agreement(model: DynamicsModel, layout: JointLayout, probe: Probe) -> None:
+def check_agreement(model: DynamicsModel, layout: JointLayout, probe: DynamicsSample) -> None:
     """Compare the model with a simulator's probe: kinetic energy, and `M dv/dt + C = f`.
 
     The accelerations are weighed by the masses, and each force is compared with itself: a heavy

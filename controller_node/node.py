@@ -9,8 +9,8 @@ from rclpy.node import Node
 
 from controller_node.actuation import Actuation
 from controller_node.behaviours.base import ModeReport
-from controller_node.interface.contact_subscription import ContactInbox
-from controller_node.interface.publishers import Answer, Outputs
+from controller_node.interface.contact_subscription import ContactSubscription
+from controller_node.interface.publishers import Answer, Publishers
 from controller_node.interface.simulators import Simulators
 from controller_node.interface.strengths_topic import StrengthTopic
 from controller_node.interface.trajectory_topic import Trajectories
@@ -41,7 +41,7 @@ from msgs_config.parameters import Values, resolve
 from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
 from msgs_config.runtime.durations import Durations
 from msgs_config.runtime.once_logger import UNLOGGED, Warnings
-from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
@@ -97,7 +97,7 @@ class ControllerNode(Node):
             self._warnings,
         )
         self._contacts = (
-            ContactInbox(self, self._character, self._simulators, self._warnings)
+            ContactSubscription(self, self._character, self._simulators, self._warnings)
             if self._controller.needs_contacts
             else None
         )
@@ -110,7 +110,7 @@ class ControllerNode(Node):
             self._layout.mask(commanded_joints(self._character, self._values))
         )
         self._actuation = Actuation(len(commanded), self._layout.size)
-        self._outputs = Outputs(self, self._layout, commanded, self._simulators.bound)
+        self._outputs = Publishers(self, self._layout, commanded, self._simulators.bound)
         self._trajectories = Trajectories(self, self._controller, self._outputs, self._warnings)
         self._strengths = StrengthTopic(self, self._controller, self._outputs, self._warnings)
         self._publish_configuration()
@@ -131,7 +131,7 @@ class ControllerNode(Node):
             ActuatedCharactersError: the simulator simulates something else than this controller
                 was made for.
         """
-        spinner = Spinner(self)
+        spinner = PollingExecutor(self)
         self._controller.while_planning(spinner.serve)
         try:
             while not stop:

@@ -15,10 +15,14 @@ from msgs_config.messages.topics import Outgoing
 from msgs_config.parameters import Values
 from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
 from msgs_config.runtime.once_logger import UNLOGGED, Warnings
-from msgs_config.runtime.polling import Spinner
+from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
-from sim_node.interface.character_interface import Port, open_ports, publish_configurations
+from sim_node.interface.character_interface import (
+    CharacterInterface,
+    open_ports,
+    publish_configurations,
+)
 from sim_node.interface.initial_state_topic import InitialStates
 from sim_node.interface.other_publishers import RivalWatch
 from sim_node.interface.publisher_diagnosis import (
@@ -29,24 +33,24 @@ from sim_node.interface.publisher_diagnosis import (
 )
 from sim_node.interface.services import Services
 from sim_node.interface.status import report
-from sim_node.interface.world_interface import WorldPort
+from sim_node.interface.world_interface import WorldInterface
 from sim_node.parameters import (
     command_timeout_ns,
     is_realtime,
-    make_cast,
-    make_role,
+    load_parameters,
+    make_character_setup,
     make_settings,
     push_ticks,
     tick_period,
 )
 from sim_node.physics.simulation import Simulation
-from sim_node.timing.flow_control import BackPressure
-from sim_node.timing.lockstep import LockstepBarrier, Verdict
-from sim_node.timing.rate_limiter import Pace
+from sim_node.timing.flow_control import FlowControl
+from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
+from sim_node.timing.rate_limiter import RateLimiter
 from sim_node.timing.run_state import RunControl
 from sim_node.timing.tick_times import TickTimes
-from sim_node.timing.watchdog import Due, Patience
-from sim_node.timing.zero_order_hold import CommandHold
+from sim_node.timing.watchdog import Watchdog, WatchdogEvent
+from sim_node.timing.zero_order_hold import ZeroOrderHold
 
 _EXPLAIN_AFTER = 2.0  # s without a complete command before the node says what is missing
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
@@ -64,10 +68,12 @@ class SimNode(Node):
             ActuatedCharactersError: a parameter or a character cannot be used.
         """
         super().__init__(topics.SIM_NODE)
-        cast = make_cast(given_parameters(self))
+        cast = load_parameters(given_parameters(self))
         values = self._values = cast.values
         self._realtime = is_realtime(values)
-        roles = [make_role(part.character, part.values, part.name) for part in cast.parts]
+        roles = [
+            make_character_setup(part.character, part.values, part.name) for part in cast.parts
+        ]
         self._simulation = Simulation(roles, make_settings(values))
         self._initial_states = InitialStates(self, cast, self._simulation)
         declare(self, self._initial_states.known, values)
@@ -75,20 +81,22 @@ class SimNode(Node):
         self._warnings = Warnings(self)
         self._ports = open_ports(self, cast, self._simulation, self._session, self._warnings)
         self._rivals = RivalWatch(self, self._ports, self._session, self._warnings)
-        self._world_port = WorldPort(self, self._simulation, self._session, self._warnings)
+        self._world_port = WorldInterface(self, self._simulation, self._session, self._warnings)
         self._clock_topic = topics.create_publisher(self, topics.CLOCK)
         self._max_ticks = values.integer("max_ticks")
-        self._patience = Patience(
+        self._patience = Watchdog(
             republish_period=values.number("republish_period"),
             explain_after=_EXPLAIN_AFTER,
             timeout=values.number("lockstep_timeout"),
         )
-        self._pace = Pace(tick_period(values))
-        self._back_pressure = BackPressure(self._is_acknowledged)
+        self._pace = RateLimiter(tick_period(values))
+        self._back_pressure = FlowControl(self._is_acknowledged)
         self._diagnostics = DiagnosticsPublisher(self)
         self._next_diagnostics = 0.0
         self._timeouts = 0
-        self._conflicts: dict[str, Port] = {}  # joints of which commands compete in real time
+        self._conflicts: dict[
+            str, CharacterInterface
+        ] = {}  # joints of which commands compete in real time
         self._tick_times = TickTimes()
         self._begun = False
         self._control = RunControl()
@@ -103,7 +111,7 @@ class SimNode(Node):
                 said where a reference begins.
             CharacterError: the engine makes nothing sound of a character.
         """
-        spinner = Spinner(self)
+        spinner = PollingExecutor(self)
         try:
             cast = self._initial_states.settle(stop, spinner)
             if cast is None:
@@ -124,18 +132,18 @@ class SimNode(Node):
     @property
     def _finished(self) -> bool:
         ticks = self._simulation.tick - FIRST_TICK
-        return not self._control.is_stuck and 0 < self._max_ticks <= ticks
+        return not self._control.has_diverged and 0 < self._max_ticks <= ticks
 
     @property
     def _complete(self) -> bool:
         return all(port.collector.complete for port in self._ports)
 
-    def _wait_for_subscribers(self, stop: StopSignal, spinner: Spinner) -> None:
+    def _wait_for_subscribers(self, stop: StopSignal, spinner: PollingExecutor) -> None:
         wanted = self._values.integer("wait_for_subscribers")
         self._patience.restart(time.monotonic())
         while not stop and (found := self._fewest_subscribers) < wanted:
             spinner.rest()
-            if Due.EXPLAIN in self._patience.due(time.monotonic()):
+            if WatchdogEvent.EXPLAIN in self._patience.due(time.monotonic()):
                 sentence = f"waiting for {wanted} subscribers of joint_states; there are {found}"
                 self.get_logger().warning(f"{sentence}; has one not started, or ended?")
 
@@ -143,7 +151,7 @@ class SimNode(Node):
     def _fewest_subscribers(self) -> int:
         return min(port.outputs.state_subscribers for port in self._ports)
 
-    def _turn(self, spinner: Spinner) -> None:
+    def _turn(self, spinner: PollingExecutor) -> None:
         """Take commands, and advance if the tick is complete and due; or rest."""
         received = self._receive()
         if received:
@@ -183,7 +191,7 @@ class SimNode(Node):
                 if verdict is None:
                     break
                 received = True
-                if verdict is Verdict.CONFLICT:
+                if verdict is CommandStatus.CONFLICT:
                     self._on_conflict(port)
         return received
 
@@ -206,7 +214,7 @@ class SimNode(Node):
 
     def _begin_tick(self) -> None:
         for port in self._ports:
-            port.open()
+            port.begin_tick()
         self._patience.restart(time.monotonic())
         topics.publish_together(self._messages())
         for port in self._ports:
@@ -242,7 +250,7 @@ class SimNode(Node):
         if self._control.tick():
             self._run_services.end_steps()
 
-    def _on_conflict(self, port: Port) -> None:
+    def _on_conflict(self, port: CharacterInterface) -> None:
         if self._control.paused and not self._control.runs:
             return
         joint = f"{port.actor.role.prefix}{port.collector.conflict}"
@@ -270,10 +278,10 @@ class SimNode(Node):
             self._rivals.look()
         for due in self._patience.due(now):
             waits = self._control.runs and not self._complete
-            if due is Due.REPUBLISH:
+            if due is WatchdogEvent.REPUBLISH:
                 for port in self._ports:
                     port.outputs.republish(with_state=waits, with_episode=self._rivals.seen)
-            elif waits and due is Due.EXPLAIN:
+            elif waits and due is WatchdogEvent.EXPLAIN:
                 self.get_logger().warning(self._describe_waiting())
             elif waits and self._simulation.tick > FIRST_TICK:  # before that it just waits
                 self._on_timeout()
@@ -333,7 +341,7 @@ class SimNode(Node):
         if (period := tick_period(values)) != self._pace.period:
             self._pace.change(period, time.monotonic())
         for port in self._ports:
-            if isinstance(port.collector, CommandHold):
+            if isinstance(port.collector, ZeroOrderHold):
                 port.collector.timeout_ns = command_timeout_ns(values)
 
     def _publish_diagnostics(self) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from msgs_config import files
 from msgs_config.character.loading import load_character
-from msgs_config.character.model import Character, Loading
+from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.character.urdf_check import check_urdf
 from msgs_config.errors import CharacterError, ConfigurationError, LayoutError
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
@@ -24,7 +24,7 @@ from msgs_config.shared_parameters import (
     placed,
 )
 from sim_node.initial_state import POSITION, VELOCITY, check_given, initial_state_parameters
-from sim_node.physics.simulated_character import Role
+from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import SimulationSettings
 from sim_node.physics.world import WorldSettings
 
@@ -147,7 +147,7 @@ def character_parameters(character: Character) -> list[Parameter]:
 
 
 @dataclass(frozen=True)
-class Part:
+class CharacterParameters:
     """One character of a simulator: its name, and all parameters as if it were alone."""
 
     name: str
@@ -161,10 +161,10 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Cast:
+class SimulatorParameters:
     """The characters of a simulator, and its parameters as they are declared."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[CharacterParameters, ...]
     declared: tuple[Parameter, ...]
     values: Values
 
@@ -173,7 +173,7 @@ class Cast:
         """Names of the characters; empty for one alone, which has none."""
         return tuple(part.name for part in self.parts if part.name)
 
-    def with_values(self, changes: Mapping[str, Mapping[str, Value]]) -> "Cast":
+    def with_values(self, changes: Mapping[str, Mapping[str, Value]]) -> "SimulatorParameters":
         """The same with other values of parameters of characters, by the characters' names."""
         parts = [
             replace(part, values=Values({**part.values, **changes.get(part.name, {})}))
@@ -187,7 +187,7 @@ class Cast:
         return replace(self, parts=tuple(parts), values=Values(self.values | changed))
 
 
-def make_cast(given: Mapping[str, object]) -> Cast:
+def load_parameters(given: Mapping[str, object]) -> SimulatorParameters:
     """Load the characters that the parameters name, and resolve all parameters.
 
     With `characters` empty there is one, without a name, whose parameters have no prefix.
@@ -205,7 +205,7 @@ def make_cast(given: Mapping[str, object]) -> Cast:
             name = part.prefix + parameter.name
             declared.append(replace(parameter, name=name))
             values[name] = part.values[parameter.name]
-    return Cast(parts, tuple(declared), resolve(declared, values))
+    return SimulatorParameters(parts, tuple(declared), resolve(declared, values))
 
 
 def _names(given: Mapping[str, object]) -> list[str]:
@@ -237,7 +237,7 @@ def _own(given: Mapping[str, object], name: str, names: list[str]) -> dict[str, 
     return own
 
 
-def _make_part(name: str, given: Mapping[str, object]) -> Part:
+def _make_part(name: str, given: Mapping[str, object]) -> CharacterParameters:
     try:
         alone = resolve([CHARACTER, PLACEMENT], {k: given[k] for k in given if k in _BEFORE})
         character = placed(load_character(alone.text(CHARACTER.name)), alone)
@@ -246,16 +246,16 @@ def _make_part(name: str, given: Mapping[str, object]) -> Part:
         character.layout.mask(values.texts("commanded_joints"))  # they exist
     except (ConfigurationError, LayoutError) as error:
         raise ConfigurationError(f"character '{name}': {error}" if name else str(error)) from error
-    return Part(name, character, values)
+    return CharacterParameters(name, character, values)
 
 
 def _of_character(character: Character) -> list[Parameter]:
     return [CHARACTER, PLACEMENT, *character_parameters(character)]
 
 
-def make_role(character: Character, values: Values, name: str = "") -> Role:
+def make_character_setup(character: Character, values: Values, name: str = "") -> CharacterSetup:
     """The character's part in the simulation that the parameters' values say."""
-    return Role(
+    return CharacterSetup(
         character=character,
         commanded_joints=values.texts("commanded_joints"),
         initial_position=values.numbers(POSITION),
@@ -322,8 +322,8 @@ def make_settings(values: Values) -> SimulationSettings:
     )
 
 
-def _read_terrain(path: str) -> Loading:
+def _read_terrain(path: str) -> UrdfOptions:
     urdf = files.resolve(path, Path.cwd(), CharacterError)
     text = files.read_text(urdf, CharacterError)
     check_urdf(urdf, text)
-    return Loading(urdf, text, fixed_base=True)
+    return UrdfOptions(urdf, text, fixed_base=True)

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 
-class Claim:
+class DirectoryLock:
     """Holds a directory until `release`, or until its process ends, however that happens."""
 
     def __init__(self, directory: Path) -> None:

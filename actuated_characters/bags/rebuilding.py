@@ -12,7 +12,7 @@ from msgs_config.character.file import (
 )
 from msgs_config.character.loading import make_character
 from msgs_config.character.meshes import check_collision_meshes
-from msgs_config.character.model import Character, Loading
+from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.files import resolve
 from msgs_config.messages.configuration import (
@@ -32,7 +32,7 @@ class RecordedWorld:
     namespace: str = ""  # of its simulator, without the leading slash
     name: str = ""  # the character's in it, where there were several
     characters: tuple[str, ...] = ()  # the names of all of them, in the order of their entry
-    terrain: Loading | None = None  # what lay there, beside the plane
+    terrain: UrdfOptions | None = None  # what lay there, beside the plane
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,10 @@ def _paths_of_today(known: RunConfiguration, copy: WorldCopy) -> tuple[Path, Pat
     return path, file.loading.urdf_path
 
 
-def _terrain(known: RunConfiguration, terrain: UrdfCopy) -> Loading:
+def _terrain(known: RunConfiguration, terrain: UrdfCopy) -> UrdfOptions:
     path = terrain.path
     if path is None:
         path = resolve(str(known.parameters.get("terrain")), Path.cwd(), RecordingError)
-    loading = Loading(path, terrain.text, fixed_base=True)
+    loading = UrdfOptions(path, terrain.text, fixed_base=True)
     check_collision_meshes(loading, terrain.meshes)
     return loading

@@ -15,10 +15,10 @@ from actuated_characters.bags.tracks import (
     CONFIGURATION,
     MODE,
     PLAN,
+    CharacterTimeline,
     CommandArrays,
     ControllerSettings,
     ModeChange,
-    Track,
     integers,
     matrix,
 )
@@ -31,7 +31,7 @@ from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.projectiles import BallStates
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays
 
 __all__ = [
@@ -88,7 +88,9 @@ class Recording:
     plans: tuple[PlanArrays, ...] = ()  # what a planner expected, one after another
     unstamped_commands: tuple[CommandArrays, ...] = ()  # that answer no state, in real time
     pushes_sent: int = 0  # messages on `external_wrench`
-    throws: tuple[tuple[Throw, ...], ...] = ()  # (t,): what each tick began with; () if nothing
+    throws: tuple[
+        tuple[ProjectileThrow, ...], ...
+    ] = ()  # (t,): what each tick began with; () if nothing
     balls: tuple[BallStates | None, ...] = ()  # (t + 1,): where they are; () if there are none
     throws_sent: int = 0  # messages on `throw`
     skipped_states: int = 0  # of an episode whose first state is not in the bag
@@ -205,11 +207,13 @@ def _named(bag: Path, namespace: str) -> Iterator[None]:
         raise type(error)(f"recording {where}: {error}") from error
 
 
-def _read(bag: Path) -> tuple[list[Track], dict[str, WorldTrack]]:
+def _read(bag: Path) -> tuple[list[CharacterTimeline], dict[str, WorldTrack]]:
     """What is said in each namespace, of topics that have the contract's names."""
-    tracks: dict[str, Track] = {}
+    tracks: dict[str, CharacterTimeline] = {}
     worlds: dict[str, WorldTrack] = {}
-    places: dict[str, tuple[Track, str] | tuple[WorldTrack, str] | None] = {}  # by topic
+    places: dict[
+        str, tuple[CharacterTimeline, str] | tuple[WorldTrack, str] | None
+    ] = {}  # by topic
     for message in read_messages(bag):
         topic = message.topic
         if topic not in places:
@@ -237,15 +241,17 @@ def _world_of(topic: str, worlds: dict[str, WorldTrack]) -> tuple[WorldTrack, st
     return None
 
 
-def _track_of(topic: str, tracks: dict[str, Track]) -> tuple[Track, str] | None:
+def _track_of(
+    topic: str, tracks: dict[str, CharacterTimeline]
+) -> tuple[CharacterTimeline, str] | None:
     for name in _READ:
         if f"/{topic}".endswith(f"/{name}"):
             namespace = topic.removesuffix(name).strip("/")
-            return tracks.setdefault(namespace, Track(namespace)), name
+            return tracks.setdefault(namespace, CharacterTimeline(namespace)), name
     return None
 
 
-def _recording(track: Track, worlds: Mapping[str, WorldTrack]) -> Recording:
+def _recording(track: CharacterTimeline, worlds: Mapping[str, WorldTrack]) -> Recording:
     """What a track has collected. Raises RecordingError if it is not whole."""
     track.finish()
     assert track.rebuilt is not None
@@ -282,7 +288,7 @@ def _recording(track: Track, worlds: Mapping[str, WorldTrack]) -> Recording:
     )
 
 
-def _references(stamps: IntArray, track: Track) -> tuple[FloatArray, FloatArray]:
+def _references(stamps: IntArray, track: CharacterTimeline) -> tuple[FloatArray, FloatArray]:
     """Position and velocity (t + 1, n) of the reference at each state, NaN where there is none."""
     size, said = track.size, track.references
     at = integers(said.stamps_ns)
@@ -301,7 +307,7 @@ def _by_tick(stamps: IntArray, said: dict[int, WrenchArrays]) -> Wrenches:
     return tuple(said.get(stamp) for stamp in stamps.tolist()[1:]) if said else ()
 
 
-def _throws(stamps: IntArray, world: WorldTrack) -> tuple[tuple[Throw, ...], ...]:
+def _throws(stamps: IntArray, world: WorldTrack) -> tuple[tuple[ProjectileThrow, ...], ...]:
     """What each tick began with, as it was said with the stamp of the state after it."""
     if not world.throws:
         return ()

@@ -18,7 +18,7 @@ from rosbags.rosbag2.storage_mcap import McapWriter
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 
 from actuated_characters.bags.definitions import MessageDefinition
-from actuated_characters.bags.directory_lock import Claim
+from actuated_characters.bags.directory_lock import DirectoryLock
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 
 MCAP, SQLITE3 = "mcap", "sqlite3"
@@ -68,7 +68,7 @@ class BagFiles:
     def _open(self) -> None:
         try:
             self._writer.open()
-            self._claim = Claim(self.path)  # lest it is recovered while it is being written
+            self._claim = DirectoryLock(self.path)  # lest it is recovered while it is being written
         except _REFUSED:
             with suppress(*_REFUSED):
                 self._writer.abort()

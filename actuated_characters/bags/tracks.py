@@ -77,7 +77,7 @@ def integers(numbers: "array[int]") -> IntArray:
     return np.frombuffer(numbers, dtype=np.int64)
 
 
-class Track:
+class CharacterTimeline:
     """All that is said in one namespace.
 
     What a message means is known with the simulator's configuration; what comes before it is kept.

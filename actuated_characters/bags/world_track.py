@@ -3,7 +3,7 @@
 from msgs_config.errors import CommandError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 
 WORLD_TOPICS = tuple(topic.name for topic in (topics.THROW, topics.APPLIED_THROW, topics.THROWN))
 """Their names, below the simulator's namespace."""
@@ -13,7 +13,9 @@ class WorldTrack:
     """All that is said of the balls in one namespace."""
 
     def __init__(self) -> None:
-        self.throws: dict[int, list[Throw]] = {}  # by the stamp of the state after the tick
+        self.throws: dict[
+            int, list[ProjectileThrow]
+        ] = {}  # by the stamp of the state after the tick
         self.balls: dict[int, BallStates] = {}  # by stamp
         self.throws_sent = 0
         self._codec = ThrowCodec()

@@ -13,7 +13,7 @@ from actuated_characters.studies.catalogue import NAMES, load_study
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.studies.framework.study import Cell, Findings, Study
+    from actuated_characters.studies.framework.study import Cell, Study, StudyResult
 
 _ALL = "all"
 
@@ -75,7 +75,7 @@ def _conduct(study: "Study", directory: Path, *, keep_runs: bool) -> None:
             )
 
         laboratory = TopicLaboratory(directory, keep_runs=keep_runs, report=report)
-        findings = study.conduct(laboratory)
+        findings = study.run(laboratory)
         bar.update(task, description=study.name, completed=bar.tasks[task].total)
     files = write_findings(directory, study.name, findings)
     console.print(_table(study.title, findings))
@@ -84,7 +84,7 @@ def _conduct(study: "Study", directory: Path, *, keep_runs: bool) -> None:
     console.print(f"in {directory}: {', '.join(file.name for file in files)}")
 
 
-def _table(title: str, findings: "Findings") -> Table:
+def _table(title: str, findings: "StudyResult") -> Table:
     table = Table(title=title, title_justify="left")
     for column in findings.columns:
         table.add_column(column, overflow="fold")

@@ -22,7 +22,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from sim_node.physics.mass_matrix import make_passive_forces
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 
 _NEAR = 1e-4
 """rad or m from a limit at which it may act: the engine's solver is iterative."""
@@ -82,7 +82,7 @@ class EquationOfMotion:
         effort: FloatArray,  # (n,) applied: `effort` of the state that the tick leads to
         next_velocity: FloatArray,  # (n,) of that state
         contacts: FloatArray,  # (links, 6) N, N m; world axes, at the centres of mass
-        pushes: Sequence[Push] = (),
+        pushes: Sequence[ExternalWrench] = (),
     ) -> Balance:
         """The parts of the equation of one tick."""
         model = self._model
@@ -125,7 +125,7 @@ class EquationOfMotion:
         acceleration[:3] -= np.cross(spin, np.cross(spin, centre))
         return acceleration
 
-    def _at_centres(self, pushes: Sequence[Push]) -> FloatArray:
+    def _at_centres(self, pushes: Sequence[ExternalWrench]) -> FloatArray:
         """The wrenches (links, 6) of pushes, moved to the links' centres of mass."""
         wrenches = np.zeros((len(self._offsets), 6))
         _, turns = self._model.link_poses()

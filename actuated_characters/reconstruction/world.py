@@ -13,7 +13,7 @@ from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import SimulationError
-from sim_node.parameters import make_role, make_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation, Snapshot
 
 _FARTHEST = 0.6  # m, of the centre of mass from the motion's
@@ -86,7 +86,7 @@ class TrialWorld:
             self._simulation.close()  # only a new world returns to a state without a step
             self._simulation = self._fresh()
         else:
-            self._simulation.take_over(place.snapshot)
+            self._simulation.load_snapshot(place.snapshot)
         self._controller.begin_episode(self._episode_ns)  # it forgets what it planned before
         tick = 0 if place is None else place.tick
         memory = self._planner.memory() if place is None else place.memory
@@ -139,5 +139,5 @@ class TrialWorld:
         return is_lost(here, self._centre_at(self._desired(tick).configuration.position))
 
     def _fresh(self) -> Simulation:
-        role = make_role(self.plan.character, self.plan.simulator)
+        role = make_character_setup(self.plan.character, self.plan.simulator)
         return Simulation([role], make_settings(self.plan.simulator))

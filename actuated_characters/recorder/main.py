@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from typing import NoReturn
 
-from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, stand_back
+from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, use_batch_scheduling
 
 
 def main() -> NoReturn:
     """Run the recorder until a signal."""
     limit_threads()
-    stand_back()
+    use_batch_scheduling()
     run_node(_load)
 
 

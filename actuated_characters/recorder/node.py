@@ -13,7 +13,7 @@ from actuated_characters.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, RunListener
 from actuated_characters.recorder.session_filter import Heard, SessionFilter, session_in
-from actuated_characters.recorder.topic_reader import Inbox
+from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import (
     NamedTopics,
     RecordedTopic,
@@ -27,7 +27,7 @@ from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import REMEDY, SESSION, given_session, named
 from msgs_config.parameters import Parameter, Values, resolve
 from msgs_config.runtime.once_logger import Warnings
-from msgs_config.runtime.polling import Spinner
+from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare, given_parameters
 
@@ -78,7 +78,7 @@ class RecorderNode(Node):
         self._failure: str | None = None
         self._warnings = Warnings(self)
         self._filter = SessionFilter(given_session(values), self._warnings.say_once)
-        self._inboxes: list[Inbox] = []
+        self._inboxes: list[TopicReader] = []
         characters = values.texts("characters") or ("",)
         wanted = contract_topics(
             self, characters, values.texts("exclude"), measured_only=not values.flag("write_bag")
@@ -101,7 +101,7 @@ class RecorderNode(Node):
         """Record a topic from now on, whose publishers offer this."""
         if self._bag is not None:
             self._bag.add_topic(recorded.name, recorded.topic.message_type, offered)
-        self._inboxes.append(Inbox(self, recorded))
+        self._inboxes.append(TopicReader(self, recorded))
 
     def run(self, stop: StopSignal) -> None:
         """Record until `stop`, then take what is still on its way and write the figures.
@@ -109,7 +109,7 @@ class RecorderNode(Node):
         Raises:
             RecordingError: ticks were missing, or the bag could not be written.
         """
-        spinner = Spinner(self, _SERVICE_PERIOD)
+        spinner = PollingExecutor(self, _SERVICE_PERIOD)
         due = {self._search: 0.0, self._flush: 0.0, self._tell_progress: 0.0}
         try:
             while not stop:
@@ -261,10 +261,10 @@ class RecorderNode(Node):
     def _states_of(self, character: str) -> str:
         return self.resolve_topic_name(topics.JOINT_STATES.under(character).name)
 
-    def _dropped(self, inbox: Inbox) -> int:
+    def _dropped(self, inbox: TopicReader) -> int:
         return self._filter.dropped(inbox.recorded.name)
 
-    def _counts(self, character: str, count: Callable[[Inbox], int]) -> dict[str, int]:
+    def _counts(self, character: str, count: Callable[[TopicReader], int]) -> dict[str, int]:
         """By topic of a character, how many messages were lost or dropped, where any were."""
         return {
             inbox.recorded.name: count(inbox)

@@ -10,7 +10,7 @@ from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.runtime.polling import DirectSubscription
 
 
-class Inbox:
+class TopicReader:
     """Takes all messages of a topic, with a queue that outlasts long pauses."""
 
     def __init__(self, node: Node, recorded: RecordedTopic) -> None:

@@ -10,11 +10,11 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from actuated_characters.render.captions import write_on
-from actuated_characters.render.engine.camera_pose import View
+from actuated_characters.render.engine.camera_pose import CameraPose
 from actuated_characters.render.engine.render_scene import Size
-from actuated_characters.render.engine.renderer import Camera, LinkForce, Picture
+from actuated_characters.render.engine.renderer import LinkForce, Picture, Renderer
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.model import Character, Loading, Vector
+from msgs_config.character.model import Character, UrdfOptions, Vector
 from msgs_config.errors import ActuatedCharactersError, RunError
 
 _AHEAD = 2  # shots that a process has, so that it never waits for the next one
@@ -22,18 +22,18 @@ _WAIT = 5.0  # s for a process to end that was told to
 
 
 @dataclass(frozen=True)
-class Set:
+class SceneSettings:
     """What stays the same from picture to picture."""
 
     characters: tuple[Character, ...]
     ground: bool
-    terrain: Loading | None
+    terrain: UrdfOptions | None
     ghost_offset: Vector  # m, world: how far from its place a ghost is drawn
     size: Size
 
 
 @dataclass(frozen=True)
-class Shot:
+class FrameSpec:
     """One picture of characters of n degrees of freedom and l links in all."""
 
     position: FloatArray  # (n,), message form
@@ -41,11 +41,13 @@ class Shot:
     forces: tuple[LinkForce, ...]
     touching: BoolArray | None  # (l,): the links that are marked
     balls: FloatArray  # (m, 4): centres and radii, m in the world
-    view: View
+    view: CameraPose
     caption: str  # none if empty
 
 
-def draw(stage: Set, shots: Sequence[Shot], workers: int) -> Generator[Picture, None, None]:
+def draw(
+    stage: SceneSettings, shots: Sequence[FrameSpec], workers: int
+) -> Generator[Picture, None, None]:
     """The pictures (h, w, 3) one after another, as they are asked for.
 
     Process k of m draws each m-th picture from the k-th on. Close the iterator to end the processes
@@ -77,8 +79,8 @@ def draw(stage: Set, shots: Sequence[Shot], workers: int) -> Generator[Picture, 
                 _send(pipes[number % len(pipes)], shots[number])
 
 
-def _pictures(stage: Set, shots: Iterable[Shot]) -> Iterator[Picture]:
-    with Camera(stage.characters, ground=stage.ground, terrain=stage.terrain) as camera:
+def _pictures(stage: SceneSettings, shots: Iterable[FrameSpec]) -> Iterator[Picture]:
+    with Renderer(stage.characters, ground=stage.ground, terrain=stage.terrain) as camera:
         for shot in shots:
             picture = camera.picture(
                 shot.position,
@@ -127,7 +129,7 @@ def _draw_each(pipe: Connection) -> None:
             pipe.send(error)
 
 
-def _send(pipe: Connection, content: Set | Shot) -> None:
+def _send(pipe: Connection, content: SceneSettings | FrameSpec) -> None:
     # what the other side has to say of its end is read, not this
     with suppress(ConnectionError):
         pipe.send(content)

@@ -14,10 +14,10 @@ import numpy as np
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.annotations import Marks
 from actuated_characters.render.camera_path import followed_path
-from actuated_characters.render.drawing import Set, Shot, draw
-from actuated_characters.render.engine.camera_pose import View
+from actuated_characters.render.drawing import FrameSpec, SceneSettings, draw
+from actuated_characters.render.engine.camera_pose import CameraPose
 from actuated_characters.render.engine.render_scene import Size
-from actuated_characters.render.engine.renderer import Camera, LinkForce, Picture
+from actuated_characters.render.engine.renderer import LinkForce, Picture, Renderer
 from actuated_characters.render.scene import Scene, make_scene, nearest_rows
 from actuated_characters.render.stills import Progress, check_size
 from actuated_characters.render.video import check_video, write_video
@@ -95,7 +95,9 @@ class Movie:
         self._paths = camera_paths(self._scene)[self.rows]
         self._view, offset, self._arrows = self._framing()
         scene = self._scene
-        self._set = Set(scene.characters, scene.ground, scene.terrain, offset, self._settings.size)
+        self._set = SceneSettings(
+            scene.characters, scene.ground, scene.terrain, offset, self._settings.size
+        )
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -124,15 +126,15 @@ class Movie:
             counted = pictures if progress is None else _counted(pictures, progress)
             write_video(path, counted, settings.size, settings.fps)
 
-    def _framing(self) -> tuple[View, Vector, Forces]:
+    def _framing(self) -> tuple[CameraPose, Vector, Forces]:
         """The view of the first picture, how far the ghost is drawn from its place, the arrows."""
         scene, size = self._scene, self._settings.size
         ways = self._paths - self._paths[0]
         some = slice(None, None, ceil(len(self) / _MOST_FRAMED))
         positions, ghosts = scene.position[self.rows[some]], scene.reference[self.rows[some]]
         heading, offset = _heading(scene), _HERE
-        like = View(yaw=heading + _YAW, pitch=_PITCH)
-        with Camera(scene.characters, ground=False) as camera:
+        like = CameraPose(yaw=heading + _YAW, pitch=_PITCH)
+        with Renderer(scene.characters, ground=False) as camera:
             width, height, _ = camera.extents(positions, ways[some], like).tolist()
             if self._ghost is GhostPlace.BESIDE:
                 offset = _beside(heading, max(width, _LEAST_BESIDE * height) / sin(_YAW))
@@ -167,12 +169,12 @@ class Movie:
             yield min(before, max(row - 1, 0)), row
             before = row
 
-    def _shots(self) -> list[Shot]:
+    def _shots(self) -> list[FrameSpec]:
         scene, marks = self._scene, Marks(self._scene)
         ways = (self._paths - self._paths[0]).tolist()
         each = zip(self.rows.tolist(), ways, self._arrows, self._ticks(), strict=True)
         return [
-            Shot(
+            FrameSpec(
                 position=scene.position[row],
                 ghost=None if self._ghost is GhostPlace.NONE else scene.reference[row],
                 forces=forces,

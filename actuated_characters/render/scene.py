@@ -8,7 +8,7 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character.model import Character, Loading
+from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import RecordingError
 from msgs_config.shared_parameters import PLANE
 
@@ -41,7 +41,7 @@ class Scene:
         return bool(self.recordings[0].parameters.get("terrain", PLANE) == PLANE)
 
     @property
-    def terrain(self) -> Loading | None:
+    def terrain(self) -> UrdfOptions | None:
         """What else lay there."""
         return self.recordings[0].world.terrain
 

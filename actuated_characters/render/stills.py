@@ -10,7 +10,7 @@ from matplotlib.image import imsave
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.captions import captioned
 from actuated_characters.render.engine.render_scene import Size
-from actuated_characters.render.engine.renderer import Camera, Picture
+from actuated_characters.render.engine.renderer import Picture, Renderer
 from actuated_characters.render.scene import make_scene, nearest_rows
 from actuated_characters.whole_files import write_whole
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
@@ -110,7 +110,7 @@ def pose_strip(
     if captions is not None and len(captions) != count:
         raise ConfigurationError(f"{len(captions)} captions for {count} pictures")
     world = world or WorldSettings()
-    with Camera(character, ground=world.ground, terrain=world.terrain) as camera:
+    with Renderer(character, ground=world.ground, terrain=world.terrain) as camera:
         no_ghosts = np.full_like(positions, np.nan)
         ghosts = no_ghosts if ghosts is None else np.atleast_2d(ghosts)
         is_known = np.isfinite(ghosts)
@@ -160,7 +160,7 @@ def _rows(known: FloatArray, times: Sequence[float] | int) -> IntArray:
     return nearest_rows(known, wanted)
 
 
-def _natural_size(camera: Camera, positions: FloatArray) -> Size:
+def _natural_size(camera: Renderer, positions: FloatArray) -> Size:
     aspect = min(max(camera.aspect(positions), _NARROWEST), _WIDEST)
     return round(aspect * _TILE_HEIGHT), _TILE_HEIGHT
 

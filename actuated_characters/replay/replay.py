@@ -27,9 +27,9 @@ from msgs_config.arrays import IntArray
 from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import WrenchArrays, select
-from sim_node.physics.simulated_character import Actor
+from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 
 Progress = Callable[[int], None]
 """Is told how many ticks are done, of all worlds together."""
@@ -187,7 +187,7 @@ class _WorldReplay:
         return None
 
     def _compare(
-        self, simulation: Simulation, part: _Part, actor: Actor, offset: int
+        self, simulation: Simulation, part: _Part, actor: SimulatedCharacter, offset: int
     ) -> Difference | None:
         """What differs in one character's state, and in the contacts of the tick before it."""
         part.hash.add(actor.state)
@@ -227,7 +227,7 @@ class _WorldReplay:
         return min(found, key=lambda difference: difference.tick, default=None), largest
 
 
-def _pushes(part: _Part, row: int, tick: int) -> Sequence[Push]:
+def _pushes(part: _Part, row: int, tick: int) -> Sequence[ExternalWrench]:
     applied = part.recording.applied_wrench[row] if part.recording.applied_wrench else None
     if applied is None or not applied.links:
         return ()
@@ -235,7 +235,7 @@ def _pushes(part: _Part, row: int, tick: int) -> Sequence[Push]:
 
 
 def _compare_contacts(
-    simulation: Simulation, part: _Part, actor: Actor, row: int
+    simulation: Simulation, part: _Part, actor: SimulatedCharacter, row: int
 ) -> Difference | None:
     """Compare what touched in the tick that led to the state of a row."""
     recorded = part.recording.contacts[row - 1] if part.recording.contacts and row else None

@@ -15,10 +15,15 @@ from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import RATE
 from msgs_config.versions import describe_changes, installed_versions
-from sim_node.parameters import PARAMETERS, character_parameters, make_role, make_settings
-from sim_node.physics.simulated_character import Role
+from sim_node.parameters import (
+    PARAMETERS,
+    character_parameters,
+    make_character_setup,
+    make_settings,
+)
+from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 
 _GROUNDS = ("plane", "none")
 _MOST_BEHIND = 1  # states by which a recorder that is stopped may have more of one than of another
@@ -76,7 +81,7 @@ def make_simulation(together: Sequence[Recording], first_stamp_ns: int) -> Simul
     """
     values = [simulator_values(recording) for recording in together]
     roles = [
-        _unlimited(make_role(recording.character, own, recording.world.name))
+        _unlimited(make_character_setup(recording.character, own, recording.world.name))
         for recording, own in zip(together, values, strict=True)
     ]
     settings = _settings(together[0], values[0])
@@ -96,14 +101,14 @@ def _settings(recording: Recording, values: Values) -> SimulationSettings:
     return replace(settings, world=world, command_delay_ticks=0)
 
 
-def _unlimited(role: Role) -> Role:
+def _unlimited(role: CharacterSetup) -> CharacterSetup:
     links = tuple(
         replace(link, joint=replace(link.joint, effort_limit=inf)) for link in role.character.links
     )
     return replace(role, character=replace(role.character, links=links))
 
 
-def pushes_of(character: Character, applied: WrenchArrays, tick: int) -> list[Push]:
+def pushes_of(character: Character, applied: WrenchArrays, tick: int) -> list[ExternalWrench]:
     """The pushes that acted during the tick that begins at `tick`, in their order.
 
     Raises:
@@ -116,7 +121,7 @@ def pushes_of(character: Character, applied: WrenchArrays, tick: int) -> list[Pu
             raise RecordingError(f"a push of tick {tick}: {one_of('link', name, list(rows))}")
         centre = character.links[rows[name]].inertial_pose.position
         point = applied.points[number] if len(applied.points) else np.array(centre)
-        pushes.append(Push(rows[name], applied.wrenches[number], point, tick, 1))
+        pushes.append(ExternalWrench(rows[name], applied.wrenches[number], point, tick, 1))
     return pushes
 
 

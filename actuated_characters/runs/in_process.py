@@ -11,9 +11,9 @@ from actuated_characters.runs.planned_wrenches import PlannedPush, push_schedule
 from controller_node.controller import Controller
 from controller_node.parameters import make_controller
 from msgs_config.messages.clock import TickClock
-from sim_node.parameters import make_role, make_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import ThrowSchedule
+from sim_node.physics.throws import ThrowQueue
 
 
 def ticks_in_process(
@@ -31,9 +31,9 @@ def ticks_in_process(
         SimulationError: the simulation diverged.
     """
     controller = controller or make_controller(plan.character, plan.reference, plan.controller)
-    role = make_role(plan.character, plan.simulator)
+    role = make_character_setup(plan.character, plan.simulator)
     schedule, clock = push_schedule(plan, pushes), TickClock(plan.simulator.integer("rate"))
-    balls = ThrowSchedule()
+    balls = ThrowQueue()
     for throw in throws:
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))
     with Simulation([role], make_settings(plan.simulator)) as simulation:

@@ -15,7 +15,7 @@ from msgs_config.messages.session import SESSION, given_session
 from msgs_config.messages.topics import Topic
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare, given_parameters
 
@@ -50,7 +50,7 @@ class PusherNode(Node):
         session = given_session(values)
         pushes = read_pushes(Path(values.text("file")))
         self._outboxes = [
-            _Outbox(
+            _PlannedPublisher(
                 self,
                 topics.EXTERNAL_WRENCH,
                 [encode_wrenches(replace(push.arrays(), frame_id=session)) for push in pushes],
@@ -60,7 +60,7 @@ class PusherNode(Node):
         if values.text("throws"):
             throws, codec = read_throws(Path(values.text("throws"))), ThrowCodec(session)
             self._outboxes.append(
-                _Outbox(
+                _PlannedPublisher(
                     self,
                     topics.THROW,
                     [codec.encode(each.stamp_ns, each.throw) for each in throws],
@@ -71,7 +71,7 @@ class PusherNode(Node):
 
     def run(self, stop: StopSignal) -> None:
         """Send as soon as all is heard, then be there until `stop`."""
-        spinner = Spinner(self)
+        spinner = PollingExecutor(self)
         try:
             while not stop:
                 if self._torques is None and all(outbox.is_heard for outbox in self._outboxes):
@@ -86,7 +86,7 @@ class PusherNode(Node):
             spinner.close()
 
 
-class _Outbox:
+class _PlannedPublisher:
     """Serialised messages for one topic, and how many are to hear them."""
 
     def __init__(self, node: Node, topic: Topic, messages: Sequence[bytes], wanted: int) -> None:

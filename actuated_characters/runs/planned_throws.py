@@ -16,7 +16,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, RecordingError, one_of
 from msgs_config.geometry import fixed_order, rotations
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.throw import Throw, natural_radius
+from msgs_config.messages.throw import ProjectileThrow, natural_radius
 from msgs_config.shared_parameters import PLANE
 from sim_node.physics.sphere_sweep import find_impact
 from sim_node.physics.throws import MOST_BALLS
@@ -43,7 +43,7 @@ class PlannedThrow:
     """A ball that is let go in the state of a stamp."""
 
     stamp_ns: int
-    throw: Throw
+    throw: ProjectileThrow
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def _planned(plan: Plan, aim: Aim) -> tuple[PlannedThrow, tuple[str, ...]]:
             f"a ball with a radius of {aim.size:.3g} m on its way to '{aim.target}' would be "
             f"{-lowest:.2g} m in the ground; take a smaller 'radius', or another 'from'"
         )
-    throw = Throw(aim.mass, aim.size, _triple(start), _triple(velocity))
+    throw = ProjectileThrow(aim.mass, aim.size, _triple(start), _triple(velocity))
     return PlannedThrow(TickClock(rate).stamp_ns(1 + first), throw), impact.before
 
 
@@ -201,7 +201,9 @@ def read_throws(file: Path) -> list[PlannedThrow]:
     """
     try:
         content = json.loads(file.read_text("utf-8"))
-        return [PlannedThrow(each["stamp_ns"], Throw(**each["throw"])) for each in content]
+        return [
+            PlannedThrow(each["stamp_ns"], ProjectileThrow(**each["throw"])) for each in content
+        ]
     except (OSError, ValueError, TypeError, KeyError, CommandError) as error:
         raise RecordingError(f"{file} holds no throws: {error}") from error
 

@@ -13,7 +13,7 @@ from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.parameters import push_ticks
-from sim_node.physics.wrenches import PushSchedule
+from sim_node.physics.wrenches import WrenchQueue
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class PlannedPush:
         return WrenchArrays.of_rows(self.stamp_ns, [self.link], [self.wrench], points)
 
 
-def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> PushSchedule:
+def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
     """The pushes of a plan as its simulator takes them, without topics."""
-    schedule, clock = PushSchedule(plan.character), TickClock(plan.simulator.integer("rate"))
+    schedule, clock = WrenchQueue(plan.character), TickClock(plan.simulator.integer("rate"))
     for push in pushes:
         content = push.arrays()
         schedule.add(

@@ -10,7 +10,7 @@ from actuated_characters.bags.recording import Recording
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import label, make_panels, show_pictures
-from actuated_characters.studies.framework.study import Case, Findings, Laboratory
+from actuated_characters.studies.framework.study import RunSpec, StudyResult, StudyRunner
 from actuated_characters.studies.framework.tracking import errors_by_joint, fall_time
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT
@@ -47,7 +47,7 @@ class AssistanceStudy:
     title = "the walk by strength of root force and torque"
     runs = len(_STRENGTHS) + 1
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Walk with each strength, and with a root that nobody may command."""
         character = load_character(_CHARACTER)
         walks = [
@@ -55,7 +55,7 @@ class AssistanceStudy:
             for strength in _STRENGTHS
         ]
         walks.append(_walk(laboratory, "none", 0.0, {"root_assistance": False}))
-        return Findings(
+        return StudyResult(
             columns=(
                 "root stiffness",
                 "falls at (s)",
@@ -90,11 +90,11 @@ def weakened(character: Character, strength: float) -> dict[str, object]:
 
 
 def _walk(
-    laboratory: Laboratory, name: str, strength: float, controller: dict[str, object]
+    laboratory: StudyRunner, name: str, strength: float, controller: dict[str, object]
 ) -> _Walk:
     reference = {"reference": "clip", "clip": "walk"}
     label = name.replace(" ", "")
-    case = Case(label, _CHARACTER, _DURATION, reference, controller=controller)
+    case = RunSpec(label, _CHARACTER, _DURATION, reference, controller=controller)
     run = laboratory.run(case).recording
     position, desired = run.position[:-1], run.reference_position[:-1]
     fall = fall_time(run.times[:-1], position[:, 2], desired[:, 2])

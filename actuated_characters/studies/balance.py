@@ -9,7 +9,7 @@ import numpy as np
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.stills import pose_strip
 from actuated_characters.runs.planned_wrenches import PlannedPush
-from actuated_characters.studies.framework.study import Case, Findings, Laboratory, Outcome
+from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyResult, StudyRunner
 from msgs_config.arrays import BoolArray
 from msgs_config.geometry import rotations
 from msgs_config.messages.clock import TickClock
@@ -43,7 +43,7 @@ class _Limit:
 
     survived: float  # N s
     fell: float  # N s
-    strongest: Outcome  # the run with the largest impulse that it survived
+    strongest: RunResult  # the run with the largest impulse that it survived
 
 
 class BalanceStudy:
@@ -53,7 +53,7 @@ class BalanceStudy:
     title = "balance without assistance: pushes at the chest, 0.1 s"
     runs = 2 + 7 * len(_DIRECTIONS)
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Stand with and without the virtual force, then be pushed harder and harder."""
         stood = laboratory.run(_case("stand", _STANDING))
         limp = laboratory.run(_case("without", _PUSHED, {"balance": False}))
@@ -64,7 +64,7 @@ class BalanceStudy:
             for name, limit in limits.items()
         ]
         falls = standing_time(limp.recording)
-        return Findings(
+        return StudyResult(
             columns=("direction", "survives (N s)", "falls (N s)", "change of speed (m/s)"),
             rows=rows,
             figures={
@@ -100,7 +100,7 @@ def standing_time(recording: Recording) -> float:
     return float(recording.times[last - 1])
 
 
-def survives(outcome: Outcome) -> bool:
+def survives(outcome: RunResult) -> bool:
     """Whether it stood all the time, and is upright in the end."""
     run = outcome.recording
     return not outcome.diverged and bool(stands(run).all()) and is_upright(run)
@@ -111,11 +111,11 @@ def _case(
     duration: float,
     controller: Mapping[str, object] | None = None,
     impulse: tuple[float, float] = (0.0, 0.0),
-) -> Case:
+) -> RunSpec:
     stamp = TickClock(_RATE).stamp_ns(1 + round(_PUSH_TIME * _RATE))
     force = (impulse[0] / _PUSH_DURATION, impulse[1] / _PUSH_DURATION, 0.0)
     push = PlannedPush(stamp, _LINK, (*force, 0.0, 0.0, 0.0))
-    return Case(
+    return RunSpec(
         label,
         "humanoid",
         duration,
@@ -126,11 +126,11 @@ def _case(
     )
 
 
-def _largest_impulse(laboratory: Laboratory, direction: str) -> _Limit:
+def _largest_impulse(laboratory: StudyRunner, direction: str) -> _Limit:
     """Bisect between no push and one that throws anybody over."""
     x, y = _DIRECTIONS[direction]
 
-    def pushed(impulse: float) -> Outcome:
+    def pushed(impulse: float) -> RunResult:
         label = f"{direction}_{impulse:g}Ns"
         return laboratory.run(_case(label, _PUSHED, impulse=(impulse * x, impulse * y)))
 

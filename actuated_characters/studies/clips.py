@@ -10,7 +10,7 @@ from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.engine.visual_shapes import outline
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import label, make_panels, show_pictures
-from actuated_characters.studies.framework.study import Case, Findings, Laboratory, Outcome
+from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyResult, StudyRunner
 from actuated_characters.studies.framework.tracking import errors_by_joint
 from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
@@ -38,7 +38,7 @@ class _Tracked:
 
     clip: str
     loops: bool
-    outcome: Outcome
+    outcome: RunResult
     errors: FloatArray  # (t, j) rad
     captured: tuple[str, ...]  # links, besides the feet, on the ground in the capture itself
     touching: tuple[str, ...]  # links, besides feet and shins, on the ground in the run
@@ -62,12 +62,12 @@ class ClipsStudy:
     title = "every clip with root assistance, 10 s each"
     runs = 15
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Track each clip and compare its error with the bound."""
         character = load_character(_CHARACTER)
         runs = [_track(laboratory, character, clip) for clip in available_clips(character)]
         worst = max(runs, key=lambda run: float(run.errors.mean()) / run.bound)
-        return Findings(
+        return StudyResult(
             columns=(
                 "clip",
                 "loops",
@@ -119,8 +119,8 @@ def clearances(character: Character, positions: FloatArray) -> Mapping[str, Floa
     return lowest
 
 
-def _track(laboratory: Laboratory, character: Character, clip: str) -> _Tracked:
-    case = Case(clip, _CHARACTER, _DURATION, {"reference": "clip", "clip": clip})
+def _track(laboratory: StudyRunner, character: Character, clip: str) -> _Tracked:
+    case = RunSpec(clip, _CHARACTER, _DURATION, {"reference": "clip", "clip": clip})
     outcome = laboratory.run(case)
     run, feet = outcome.recording, set(character.feet)
     parents = {link.name: character.links[link.parent].name for link in character.links[1:]}

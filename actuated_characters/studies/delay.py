@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuated_characters.studies.framework.plots import label, make_panels
-from actuated_characters.studies.framework.study import Case, Findings, Laboratory
+from actuated_characters.studies.framework.study import RunSpec, StudyResult, StudyRunner
 from actuated_characters.studies.framework.tracking import (
     delayed_spectral_radius,
     errors_by_joint,
@@ -70,13 +70,13 @@ class DelayStudy:
     title = "tracking of the walk by control rate and delay, with root assistance"
     runs = len(_RATES) * len(_DELAYS)
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Walk at each rate with each delay."""
         character = load_character(_CHARACTER)
         cells = [
             _measure(laboratory, character, rate, delay) for rate in _RATES for delay in _DELAYS
         ]
-        return Findings(
+        return StudyResult(
             columns=(
                 "rate (Hz)",
                 "delay (ticks)",
@@ -137,10 +137,10 @@ def small_deviations(
     )
 
 
-def _measure(laboratory: Laboratory, character: Character, rate: int, delay: int) -> _Cell:
+def _measure(laboratory: StudyRunner, character: Character, rate: int, delay: int) -> _Cell:
     substeps = _ENGINE_RATE // rate
     outcome = laboratory.run(
-        Case(
+        RunSpec(
             f"{rate}Hz_{delay}ticks",
             _CHARACTER,
             _DURATION,

@@ -11,11 +11,17 @@ from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.equation_of_motion import EquationOfMotion
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.studies.framework.plots import label, make_panels
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory, Outcome
+from actuated_characters.studies.framework.study import (
+    Cell,
+    RunResult,
+    RunSpec,
+    StudyResult,
+    StudyRunner,
+)
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.wrenches import WrenchArrays
-from sim_node.parameters import make_role, make_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -24,9 +30,9 @@ if TYPE_CHECKING:  # it takes a second to import
 _DURATION = 3.0  # s
 _WALK: Mapping[str, object] = {"reference": "clip", "clip": "walk"}
 _CASES = (
-    Case("walk", "humanoid", _DURATION, _WALK, contacts=True),
-    Case("stand", "humanoid", _DURATION, contacts=True),
-    Case("fall", "humanoid", _DURATION, controller={"root_assistance": False}, contacts=True),
+    RunSpec("walk", "humanoid", _DURATION, _WALK, contacts=True),
+    RunSpec("stand", "humanoid", _DURATION, contacts=True),
+    RunSpec("fall", "humanoid", _DURATION, controller={"root_assistance": False}, contacts=True),
 )
 _SMALLEST = 1e-17  # that a logarithmic axis shows
 _PARTS = ("M (v' - v) / h", "C", "f", "J^T contacts")
@@ -63,14 +69,14 @@ class EquationStudy:
     title = "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part"
     runs = len(_CASES)
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Walk, stand and fall; and time a walk part by part."""
         outcomes = {case.label: laboratory.run(case) for case in _CASES}
         closures = {name: close(outcome.recording) for name, outcome in outcomes.items()}
         tick = _measure(outcomes["walk"])
         rows = [_row(name, closure) for name, closure in closures.items()]
         walk = closures["walk"]
-        return Findings(
+        return StudyResult(
             columns=("run", "p50", "p99", "largest", "p50 without contacts"),
             rows=rows,
             figures={self.name: _draw(closures, tick)},
@@ -121,11 +127,11 @@ def _rows(contacts: WrenchArrays | None, links: Mapping[str, int]) -> FloatArray
     return wrenches
 
 
-def _measure(walk: Outcome) -> TickTime:
+def _measure(walk: RunResult) -> TickTime:
     """Time the walk's parts in one process; the whole is that of the run over topics."""
     plan = make_plan("humanoid", 1.0, _WALK, {}, {})
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    role = make_role(plan.character, plan.simulator)
+    role = make_character_setup(plan.character, plan.simulator)
     physics, control = [], []
     with Simulation([role], make_settings(plan.simulator)) as simulation:
         (actor,) = simulation.actors

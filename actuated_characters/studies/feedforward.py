@@ -10,7 +10,13 @@ from actuated_characters.render.stills import pose_strip
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies.framework.motion_replay import effort_table, errors_of, same_states
 from actuated_characters.studies.framework.plots import label, make_panels
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory, Outcome
+from actuated_characters.studies.framework.study import (
+    Cell,
+    RunResult,
+    RunSpec,
+    StudyResult,
+    StudyRunner,
+)
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.clock import TickClock
 
@@ -74,10 +80,10 @@ _SUBJECTS = (
 class Quartet:
     """The four runs of a subject: closed and open loop, left alone and pushed."""
 
-    closed: Outcome
-    opened: Outcome
-    closed_pushed: Outcome
-    open_pushed: Outcome
+    closed: RunResult
+    opened: RunResult
+    closed_pushed: RunResult
+    open_pushed: RunResult
 
 
 class FeedforwardStudy:
@@ -87,11 +93,11 @@ class FeedforwardStudy:
     title = "torques of a run, played again (open loop) and computed anew (closed loop)"
     runs = 4 * len(_SUBJECTS)
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Four runs of an arm and of a walk."""
         quartets = [_run(laboratory, subject) for subject in _SUBJECTS]
         arm, walk = quartets
-        return Findings(
+        return StudyResult(
             columns=_COLUMNS,
             rows=[
                 row
@@ -110,8 +116,8 @@ class FeedforwardStudy:
         )
 
 
-def _run(laboratory: Laboratory, subject: _Subject) -> Quartet:
-    closed = Case(
+def _run(laboratory: StudyRunner, subject: _Subject) -> Quartet:
+    closed = RunSpec(
         label=f"{subject.character}-closed",
         character=subject.character,
         duration=subject.duration,
@@ -131,13 +137,13 @@ def _run(laboratory: Laboratory, subject: _Subject) -> Quartet:
     stamp_ns = TickClock(_RATE).stamp_ns(1 + round(_PUSH_TIME * _RATE))
     push = PlannedPush(stamp_ns, subject.link, (*subject.force, 0.0, 0.0, 0.0))
 
-    def pushed(case: Case) -> Outcome:
+    def pushed(case: RunSpec) -> RunResult:
         return laboratory.run(replace(case, label=f"{case.label}-pushed", pushes=[push]))
 
     return Quartet(first, laboratory.run(opened), pushed(closed), pushed(opened))
 
 
-def _named(quartet: Quartet) -> list[tuple[str, bool, Outcome]]:
+def _named(quartet: Quartet) -> list[tuple[str, bool, RunResult]]:
     """Loop, whether it was pushed, and the run."""
     return [
         ("closed", False, quartet.closed),
@@ -168,7 +174,7 @@ def _rows(subject: _Subject, quartet: Quartet) -> list[list[Cell]]:
     return rows
 
 
-def _fell(outcome: Outcome) -> bool | None:
+def _fell(outcome: RunResult) -> bool | None:
     fell = outcome.summary["fell"]
     return fell if isinstance(fell, bool) else None
 

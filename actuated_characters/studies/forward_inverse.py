@@ -19,7 +19,13 @@ from actuated_characters.studies.framework.motion_replay import (
     orders,
 )
 from actuated_characters.studies.framework.plots import THEORY, label, make_panels
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory, Outcome
+from actuated_characters.studies.framework.study import (
+    Cell,
+    RunResult,
+    RunSpec,
+    StudyResult,
+    StudyRunner,
+)
 from controller_node.references.files.clip import read_clip
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -82,7 +88,7 @@ class _Return:
     """What came back of a motion whose inverse dynamics was fed forward."""
 
     inverse: _Inverse
-    outcome: Outcome
+    outcome: RunResult
     root: str  # what was done with the root efforts
     ground: bool
 
@@ -100,7 +106,7 @@ class ForwardInverseStudy:
     title = "inverse dynamics of a motion, fed forward without feedback"
     runs = len(_ARM_RATES) + len(_WALK_RATES) + 1
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """An arm and a walk in the air at several rates; the walk on the ground by its joints."""
         arm = _Motion(_ARM, _arm_keyframes(laboratory), _ARM_LENGTH)
         keyframes, cycle = _walk_keyframes(laboratory)
@@ -111,7 +117,7 @@ class ForwardInverseStudy:
             _give_back(laboratory, each, root="fed forward", ground=False) for each in inverses
         ]
         joints = _give_back(laboratory, inverses[0], root="left out")
-        return Findings(
+        return StudyResult(
             columns=_COLUMNS,
             rows=[*_rows(arms), *_rows(whole), *_rows([joints])],
             figures={
@@ -123,7 +129,7 @@ class ForwardInverseStudy:
         )
 
 
-def _arm_keyframes(laboratory: Laboratory) -> str:
+def _arm_keyframes(laboratory: StudyRunner) -> str:
     return _write_keyframes(
         laboratory,
         _ARM,
@@ -134,7 +140,7 @@ def _arm_keyframes(laboratory: Laboratory) -> str:
     )
 
 
-def _walk_keyframes(laboratory: Laboratory) -> tuple[str, float]:
+def _walk_keyframes(laboratory: StudyRunner) -> tuple[str, float]:
     """The clip as a smooth motion, from rest; the file, and the time in s of a cycle.
 
     The clip itself is linear between its frames: its velocity jumps, for which no effort is
@@ -151,7 +157,7 @@ def _walk_keyframes(laboratory: Laboratory) -> tuple[str, float]:
 
 
 def _write_keyframes(
-    laboratory: Laboratory, character: str, keyframes: Sequence[tuple[float, Mapping[str, float]]]
+    laboratory: StudyRunner, character: str, keyframes: Sequence[tuple[float, Mapping[str, float]]]
 ) -> str:
     content = {
         "interpolation": "smooth",
@@ -160,7 +166,7 @@ def _write_keyframes(
     return laboratory.write(f"{character}_keyframes.yaml", yaml.safe_dump(content))
 
 
-def _invert(laboratory: Laboratory, motion: _Motion, rate: int) -> _Inverse:
+def _invert(laboratory: StudyRunner, motion: _Motion, rate: int) -> _Inverse:
     """Inverse dynamics at each tick of a run."""
     plan = make_plan(motion.character, motion.duration, motion.reference, {"rate": rate}, {})
     model = DynamicsModel(plan.character)
@@ -172,12 +178,12 @@ def _invert(laboratory: Laboratory, motion: _Motion, rate: int) -> _Inverse:
 
 
 def _give_back(
-    laboratory: Laboratory, inverse: _Inverse, *, root: str = "none", ground: bool = True
+    laboratory: StudyRunner, inverse: _Inverse, *, root: str = "none", ground: bool = True
 ) -> _Return:
     """Feed efforts forward; the root's only if that is what is said of them."""
     motion = inverse.motion
     outcome = laboratory.run(
-        Case(
+        RunSpec(
             label=f"{motion.character}-{inverse.rate}{'' if ground else '-air'}",
             character=motion.character,
             duration=motion.duration,

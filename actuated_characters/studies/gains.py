@@ -10,7 +10,13 @@ from actuated_characters.bags.recording import Recording
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import THEORY, label, make_panels, show_pictures
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory, Outcome
+from actuated_characters.studies.framework.study import (
+    Cell,
+    RunResult,
+    RunSpec,
+    StudyResult,
+    StudyRunner,
+)
 from actuated_characters.studies.framework.tracking import (
     errors_by_joint,
     inertialess_response,
@@ -71,14 +77,14 @@ class GainsStudy:
     title = "stiffness and damping x 0.1, 1, 10: the walk, with root assistance"
     runs = 10
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Walk by each pair of factors, with and without the reference's velocity."""
         runs = {
             (factors, velocity): laboratory.run(_case(factors, velocity))
             for factors in dict.fromkeys(_FACTORS.values())
             for velocity in _VELOCITIES
         }
-        return Findings(
+        return StudyResult(
             columns=(
                 "gains",
                 "reference velocity",
@@ -103,12 +109,12 @@ class GainsStudy:
         )
 
 
-_Runs = Mapping[tuple[tuple[float, float], str], Outcome]
+_Runs = Mapping[tuple[tuple[float, float], str], RunResult]
 
 
-def _case(factors: tuple[float, float], velocity: str) -> Case:
+def _case(factors: tuple[float, float], velocity: str) -> RunSpec:
     stiffness, damping = factors
-    return Case(
+    return RunSpec(
         f"p{stiffness:g}_d{damping:g}_{velocity}",
         _CHARACTER,
         _DURATION,
@@ -135,7 +141,7 @@ def _knee(run: Recording, factors: tuple[float, float]) -> _Knee:
     return _Knee(run.times[:-1], run.position[:-1, entry], reference, theory)
 
 
-def _row(name: str, velocity: str, outcome: Outcome) -> tuple[Cell, ...]:
+def _row(name: str, velocity: str, outcome: RunResult) -> tuple[Cell, ...]:
     run = outcome.recording
     errors = errors_by_joint(run.layout, run.position[:-1], run.reference_position[:-1])
     saturated = outcome.summary["saturated_fraction"]

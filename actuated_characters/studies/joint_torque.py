@@ -18,7 +18,7 @@ from actuated_characters.studies.framework.bodies import (
     write_hinged_boxes,
 )
 from actuated_characters.studies.framework.plots import THEORY, label, make_panels
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory
+from actuated_characters.studies.framework.study import Cell, RunSpec, StudyResult, StudyRunner
 from controller_node.effort_series import write_effort_series
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
@@ -58,7 +58,7 @@ class JointTorqueStudy:
     title = "joint torque: forces between two bodies that sum to zero"
     runs = 5
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Run the torque at two rates, then the forces, a root force, and nothing at all."""
         boxes = write_hinged_boxes(
             laboratory, "hinged", _PARENT, _CHILD, joint_in_parent=(0.0, 0.0, 0.0)
@@ -77,7 +77,7 @@ class JointTorqueStudy:
             "neither": passive,
         }
         apart = np.abs(by_torque.recording.position - by_forces.recording.position).max()
-        return Findings(
+        return StudyResult(
             columns=(
                 "driven by",
                 "hinge at the end (rad)",
@@ -122,7 +122,7 @@ def _profile(times: FloatArray) -> FloatArray:
 
 
 def _run(
-    laboratory: Laboratory,
+    laboratory: StudyRunner,
     boxes: str,
     name: str,
     *,
@@ -133,7 +133,7 @@ def _run(
 ) -> _Run:
     times = _times(rate)
     series = _write_series(laboratory, boxes, name, torque * _profile(times), times, force)
-    case = Case(
+    case = RunSpec(
         label=name,
         character=boxes,
         duration=_DURATION,
@@ -156,7 +156,7 @@ def _run(
 
 
 def _write_series(
-    laboratory: Laboratory,
+    laboratory: StudyRunner,
     boxes: str,
     name: str,
     torques: FloatArray,

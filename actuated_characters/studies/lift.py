@@ -10,7 +10,7 @@ from actuated_characters.studies.framework.lift_figures import (
     draw_laws,
     draw_stability,
 )
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory
+from actuated_characters.studies.framework.study import Cell, RunSpec, StudyResult, StudyRunner
 from actuated_characters.studies.theory import second_order
 from actuated_characters.studies.theory.lift_responses import (
     CRITICAL,
@@ -52,7 +52,7 @@ class LiftStudy:
     title = "1 kg on a slider, from rest at 0 m to 1 m, 240 Hz"
     runs = 26
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Run each law with gains that show what it is like, then look for the bounds."""
 
         def respond(gains: Gains, duration: float = _LENGTH) -> Response:
@@ -77,7 +77,7 @@ class LiftStudy:
         ]
         ends = [response for bound in bounds for response in (bound.below, bound.above)]
         responses = [p, *pd, *implicit, gravity, *pid, *stiff]
-        return Findings(
+        return StudyResult(
             columns=_COLUMNS,
             rows=[
                 *(_row(response) for response in responses),
@@ -93,10 +93,10 @@ class LiftStudy:
         )
 
 
-def _respond(laboratory: Laboratory, gains: Gains, duration: float) -> Response:
+def _respond(laboratory: StudyRunner, gains: Gains, duration: float) -> Response:
     numbers = f"{gains.stiffness:.0f}-{gains.damping:.0f}-{gains.integral:.0f}"
     outcome = laboratory.run(
-        Case(
+        RunSpec(
             label=f"{gains.law}-{numbers}",
             character="lift",
             duration=duration,

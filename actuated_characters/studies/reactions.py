@@ -11,7 +11,7 @@ from actuated_characters.metrics.recording_metrics import distances, vectors_of
 from actuated_characters.render.stills import strip
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.reactions import mode_spans
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory
+from actuated_characters.studies.framework.study import Cell, RunSpec, StudyResult, StudyRunner
 from msgs_config.arrays import FloatArray
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -60,7 +60,7 @@ class ReactionStudy:
     title = "a walk that is hit by a ball against the chest, behaviour reactive"
     runs = len(IMPULSES) + 3
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Let it be hit harder and harder; and others: one that is limp, and one that gets up."""
 
         def run(label: str, behaviour: str, impulse: float = 0.0, **more: float) -> Recording:
@@ -83,7 +83,7 @@ class ReactionStudy:
         }
         reactions = {impulse: measure(run, alone, HIT) for impulse, run in hits.items()}
         poses = {**others, "reactive": hits[20.0]}
-        return Findings(
+        return StudyResult(
             columns=(
                 "planned impulse (N s)",
                 "measured impulse (N s)",
@@ -165,10 +165,10 @@ def _case(
     at: float = HIT,
     distance: float = 2.0,
     length: float = _LENGTH,
-) -> Case:
+) -> RunSpec:
     mass = impulse / _SPEED
     throw = f"mass={mass} speed={_SPEED} at={at} from=front target=chest distance={distance}"
-    return Case(
+    return RunSpec(
         label,
         "humanoid",
         length,

@@ -10,7 +10,7 @@ from actuated_characters.bags.recording import Recording
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies.framework.bodies import IN_SPACE, Box, Momenta, momenta, write_box
 from actuated_characters.studies.framework.plots import draw_over_theory, label, make_panels
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Laboratory
+from actuated_characters.studies.framework.study import Cell, RunSpec, StudyResult, StudyRunner
 from actuated_characters.studies.theory.euler import (
     Load,
     Motion,
@@ -114,13 +114,13 @@ class RigidBodyStudy:
     title = "a free rigid body: m dv/dt = f, I dw/dt + w x I w = tau + r x f"
     runs = len(TRIALS)
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Run each trial, and integrate the same equations beside it."""
         seen = {trial.label: _observe(laboratory, trial) for trial in TRIALS}
         free, finer = seen["middle_axis"], seen["middle_axis_2000"]
         drifts = [float(_off_start(one.momenta.spin).max()) for one in (free, finer)]
         shrink = seen["torque"].trial.box.inertia[2] / seen["torque_long"].trial.box.inertia[2]
-        return Findings(
+        return StudyResult(
             columns=_COLUMNS,
             rows=[_row(one) for one in seen.values()],
             figures={
@@ -141,10 +141,10 @@ class RigidBodyStudy:
         )
 
 
-def _observe(laboratory: Laboratory, trial: Trial) -> Observed:
+def _observe(laboratory: StudyRunner, trial: Trial) -> Observed:
     """Run a trial; the wrenches last as long as it does."""
     stamp = TickClock(trial.rate).stamp_ns(1)
-    case = Case(
+    case = RunSpec(
         label=trial.label,
         character=write_box(laboratory, trial.box),
         duration=trial.duration,

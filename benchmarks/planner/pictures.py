@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import track
 
 from actuated_characters.render.captions import captioned
-from actuated_characters.render.engine.renderer import Camera, Picture
+from actuated_characters.render.engine.renderer import Picture, Renderer
 from actuated_characters.render.stills import pose_strip
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
@@ -109,7 +109,7 @@ def film(seen: Seen, file: Path) -> None:
 
 def _frames(seen: Seen, rows: FloatArray) -> list[Picture]:
     positions, references = seen.positions[rows], seen.references[rows]
-    with Camera(seen.character) as camera:
+    with Renderer(seen.character) as camera:
         view = camera.view(np.concatenate((positions[:1], references[:1])), size=FRAME)
         return [
             captioned(

@@ -22,7 +22,7 @@ from msgs_config.character.layout import JointLayout
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.topics import Topic
-from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal, limit_threads, run_node
 
 _PING = replace(topics.JOINT_STATES, name="ping")
@@ -65,7 +65,7 @@ def round_trips(layout: JointLayout, count: int, *, direct: bool) -> FloatArray:
 def _taker(node: Node, topic: Topic, way: str, at_end: ExitStack) -> Callable[[], bool]:
     """What looks for a message once, and says whether there was one."""
     if way == _DIRECT:
-        inbox, spinner = DirectSubscription(node, topic), Spinner(node)
+        inbox, spinner = DirectSubscription(node, topic), PollingExecutor(node)
         at_end.callback(spinner.close)
 
         def take_directly() -> bool:

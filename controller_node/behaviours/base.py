@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol, TypeAlias
 
-from controller_node.behaviours.targets import AS_IT_IS, Way
+from controller_node.behaviours.targets import AS_IT_IS, Target
 from controller_node.laws import GainArrays
 from controller_node.references.base import ReferenceState
-from controller_node.references.transformed import Carry
+from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray
 
 
@@ -52,20 +52,20 @@ class Phase:
 
 
 @dataclass(frozen=True)
-class Directive:
+class BehaviourOutput:
     """What to track in a tick, and how firmly."""
 
     phase: Phase  # the same object as long as it lasts
-    way: Way  # the same object as long as it leads on
+    way: Target  # the same object as long as it leads on
     gains: GainArrays
 
 
 class Behaviour(Protocol):
     """A state machine, made anew for each episode."""
 
-    carry: Carry  # of the own reference, to where the character goes on with it
+    carry: PlanarTransform  # of the own reference, to where the character goes on with it
 
-    def advance(self, seen: Observation) -> Directive:
+    def advance(self, seen: Observation) -> BehaviourOutput:
         """What to do in a tick; called once a tick, in order."""
         ...
 
@@ -90,23 +90,23 @@ class Tracking:
     """Follows the own reference, whatever comes."""
 
     def __init__(self) -> None:
-        self.carry = Carry()
+        self.carry = PlanarTransform()
         self._phase: Phase | None = None
 
-    def advance(self, seen: Observation) -> Directive:
+    def advance(self, seen: Observation) -> BehaviourOutput:
         """The reference and the gains as they are."""
         if self._phase is None:
             self._phase = Phase(Mode.TRACK, {"assistance": seen.assistance()})
-        return Directive(self._phase, AS_IT_IS, seen.gains)
+        return BehaviourOutput(self._phase, AS_IT_IS, seen.gains)
 
 
 class Ragdoll:
     """Follows nothing; its law is to be `zero`."""
 
     def __init__(self) -> None:
-        self.carry = Carry()
+        self.carry = PlanarTransform()
         self._phase = Phase(Mode.LIMP, {"assistance": "none"})
 
-    def advance(self, seen: Observation) -> Directive:
+    def advance(self, seen: Observation) -> BehaviourOutput:
         """The reference as it is, which nobody follows."""
-        return Directive(self._phase, AS_IT_IS, seen.gains)
+        return BehaviourOutput(self._phase, AS_IT_IS, seen.gains)

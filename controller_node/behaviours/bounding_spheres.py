@@ -9,7 +9,7 @@ from msgs_config.geometry import fixed_order, rotations
 _MOST_SPHERES = 12  # along one shape
 
 
-class Hull:
+class BoundingSpheres:
     """Spheres around every link's shapes. A link that has no shapes is nowhere."""
 
     def __init__(self, character: Character) -> None:

@@ -12,7 +12,7 @@ from msgs_config.geometry import fixed_order
 _REACH = 3.0  # joints, from the struck link to those that are as firm as before
 
 
-class GiveWay:
+class ComplianceProfile:
     """The gains of a character while it gives way."""
 
     def __init__(self, character: Character, mass_diagonal: FloatArray) -> None:

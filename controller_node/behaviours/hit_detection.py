@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.behaviours.bounding_spheres import Hull
+from controller_node.behaviours.bounding_spheres import BoundingSpheres
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
@@ -36,7 +36,7 @@ class HitDetector:
 
     def __init__(self, character: Character, period: float, window: float = WINDOW) -> None:
         """For ticks of `period`; impulses are added up over `window`; s."""
-        self._hull = Hull(character)
+        self._hull = BoundingSpheres(character)
         self._period = period
         self._recent: deque[FloatArray] = deque(maxlen=max(round(window / period), 1))
         self._before: FloatArray | None = None

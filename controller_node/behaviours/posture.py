@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration
+from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import fixed_order, rotations
@@ -46,7 +46,7 @@ class Posture:
         )
         return math.acos(min(max(float(fixed_order.dot(up, wanted)), -1.0), 1.0))
 
-    def has_fallen(self, body: Configuration, target: Configuration) -> bool:
+    def has_fallen(self, body: GeneralizedPosition, target: GeneralizedPosition) -> bool:
         """Whether the root of a body is far below a target's, or far from as upright."""
         height, wanted = float(body.position[2]), float(target.position[2])
         if height < _FALLEN_HEIGHT * wanted and wanted - height > self._drop:

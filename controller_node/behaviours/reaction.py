@@ -12,17 +12,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.behaviours.base import Directive, Mode, Observation, Phase
-from controller_node.behaviours.compliance import GiveWay, softened
+from controller_node.behaviours.base import BehaviourOutput, Mode, Observation, Phase
+from controller_node.behaviours.compliance import ComplianceProfile, softened
 from controller_node.behaviours.hit_detection import WINDOW, Hit, HitDetector
 from controller_node.behaviours.motion_library import Match, MotionLibrary
 from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.settings import ReactionSettings
-from controller_node.behaviours.targets import BodyWay, ClipWay, OwnWay, Way
+from controller_node.behaviours.targets import (
+    ClipTarget,
+    CurrentStateTarget,
+    ReferenceTarget,
+    Target,
+)
 from controller_node.laws import GainArrays
 from controller_node.references.base import ReferenceState
-from controller_node.references.inertialised import InertialisedReference, Offset
-from controller_node.references.transformed import Carry, MovedReference
+from controller_node.references.inertialised import InertialisedReference, InertializationOffset
+from controller_node.references.transformed import PlanarTransform, TransformedReference
 from controller_node.strength import weakened
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -61,26 +66,26 @@ class Reaction:
         self._layout = kit.character.layout
         self._settings = kit.settings
         self._detector = HitDetector(kit.character, kit.period)
-        self._own = OwnWay(self._layout)
-        self._way: Way = self._own
+        self._own = ReferenceTarget(self._layout)
+        self._way: Target = self._own
         self._hit = Hit(0, 0.0)  # the last one
         self._begin(0.0, Mode.TRACK, self._begin_tracking, self._firm)
 
     @property
-    def carry(self) -> Carry:
+    def carry(self) -> PlanarTransform:
         """Of the own reference, to where the character goes on with it."""
         return self._own.carry
 
     @carry.setter
-    def carry(self, carry: Carry) -> None:
+    def carry(self, carry: PlanarTransform) -> None:
         self._own.carry = carry
 
-    def advance(self, seen: Observation) -> Directive:
+    def advance(self, seen: Observation) -> BehaviourOutput:
         """What to do in a tick: change the phase if it is time, and say what is tracked in it."""
         self._kit.model.update(seen.position, seen.velocity)
         hit = self._detector.strongest(seen.contacts, *self._kit.model.link_poses())
         self._step(seen, hit)
-        return Directive(self._phase, self._way, self._gains(seen))
+        return BehaviourOutput(self._phase, self._way, self._gains(seen))
 
     def _begin(
         self,
@@ -118,7 +123,7 @@ class Reaction:
 
     def _return(self, seen: Observation, hit: Hit | None) -> None:
         if self._elapsed(seen) >= self._settings.blend_duration:
-            self._way = self._own = OwnWay(self._layout, self._own.carry)
+            self._way = self._own = ReferenceTarget(self._layout, self._own.carry)
             self._begin_tracking(seen, hit)
         else:
             self._track(seen, hit)
@@ -158,7 +163,7 @@ class Reaction:
 
     def _lie(self, seen: Observation, hit: Hit | None) -> None:
         """Wait until it lies still."""
-        assert isinstance(self._way, BodyWay)
+        assert isinstance(self._way, CurrentStateTarget)
         self._way.state = self._body(seen)
         still_energy = 0.5 * self._kit.character.mass * _STILL_SPEED * _STILL_SPEED
         if self._kit.model.kinetic_energy() > still_energy:
@@ -171,7 +176,7 @@ class Reaction:
             )
 
     def _find_get_up(self, seen: Observation, hit: Hit | None) -> None:
-        assert isinstance(self._way, BodyWay)
+        assert isinstance(self._way, CurrentStateTarget)
         self._detector.forget()
         self._way.state = self._body(seen)
         rising = seen.assistance("rising")
@@ -203,7 +208,7 @@ class Reaction:
         if hit is not None and hit.impulse >= self._settings.limp_threshold:
             self._go_limp(seen, "hit", hit)
         elif seen.time >= self._rise_until:
-            if isinstance(self._way, ClipWay):
+            if isinstance(self._way, ClipTarget):
                 carry = self._carry_to(seen.now, self._way.target(seen.time, seen.now))
                 self._come_back(seen, carry, self._settings.blend_duration)
             else:
@@ -217,7 +222,7 @@ class Reaction:
         target = self._way.target(seen.time, seen.now).configuration
         self._lead = self._layout.difference(self._body(seen).configuration, target)
         diagonal = np.diag(kit.model.mass_matrix())
-        self._give_way = GiveWay(kit.character, diagonal)
+        self._give_way = ComplianceProfile(kit.character, diagonal)
         self._softness = softened(kit.character, hit.link, settings.softness)
         self._begin(seen.time, Mode.REACT, self._react_on, self._soft, **self._hit_facts(seen))
 
@@ -237,8 +242,8 @@ class Reaction:
     def _go_limp(self, seen: Observation, why: str, hit: Hit | None) -> None:
         """Let everything go; the target comes to the body, which nothing draws to it."""
         target, body = self._way.target(seen.time, seen.now), self._body(seen)
-        offset = Offset(self._layout, body, target, seen.time, _STILL_TIME)
-        self._way = BodyWay(offset, body)
+        offset = InertializationOffset(self._layout, body, target, seen.time, _STILL_TIME)
+        self._way = CurrentStateTarget(offset, body)
         self._moved = seen.time
         self._lead = np.zeros(self._layout.size)
         facts: dict[str, object] = {"why": why}
@@ -254,19 +259,19 @@ class Reaction:
         motion = library.references[match.clip]
         there = self._led(seen)
         place = motion.sample(match.time).configuration.position
-        carry = Carry.leading(place, 0.0, there, match.turn)
-        moved = MovedReference(self._layout, motion, carry, seen.time, match.time)
+        carry = PlanarTransform.leading(place, 0.0, there, match.turn)
+        moved = TransformedReference(self._layout, motion, carry, seen.time, match.time)
         wanted = self._way.target(seen.time, seen.now)
-        self._way = ClipWay(
+        self._way = ClipTarget(
             InertialisedReference(self._layout, moved, wanted, start=seen.time, duration=duration)
         )
 
-    def _come_back(self, seen: Observation, carry: Carry, duration: float) -> None:
+    def _come_back(self, seen: Observation, carry: PlanarTransform, duration: float) -> None:
         """Go over to the own reference, carried."""
         wanted = self._way.target(seen.time, seen.now)
         own = carry.moved(self._layout, seen.now)
-        offset = Offset(self._layout, own, wanted, seen.time, duration)
-        self._way = self._own = OwnWay(self._layout, carry, offset)
+        offset = InertializationOffset(self._layout, own, wanted, seen.time, duration)
+        self._way = self._own = ReferenceTarget(self._layout, carry, offset)
         facts = {"to": "reference", "assistance": seen.assistance()}
         self._begin(seen.time, Mode.BLEND, self._return, self._firm, **facts)
 
@@ -332,11 +337,11 @@ class Reaction:
         position[entries] = rotations.log(turned)
         return position
 
-    def _carry_to(self, motion: ReferenceState, there: ReferenceState) -> Carry:
+    def _carry_to(self, motion: ReferenceState, there: ReferenceState) -> PlanarTransform:
         """What leads from where a motion's root is, and faces, to where another one's is."""
         one, other = motion.configuration, there.configuration
         heading = self._kit.posture.heading
-        return Carry.leading(
+        return PlanarTransform.leading(
             one.position[:3],
             float(heading(one.orientations_xyzw[0])),
             other.position[:3],

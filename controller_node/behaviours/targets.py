@@ -3,14 +3,14 @@
 from typing import Protocol
 
 from controller_node.references.base import Reference, ReferenceState
-from controller_node.references.inertialised import Offset
-from controller_node.references.transformed import Carry
+from controller_node.references.inertialised import InertializationOffset
+from controller_node.references.transformed import PlanarTransform
 from msgs_config.character.layout import JointLayout
 
-_NO_CARRY = Carry()
+_NO_CARRY = PlanarTransform()
 
 
-class Way(Protocol):
+class Target(Protocol):
     """What is tracked; its state at a time in s may depend on that of the own reference."""
 
     def target(self, time: float, own: ReferenceState) -> ReferenceState:
@@ -26,14 +26,17 @@ class _AsItIs:
         return own
 
 
-AS_IT_IS: Way = _AsItIs()
+AS_IT_IS: Target = _AsItIs()
 
 
-class OwnWay:
+class ReferenceTarget:
     """The own reference, where the character has been carried to, and the way onto it."""
 
     def __init__(
-        self, layout: JointLayout, carry: Carry = _NO_CARRY, offset: Offset | None = None
+        self,
+        layout: JointLayout,
+        carry: PlanarTransform = _NO_CARRY,
+        offset: InertializationOffset | None = None,
     ) -> None:
         self._layout = layout
         self.carry = carry
@@ -45,7 +48,7 @@ class OwnWay:
         return carried if self._offset is None else self._offset.applied(carried, time)
 
 
-class ClipWay:
+class ClipTarget:
     """A motion that was found."""
 
     def __init__(self, reference: Reference) -> None:
@@ -56,10 +59,10 @@ class ClipWay:
         return self._reference.sample(time)
 
 
-class BodyWay:
+class CurrentStateTarget:
     """The body itself: nothing is tracked, and the target comes to the state that there is."""
 
-    def __init__(self, offset: Offset, state: ReferenceState) -> None:
+    def __init__(self, offset: InertializationOffset, state: ReferenceState) -> None:
         """From what `offset` leads to; `state` is the present one, to be kept up to date."""
         self._offset = offset
         self.state = state

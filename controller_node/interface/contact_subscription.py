@@ -18,7 +18,7 @@ _MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the states waiti
 _MOST_KEPT = 5000  # ticks whose states are yet to come, as many as the queue of states holds
 
 
-class ContactInbox:
+class ContactSubscription:
     """Takes `contacts` of the bound simulator, and has those of each state ready."""
 
     def __init__(

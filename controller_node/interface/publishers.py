@@ -37,7 +37,7 @@ class Answer:
     reference: StampedReference
 
 
-class Outputs:
+class Publishers:
     """The publishers of a controller. A topic that nobody listens to costs nothing."""
 
     def __init__(

@@ -18,7 +18,7 @@ _LATEST_NS = 10**15  # after now
 _MOST_AT_ONCE = 100  # messages, lest a flood of them keep the states waiting
 
 
-class StampedInbox:
+class StampedSubscription:
     """A topic whose messages count from their header's stamp on, without one at once."""
 
     def __init__(

@@ -4,8 +4,8 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from controller_node.controller import Controller
-from controller_node.interface.publishers import Outputs
-from controller_node.interface.stamped_subscription import StampedInbox
+from controller_node.interface.publishers import Publishers
+from controller_node.interface.stamped_subscription import StampedSubscription
 from controller_node.strength import strengths_of
 from msgs_config.messages import topics
 from msgs_config.runtime.once_logger import Warnings
@@ -15,11 +15,11 @@ class StrengthTopic:
     """Takes `~/strength`, each message before the answer to a state, and says which it took."""
 
     def __init__(
-        self, node: Node, controller: Controller, outputs: Outputs, warnings: Warnings
+        self, node: Node, controller: Controller, outputs: Publishers, warnings: Warnings
     ) -> None:
         self._controller = controller
         self._outputs = outputs
-        self._inbox = StampedInbox(node, topics.STRENGTH, "strength", self._use, warnings)
+        self._inbox = StampedSubscription(node, topics.STRENGTH, "strength", self._use, warnings)
         self._episode_ns = 0
 
     @property
@@ -40,5 +40,5 @@ class StrengthTopic:
         layout, clock = self._controller.layout, self._controller.clock
         start_ns = clock.stamp_ns(clock.first_tick_from(start_ns))
         strengths = strengths_of(layout, tuple(message.name), tuple(message.effort), start_ns)
-        self._controller.weaken(strengths, episode_ns=self._episode_ns)
+        self._controller.set_strengths(strengths, episode_ns=self._episode_ns)
         self._outputs.publish_strengths(strengths)

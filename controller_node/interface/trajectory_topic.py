@@ -4,8 +4,8 @@ from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
 
 from controller_node.controller import Controller
-from controller_node.interface.publishers import Outputs
-from controller_node.interface.stamped_subscription import StampedInbox, nanoseconds
+from controller_node.interface.publishers import Publishers
+from controller_node.interface.stamped_subscription import StampedSubscription, nanoseconds
 from controller_node.references.trajectory import TrajectoryPoints, points_of_lists
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
@@ -17,11 +17,11 @@ class Trajectories:
     """Takes `~/joint_trajectory`, each before the answer to a state, and says which it took."""
 
     def __init__(
-        self, node: Node, controller: Controller, outputs: Outputs, warnings: Warnings
+        self, node: Node, controller: Controller, outputs: Publishers, warnings: Warnings
     ) -> None:
         self._controller = controller
         self._outputs = outputs
-        self._inbox = StampedInbox(
+        self._inbox = StampedSubscription(
             node, topics.JOINT_TRAJECTORY, "trajectory", self._follow, warnings
         )
         self._now_ns = self._episode_ns = 0

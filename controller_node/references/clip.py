@@ -9,7 +9,7 @@ import numpy as np
 from controller_node.references.base import ReferenceState
 from controller_node.references.files.clip import ClipFrames
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.geometry import rotations
 
 _BLEND_TIME = 0.15  # s before the wrap, over which the gap to the first frame is closed
@@ -73,7 +73,7 @@ class ClipReference:
         self, position: FloatArray, orientations_xyzw: FloatArray, velocity: FloatArray
     ) -> ReferenceState:
         position[self._layout.rotation_entries] = rotations.log(orientations_xyzw)
-        configuration = Configuration(position, orientations_xyzw)
+        configuration = GeneralizedPosition(position, orientations_xyzw)
         return ReferenceState(configuration, velocity, self._no_acceleration)
 
     def _closed(self, frames: ClipFrames) -> tuple[FloatArray, FloatArray]:

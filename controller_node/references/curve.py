@@ -7,7 +7,7 @@ import numpy as np
 
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.geometry import fixed_order, rotations
 
 # The coefficients of u, u^2, ... of a polynomial on 0 <= u <= 1 that begins at zero, a row each;
@@ -35,7 +35,7 @@ class Knots:
     """
 
     times: FloatArray  # (p,) s
-    configurations: Configuration  # (p, n), (p, k, 4)
+    configurations: GeneralizedPosition  # (p, n), (p, k, 4)
     velocities: FloatArray | None = None  # (p, n), a rotation's in the child frame
     accelerations: FloatArray | None = None  # (p, n), their rates of change
 
@@ -79,14 +79,16 @@ class Curve:
         position, orientations = self._positions[segment] + moved, self._orientations[segment]
         entries = self._layout.rotation_entries
         if not len(entries):
-            return ReferenceState(Configuration(position, orientations), velocity, acceleration)
+            return ReferenceState(
+                GeneralizedPosition(position, orientations), velocity, acceleration
+            )
         turned = moved[entries]
         orientations = rotations.multiply(orientations, rotations.exp(turned))
         position[entries] = rotations.log(orientations)
         velocity[entries], acceleration[entries] = rotations.angular_motion(
             turned, velocity[entries], acceleration[entries]
         )
-        return ReferenceState(Configuration(position, orientations), velocity, acceleration)
+        return ReferenceState(GeneralizedPosition(position, orientations), velocity, acceleration)
 
     def coordinate(self, entry: int, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Times in s and values of a hinge or slider at shares (m,) of each segment, (p - 1, m)."""
@@ -112,20 +114,20 @@ class Curve:
         )
         return fixed_order.product(basis, self._coefficients[segment])
 
-    def _at_rest(self, configurations: Configuration, knot: int) -> ReferenceState:
+    def _at_rest(self, configurations: GeneralizedPosition, knot: int) -> ReferenceState:
         position = configurations.position[knot].copy()
         orientations = configurations.orientations_xyzw[knot]
         position[self._layout.rotation_entries] = rotations.log(orientations)
         still = np.zeros(self._layout.size)
-        return ReferenceState(Configuration(position, orientations), still, still)
+        return ReferenceState(GeneralizedPosition(position, orientations), still, still)
 
 
-def segment_offsets(layout: JointLayout, configurations: Configuration) -> FloatArray:
+def segment_offsets(layout: JointLayout, configurations: GeneralizedPosition) -> FloatArray:
     """What leads from each configuration (p, n) to the next, (p - 1, n): rad and m."""
     position, orientations = configurations.position, configurations.orientations_xyzw
     return layout.difference(
-        Configuration(position[:-1], orientations[:-1]),
-        Configuration(position[1:], orientations[1:]),
+        GeneralizedPosition(position[:-1], orientations[:-1]),
+        GeneralizedPosition(position[1:], orientations[1:]),
     )
 
 

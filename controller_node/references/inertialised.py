@@ -9,7 +9,7 @@ import numpy as np
 
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.geometry import fixed_order, rotations
 
 # Coefficients of 1, u, ... u^5 of three quintics on 0 <= u <= 1 that end at rest at zero, a row
@@ -23,7 +23,7 @@ _DECAY = np.array(
 )
 
 
-class Offset:
+class InertializationOffset:
     """What leads from one motion to another at a time, and decays from there on.
 
     It is added to coordinates, and turns rotations in their child frames: `q exp(d(t))`. With
@@ -82,7 +82,7 @@ class Offset:
             )
             velocity[entries] = back + spin
             acceleration[entries] = second_back + second_spin - fixed_order.cross(spin, back)
-        return ReferenceState(Configuration(position, orientations), velocity, acceleration)
+        return ReferenceState(GeneralizedPosition(position, orientations), velocity, acceleration)
 
     def _at(self, time: float) -> FloatArray:
         """The offset, its rate and its second rate, (3, n)."""
@@ -126,7 +126,7 @@ class InertialisedReference:
     ) -> None:
         """Go over to `motion` from the state `wanted` at `start`, within `duration`; s."""
         self._motion = motion
-        self._offset = Offset(layout, motion.sample(start), wanted, start, duration)
+        self._offset = InertializationOffset(layout, motion.sample(start), wanted, start, duration)
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state at a time in s, not before the start."""

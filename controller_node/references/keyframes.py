@@ -8,7 +8,7 @@ from controller_node.references.base import ReferenceState
 from controller_node.references.curve import Curve, Knots, segment_offsets
 from controller_node.references.limits import JointLimits
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 
 _SHARES = np.linspace(0.0, 1.0, 65)  # of a segment, where its path is compared with the limits
@@ -20,7 +20,7 @@ class Keyframes:
     """The keyframes of a file, in a character's layout and where it stands."""
 
     times: FloatArray  # (p,) s, rising
-    configurations: Configuration  # (p, n), (p, k, 4)
+    configurations: GeneralizedPosition  # (p, n), (p, k, 4)
     smooth: bool  # else linear
     period: float | None = None  # s, of a loop
     notes: tuple[str, ...] = ()  # what their author may have overlooked
@@ -56,7 +56,7 @@ def curve_through(layout: JointLayout, keyframes: Keyframes) -> Curve:
     times, configurations = keyframes.times, keyframes.configurations
     if keyframes.period is not None:
         times = np.append(times - times[0], keyframes.period)
-        configurations = Configuration(
+        configurations = GeneralizedPosition(
             _closed(configurations.position), _closed(configurations.orientations_xyzw)
         )
     if not keyframes.smooth or len(times) == 1:

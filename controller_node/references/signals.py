@@ -8,7 +8,7 @@ import numpy as np
 from controller_node.references.base import ReferenceState
 from controller_node.references.limits import LARGEST_NUMBER, JointLimits
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import MotionError, one_of
 from msgs_config.geometry import rotations
@@ -86,12 +86,14 @@ class SineReference:
         )
 
 
-def _moved(layout: JointLayout, rest: Configuration, offset: FloatArray) -> Configuration:
+def _moved(
+    layout: JointLayout, rest: GeneralizedPosition, offset: FloatArray
+) -> GeneralizedPosition:
     """The rest pose moved by an offset (n,), a rotation's in its child frame."""
     position, entries = rest.position + offset, layout.rotation_entries
     turned = rotations.multiply(rest.orientations_xyzw, rotations.exp(offset[entries]))
     position[entries] = rotations.log(turned)
-    return Configuration(position, turned)
+    return GeneralizedPosition(position, turned)
 
 
 def _chosen(layout: JointLayout, dof_names: Sequence[str]) -> FloatArray:

@@ -14,7 +14,7 @@ from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.curve import Curve, Knots
 from controller_node.references.limits import LARGEST_NUMBER, SHORTEST_TIME, JointLimits
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import LayoutError, MotionError
 
@@ -257,16 +257,16 @@ def _check_first(
         )
 
 
-def _configuration(knots: Knots, number: int) -> Configuration:
+def _configuration(knots: Knots, number: int) -> GeneralizedPosition:
     whole = knots.configurations
-    return Configuration(whole.position[number], whole.orientations_xyzw[number])
+    return GeneralizedPosition(whole.position[number], whole.orientations_xyzw[number])
 
 
 def _without_first(knots: Knots) -> Knots:
     whole = knots.configurations
     return Knots(
         knots.times[1:],
-        Configuration(whole.position[1:], whole.orientations_xyzw[1:]),
+        GeneralizedPosition(whole.position[1:], whole.orientations_xyzw[1:]),
         None if knots.velocities is None else knots.velocities[1:],
         None if knots.accelerations is None else knots.accelerations[1:],
     )
@@ -280,7 +280,7 @@ def _lead(layout: JointLayout, start: float, now: ReferenceState, knots: Knots) 
     present, first = now.configuration, _configuration(knots, 0)
     return Knots(
         np.array([start, knots.times[0]]),
-        Configuration(
+        GeneralizedPosition(
             np.array([present.position, first.position]),
             np.array([present.orientations_xyzw, first.orientations_xyzw]),
         ),

@@ -7,12 +7,12 @@ import numpy as np
 
 from controller_node.references.base import Reference, ReferenceState
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.geometry import rotations
 
 
 @dataclass(frozen=True)
-class Carry:
+class PlanarTransform:
     """A move of the whole character: turned about the world's z, then shifted on the ground."""
 
     turn: float = 0.0  # rad
@@ -22,7 +22,7 @@ class Carry:
     @classmethod
     def leading(
         cls, from_place: FloatArray, from_heading: float, to_place: FloatArray, to_heading: float
-    ) -> "Carry":
+    ) -> "PlanarTransform":
         """What leads from one place (3,) in m and heading in rad to others; heights do not count.
 
         The turn is the shorter one.
@@ -38,7 +38,7 @@ class Carry:
 
     def moved(self, layout: JointLayout, state: ReferenceState) -> ReferenceState:
         """The state as it is after the move; a character with a fixed base stays where it is."""
-        if not layout.has_floating_base or self == Carry():
+        if not layout.has_floating_base or self == PlanarTransform():
             return state
         about_z = rotations.about_z(self.turn)
         position = state.configuration.position.copy()
@@ -49,16 +49,16 @@ class Carry:
         position[:2] += (self.x, self.y)
         orientations[0] = rotations.multiply(about_z, orientations[0])
         position[3:6] = rotations.log(orientations[0])
-        return ReferenceState(Configuration(position, orientations), velocity, acceleration)
+        return ReferenceState(GeneralizedPosition(position, orientations), velocity, acceleration)
 
 
 @dataclass(frozen=True)
-class MovedReference:
+class TransformedReference:
     """Another reference after a move, whose time `motion_start` is this one's time `start`."""
 
     layout: JointLayout
     motion: Reference
-    carry: Carry = Carry()
+    carry: PlanarTransform = PlanarTransform()
     start: float = 0.0  # s
     motion_start: float = 0.0  # s
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO
 
 from msgs_config.character.engine_urdf import engine_urdf
-from msgs_config.character.model import Loading
+from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 
 
@@ -46,7 +46,7 @@ def connect() -> int:
     return int(pybullet.connect(pybullet.DIRECT))
 
 
-def load_urdf(client: int, loading: Loading) -> int:
+def load_urdf(client: int, loading: UrdfOptions) -> int:
     """Load a URDF, each link after its parent; returns the body's number.
 
     Raises:

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 from msgs_config import files
 from msgs_config.character.mesh_check import check_mesh
 from msgs_config.character.meshes import resolve_meshes
-from msgs_config.character.model import Loading
+from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf_check import NUMBERS
 from msgs_config.errors import CharacterError
 
@@ -14,7 +14,7 @@ MAX_LINE_BYTES = 8000
 """The engine reads lines of up to 8191 bytes, and breaks a longer one in two."""
 
 
-def engine_urdf(loading: Loading) -> str:
+def engine_urdf(loading: UrdfOptions) -> str:
     """A URDF's text for the engine: what moves and collides, in short lines, its meshes absolute.
 
     The engine would look for a mesh in the working directory first, take a tab between two

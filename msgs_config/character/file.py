@@ -8,7 +8,7 @@ from typing import Any
 
 from msgs_config import files
 from msgs_config.character.joint_bounds import with_bounds
-from msgs_config.character.model import ClipFormat, Gains, Loading, Planning, SoftLimit, Vector
+from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
 from msgs_config.character.urdf_check import check_urdf, has_world_base
 from msgs_config.errors import CharacterError, one_of
 
@@ -52,7 +52,7 @@ class CharacterFile:
     name: str
     path: Path
     text: str
-    loading: Loading
+    loading: UrdfOptions
     up_axis: str
     rest_pose: dict[str, float]  # DoF name -> m or rad
     gains: dict[str, Gains]  # joint name -> gains; `force` and `torque` of the root assistance
@@ -103,7 +103,7 @@ def read_character_file(name_or_path: str) -> CharacterFile:
 def read_character_texts(path: Path, text: str, urdf: Path, urdf_text: str) -> CharacterFile:
     """A character's file from the texts that it once had; `text` is empty for a URDF alone.
 
-    `urdf_text` is that of a `Loading`, with the bounds of the character's file in it. `path` and
+    `urdf_text` is that of `UrdfOptions`, with the bounds of the character's file in it. `path` and
     `urdf` are where the two lay; of what lies there now, only the meshes are read.
 
     Raises:
@@ -149,7 +149,7 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
 
 def _loading(
     reader: "_Reader", joints: dict[str, "_Reader"], known: tuple[Path, str] | None
-) -> Loading:
+) -> UrdfOptions:
     """How the URDF is to be read; `known` are its path and its text, bounds and all."""
     if known is None:
         urdf = reader.path_of("urdf")
@@ -163,7 +163,7 @@ def _loading(
         for name, joint in joints.items()
         if {"lower", "upper"} & set(joint.content)
     }
-    return Loading(
+    return UrdfOptions(
         urdf_path=urdf,
         urdf_text=text if known or not bounds else with_bounds(robot, bounds, scale, reader.file),
         scale=scale,

@@ -75,7 +75,7 @@ class LayoutJoint:
 
 
 @dataclass(frozen=True)
-class Configuration:
+class GeneralizedPosition:
     """A generalised position in message form, and its k rotations as quaternions."""
 
     position: FloatArray  # (..., n)
@@ -169,11 +169,11 @@ class JointLayout:
         rows = [np.arange(entries.start, entries.stop) for entries in slices]
         return np.array(rows, dtype=np.intp).reshape(-1, 3)
 
-    def configuration(self, position: FloatArray) -> "Configuration":
+    def configuration(self, position: FloatArray) -> "GeneralizedPosition":
         """A position (..., n) with its rotations as quaternions."""
-        return Configuration(position, rotations.exp(position[..., self.rotation_entries]))
+        return GeneralizedPosition(position, rotations.exp(position[..., self.rotation_entries]))
 
-    def difference(self, start: "Configuration", end: "Configuration") -> FloatArray:
+    def difference(self, start: "GeneralizedPosition", end: "GeneralizedPosition") -> FloatArray:
         """What leads from `start` to `end`, (..., n): rad and m, a rotation in start's child frame.
 
         A rotation's part is `rotvec(q_start^-1 q_end)`, never a difference of components.

@@ -9,7 +9,7 @@ from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 
 from msgs_config import files
-from msgs_config.character.model import Loading
+from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 
 MAX_MESH_BYTES = 64 * 1024 * 1024
@@ -29,7 +29,7 @@ def resolve_meshes(robot: ElementTree.Element, urdf: Path) -> None:
                 raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
 
 
-def collision_meshes(loading: Loading) -> dict[str, str]:
+def collision_meshes(loading: UrdfOptions) -> dict[str, str]:
     """SHA-256 of each mesh that is collided with, hexadecimal, by the name that the URDF gives it.
 
     Raises:
@@ -40,7 +40,7 @@ def collision_meshes(loading: Loading) -> dict[str, str]:
     return {name: _hash_of(_find(name, loading.urdf_path)) for name in sorted(names)}
 
 
-def check_collision_meshes(loading: Loading, known: Mapping[str, str]) -> None:
+def check_collision_meshes(loading: UrdfOptions, known: Mapping[str, str]) -> None:
     """Check that the meshes are those whose hashes are known; see `collision_meshes`.
 
     Raises:

@@ -143,7 +143,7 @@ class ClipFormat:
 
 
 @dataclass(frozen=True)
-class Loading:
+class UrdfOptions:
     """How the URDF is to be read: what the simulator needs to load the same body."""
 
     urdf_path: Path
@@ -183,7 +183,7 @@ class Character:
     name: str
     file: Path
     file_text: str = field(repr=False)
-    loading: Loading
+    loading: UrdfOptions
     links: tuple[Link, ...]
     gains: dict[str, Gains]  # by joint; the base's force and torque under `root` and `root_r`
     rest_position: tuple[float, ...]  # (n,), message form

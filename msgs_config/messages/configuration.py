@@ -12,9 +12,9 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.character.meshes import collision_meshes
-from msgs_config.character.model import Character, Loading
+from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import LayoutError, MessageError
-from msgs_config.messages.probe import Probe, read_probe
+from msgs_config.messages.probe import DynamicsSample, read_probe
 from msgs_config.messages.session import ANONYMOUS, SESSION, session_of
 from msgs_config.parameters import Value, Values
 from msgs_config.versions import installed_versions, read_versions
@@ -24,8 +24,8 @@ def describe(
     character: Character,
     values: Values,
     since_ns: int | None = None,
-    probe: Probe | None = None,
-    terrain: Loading | None = None,
+    probe: DynamicsSample | None = None,
+    terrain: UrdfOptions | None = None,
     actuation: Mapping[str, int | bool] | None = None,
     name: str = "",
     characters: Sequence[str] = (),
@@ -84,7 +84,7 @@ class RunConfiguration:
     effort_limits: FloatArray  # (b,) N m or N
     mass: float  # kg
     parameters: dict[str, Any]
-    probe: Probe | None = None  # absent where another simulator than ours speaks
+    probe: DynamicsSample | None = None  # absent where another simulator than ours speaks
     versions: dict[str, str] = field(default_factory=dict)  # of what it runs with
     session: str = ANONYMOUS
 

@@ -14,7 +14,7 @@ _ARRAYS = ("position", "velocity", "effort", "acceleration")
 
 
 @dataclass(frozen=True)
-class Probe:
+class DynamicsSample:
     """One state in free space, an effort, and what the engine makes of them; message form."""
 
     position: FloatArray  # (n,) rad or m
@@ -29,7 +29,7 @@ class Probe:
         return {**arrays, "kinetic_energy": self.kinetic_energy}
 
 
-def read_probe(content: object, size: int) -> Probe:
+def read_probe(content: object, size: int) -> DynamicsSample:
     """The probe that JSON says, of `size` degrees of freedom.
 
     Raises:
@@ -39,7 +39,7 @@ def read_probe(content: object, size: int) -> Probe:
         raise MessageError("a probe that is no mapping")
     arrays = {name: _numbers(name, content.get(name), size) for name in _ARRAYS}
     (energy,) = _numbers("kinetic_energy", [content.get("kinetic_energy")], 1).tolist()
-    return Probe(kinetic_energy=energy, **arrays)
+    return DynamicsSample(kinetic_energy=energy, **arrays)
 
 
 def _numbers(name: str, values: object, size: int) -> FloatArray:

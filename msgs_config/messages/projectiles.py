@@ -14,7 +14,7 @@ from sensor_msgs.msg import MultiDOFJointState
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, decode
-from msgs_config.messages.throw import NUMBERS, Throw, throw_of
+from msgs_config.messages.throw import NUMBERS, ProjectileThrow, throw_of
 from msgs_config.messages.wrenches import WORLD, encode_multi_dof
 
 _POSE, _TWIST = slice(0, 7), slice(7, 13)
@@ -38,11 +38,11 @@ class ThrowCodec:
         self._encoder = JointStateEncoder(NUMBERS, frame_id)
         self._decoder = JointStateDecoder()
 
-    def encode(self, stamp_ns: int, throw: Throw) -> bytes:
+    def encode(self, stamp_ns: int, throw: ProjectileThrow) -> bytes:
         """The serialised message."""
         return self._encoder.encode(stamp_ns, throw.numbers())
 
-    def decode(self, raw: bytes) -> tuple[int, Throw]:
+    def decode(self, raw: bytes) -> tuple[int, ProjectileThrow]:
         """Stamp in ns and throw of a serialised message.
 
         Raises:

@@ -23,7 +23,7 @@ _FARTHEST = 1e6  # m
 
 
 @dataclass(frozen=True)
-class Throw:
+class ProjectileThrow:
     """A solid ball, and how it moves when it is let go; it does not turn then."""
 
     mass: float  # kg
@@ -52,7 +52,7 @@ class Throw:
         return np.array((self.mass, self.radius, *self.position, *self.velocity))
 
 
-def throw_of(names: Sequence[str], values: Sequence[float]) -> Throw:
+def throw_of(names: Sequence[str], values: Sequence[float]) -> ProjectileThrow:
     """The throw that numbers with names describe; without a radius it has that of `DENSITY`.
 
     Raises:
@@ -71,7 +71,7 @@ def throw_of(names: Sequence[str], values: Sequence[float]) -> Throw:
             raise CommandError(f"'{name}' is missing; there must be {', '.join(NUMBERS)}")
     mass = given[MASS]
     x, y, z, vx, vy, vz = (given[name] for name in (*POSITION, *VELOCITY))
-    return Throw(mass, given.get(RADIUS, natural_radius(mass)), (x, y, z), (vx, vy, vz))
+    return ProjectileThrow(mass, given.get(RADIUS, natural_radius(mass)), (x, y, z), (vx, vy, vz))
 
 
 def natural_radius(mass: float) -> float:

@@ -90,7 +90,7 @@ def _received(raw: bytes, info: dict[str, int]) -> Received:
     return Received(raw, info["source_timestamp"], info.get("publication_sequence_number"))
 
 
-class Spinner:
+class PollingExecutor:
     """Gives a loop's idle moments to other processes and to the node's executor."""
 
     def __init__(self, node: Node, service_period: float = _SERVICE_PERIOD) -> None:

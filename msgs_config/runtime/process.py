@@ -39,7 +39,7 @@ def limit_threads() -> None:
         os.environ.setdefault(name, "1")
 
 
-def stand_back() -> None:
+def use_batch_scheduling() -> None:
     """Let this process' threads wait until others leave a processor, rather than interrupt them.
 
     For who only listens to a loop. To be called before there are other threads, which inherit it.

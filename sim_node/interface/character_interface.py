@@ -13,29 +13,29 @@ from msgs_config.messages.wrenches import decode_wrenches
 from msgs_config.parameters import Values
 from msgs_config.runtime.once_logger import Warnings
 from msgs_config.runtime.polling import DirectSubscription
-from sim_node.interface.inbox import FirstTick, OwnSession, StampedInbox, forget
-from sim_node.interface.publishers import Outputs
-from sim_node.parameters import Cast, command_timeout_ns, display_ticks, is_realtime
+from sim_node.interface.inbox import FirstTick, OwnSession, StampedSubscription, forget
+from sim_node.interface.publishers import Publishers
+from sim_node.parameters import SimulatorParameters, command_timeout_ns, display_ticks, is_realtime
 from sim_node.physics.probe import measure_probe
-from sim_node.physics.simulated_character import Actor
+from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.world import WorldSettings
-from sim_node.physics.wrenches import Push, PushSchedule
-from sim_node.timing.lockstep import LockstepBarrier, Verdict
-from sim_node.timing.zero_order_hold import CommandHold
+from sim_node.physics.wrenches import ExternalWrench, WrenchQueue
+from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
+from sim_node.timing.zero_order_hold import ZeroOrderHold
 
-Collector = LockstepBarrier | CommandHold
+Collector = LockstepBarrier | ZeroOrderHold
 
 
-class Port:
+class CharacterInterface:
     """Takes what is sent to one character, and keeps it for the tick that it is for."""
 
     def __init__(
         self,
         node: Node,
-        actor: Actor,
+        actor: SimulatedCharacter,
         collector: Collector,
-        outputs: Outputs,
+        outputs: Publishers,
         session: str,
         warnings: Warnings,
     ) -> None:
@@ -47,14 +47,16 @@ class Port:
         self.states = topics.JOINT_STATES.under(namespace)
         self.torques = topics.JOINT_TORQUES.under(namespace)
         self.last_effort = collector.effort
-        self._pushes = PushSchedule(actor.character)
+        self._pushes = WrenchQueue(actor.character)
         self._decoder = JointStateDecoder()
         self._commands = DirectSubscription(node, self.torques)
         self._warnings = warnings
         self._of = f" for '{namespace}'" if namespace else ""
         self._own = OwnSession(session, warnings)
         self._wrench = topics.EXTERNAL_WRENCH.under(namespace)
-        self._wrenches = StampedInbox(node, self._wrench, "push", self._of, self._own, warnings)
+        self._wrenches = StampedSubscription(
+            node, self._wrench, "push", self._of, self._own, warnings
+        )
 
     @property
     def push_counts(self) -> Counter[str]:
@@ -75,9 +77,9 @@ class Port:
         """The degrees of freedom whose commands the tick waits for."""
         return [self.actor.role.prefix + name for name in self.collector.missing]
 
-    def open(self) -> None:
+    def begin_tick(self) -> None:
         """Begin to collect the commands that answer the present state."""
-        self.collector.open(self.actor.state.stamp_ns)
+        self.collector.begin_tick(self.actor.state.stamp_ns)
 
     def forget(self) -> None:
         """Forget what was sent in the episode before, taken already or not."""
@@ -87,7 +89,7 @@ class Port:
         self._wrenches.forget()
         forget(self._commands)
 
-    def take_command(self) -> Verdict | None:
+    def take_command(self) -> CommandStatus | None:
         """Take a command if one is there; what was made of it."""
         raw = self._commands.take()
         if raw is None:
@@ -95,14 +97,16 @@ class Port:
         try:
             command = self._decoder.decode(raw)
             if self._own.rejects(self.torques, command.frame_id):
-                return Verdict.REJECTED
+                return CommandStatus.REJECTED
             indices = self.actor.layout.indices(command.names)
-            verdict = self.collector.offer(command.stamp_ns, indices, command.effort)
+            verdict = self.collector.submit(command.stamp_ns, indices, command.effort)
         except (MessageError, LayoutError, CommandError) as error:
             self.collector.count_rejected()
             self._warnings.say_once(f"command{self._of} rejected: {error}")
-            return Verdict.REJECTED
-        if verdict is Verdict.FUTURE or (command.stamp_ns == 0 and verdict is Verdict.STALE):
+            return CommandStatus.REJECTED
+        if verdict is CommandStatus.FUTURE or (
+            command.stamp_ns == 0 and verdict is CommandStatus.STALE
+        ):
             self._warnings.say_once(
                 f"command{self._of} dropped: it answers {command.stamp_ns} ns, the state is of "
                 f"{self.collector.stamp_ns} ns; the stamp must be that of the state",
@@ -110,7 +114,7 @@ class Port:
             )
         return verdict
 
-    def take_pushes(self, clock: TickClock, tick: int, duration_ticks: int) -> list[Push]:
+    def take_pushes(self, clock: TickClock, tick: int, duration_ticks: int) -> list[ExternalWrench]:
         """The pushes that act during the step that begins at a tick, with those just sent."""
 
         def schedule(raw: bytes, first_tick: FirstTick) -> None:
@@ -128,14 +132,17 @@ class Port:
 
 
 def open_ports(
-    node: Node, cast: Cast, simulation: Simulation, session: str, warnings: Warnings
-) -> list[Port]:
+    node: Node, cast: SimulatorParameters, simulation: Simulation, session: str, warnings: Warnings
+) -> list[CharacterInterface]:
     """A port for each character; all say the same session."""
     return [_open_port(node, actor, cast.values, session, warnings) for actor in simulation.actors]
 
 
 def publish_configurations(
-    ports: Iterable[Port], cast: Cast, world: WorldSettings, session: str
+    ports: Iterable[CharacterInterface],
+    cast: SimulatorParameters,
+    world: WorldSettings,
+    session: str,
 ) -> None:
     """Publish what the run of each character depends on, its initial state among it.
 
@@ -156,12 +163,14 @@ def publish_configurations(
         )
 
 
-def _open_port(node: Node, actor: Actor, values: Values, session: str, warnings: Warnings) -> Port:
+def _open_port(
+    node: Node, actor: SimulatedCharacter, values: Values, session: str, warnings: Warnings
+) -> CharacterInterface:
     names, commanded = actor.layout.dof_names, actor.commanded
     collector: Collector = LockstepBarrier(names, commanded)
     if is_realtime(values):
-        collector = CommandHold(names, commanded, command_timeout_ns(values))
+        collector = ZeroOrderHold(names, commanded, command_timeout_ns(values))
     for note in actor.notes:
         node.get_logger().warning(f"{actor.role.prefix}{note}")
-    outputs = Outputs(node, actor, display_ticks(values), session)
-    return Port(node, actor, collector, outputs, session, warnings)
+    outputs = Publishers(node, actor, display_ticks(values), session)
+    return CharacterInterface(node, actor, collector, outputs, session, warnings)

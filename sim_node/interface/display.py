@@ -11,10 +11,10 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import DoublesEncoder, split_stamp
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WORLD
 from sim_node.interface.markers import MarkerEncoder
-from sim_node.physics.simulated_character import Actor
+from sim_node.physics.simulated_character import SimulatedCharacter
 
 try:  # a full ROS install has it, the wheels have not
     from tf2_msgs.msg import TFMessage
@@ -29,7 +29,7 @@ _LINEAR, _ANGULAR = slice(43, 46), slice(46, 49)
 class Display:
     """Publishes `odom`, `visualization` and, where there is `tf2_msgs`, `/tf`."""
 
-    def __init__(self, node: Node, actor: Actor, namespace: str) -> None:
+    def __init__(self, node: Node, actor: SimulatedCharacter, namespace: str) -> None:
         self._actor = actor
         self._base = actor.role.prefix + actor.character.links[0].name
         self._odometry = topics.create_publisher(node, topics.ODOM.under(namespace))
@@ -38,7 +38,7 @@ class Display:
         if TFMessage is not None:
             self._transforms = node.create_publisher(TFMessage, "/tf", topics.STREAM_QOS)
         self._odometry_encoder = DoublesEncoder(WORLD, self._base)
-        self._throws: tuple[Throw, ...] = ()  # whose balls are shown
+        self._throws: tuple[ProjectileThrow, ...] = ()  # whose balls are shown
         self._markers = MarkerEncoder(actor.character)
 
     @property

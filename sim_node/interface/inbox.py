@@ -49,7 +49,7 @@ class _PastError(CommandError):
     """A message is for a tick that is over, which is told once, whatever its stamp."""
 
 
-class StampedInbox:
+class StampedSubscription:
     """A topic whose messages act from the first tick not before their stamp; 0: from the next."""
 
     def __init__(

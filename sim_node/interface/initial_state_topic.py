@@ -10,7 +10,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.state import StampedState
 from msgs_config.runtime.once_logger import Warnings
-from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare
 from sim_node.initial_state import (
@@ -23,9 +23,9 @@ from sim_node.initial_state import (
     check_state,
 )
 from sim_node.interface.publisher_diagnosis import describe_publishers, publisher_names
-from sim_node.parameters import Cast, Part
+from sim_node.parameters import CharacterParameters, SimulatorParameters
 from sim_node.physics.simulation import Simulation
-from sim_node.timing.watchdog import Due, Patience
+from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 _EXPLAIN_AFTER = 2.0  # s without the states before the node says what is missing
 _REMEDY = (
@@ -37,7 +37,7 @@ _REMEDY = (
 class InitialStates:
     """The initial states of a simulator's characters, as far as controllers have to say them."""
 
-    def __init__(self, node: Node, cast: Cast, simulation: Simulation) -> None:
+    def __init__(self, node: Node, cast: SimulatorParameters, simulation: Simulation) -> None:
         """Subscribe to the controllers of the characters that begin with their references."""
         self._node = node
         self._cast = cast
@@ -54,7 +54,7 @@ class InitialStates:
         """The parameters whose values are known from the beginning."""
         self._open = [p for p in cast.declared if p.name in open_names]
 
-    def settle(self, stop: StopSignal, spinner: Spinner) -> Cast | None:
+    def settle(self, stop: StopSignal, spinner: PollingExecutor) -> SimulatorParameters | None:
         """Wait for the states, and begin in them; the characters with the parameters that say so.
 
         None if `stop` came first.
@@ -72,10 +72,10 @@ class InitialStates:
         declare(self._node, self._open, cast.values)  # the node takes them as it does changes
         return cast
 
-    def _wait(self, stop: StopSignal, spinner: Spinner) -> bool:
+    def _wait(self, stop: StopSignal, spinner: PollingExecutor) -> bool:
         """Wait until every question has its answer; whether it has, or `stop` came first."""
         timeout = self._cast.values.number("initial_state_timeout")
-        patience = Patience(math.inf, _EXPLAIN_AFTER, timeout)
+        patience = Watchdog(math.inf, _EXPLAIN_AFTER, timeout)
         patience.restart(time.monotonic())
         while missing := [question for question in self._questions if not question.is_answered()]:
             if stop:
@@ -83,7 +83,7 @@ class InitialStates:
             spinner.rest()
             for due in patience.due(time.monotonic()):
                 sentence = "; ".join(question.describe() for question in missing)
-                if due is Due.TIMEOUT:
+                if due is WatchdogEvent.TIMEOUT:
                     raise SimulationError(
                         f"no initial state within {timeout:g} s; {sentence}; {_REMEDY}"
                     )
@@ -94,7 +94,7 @@ class InitialStates:
 class _Question:
     """In which state one character's reference begins."""
 
-    def __init__(self, node: Node, part: Part) -> None:
+    def __init__(self, node: Node, part: CharacterParameters) -> None:
         self.part = part
         self._node = node
         self._topic = topics.INITIAL_STATE.of(topics.CONTROLLER_NODE).under(part.name)

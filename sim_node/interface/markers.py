@@ -17,7 +17,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, Shape, ShapeType
 from msgs_config.geometry import rotations
 from msgs_config.messages.joint_state import split_stamp
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WORLD
 
 _TYPES = {
@@ -35,7 +35,9 @@ _FIND_SECONDS = -1_987_654_321
 class MarkerEncoder:
     """Serialises where the shapes of a character and balls are, as markers in the world."""
 
-    def __init__(self, character: Character, throws: Sequence[Throw] = (), gone: int = 0) -> None:
+    def __init__(
+        self, character: Character, throws: Sequence[ProjectileThrow] = (), gone: int = 0
+    ) -> None:
         """For a character, the balls of these throws, and `gone` balls that are to be taken away.
 
         The markers of the balls are numbered on from the character's.

@@ -7,14 +7,16 @@ from rclpy.node import Node
 from msgs_config.messages.session import REMEDY
 from msgs_config.messages.topics import Topic
 from msgs_config.runtime.once_logger import Warnings
-from sim_node.interface.character_interface import Port
+from sim_node.interface.character_interface import CharacterInterface
 from sim_node.interface.publisher_diagnosis import all_publisher_names
 
 
 class RivalWatch:
     """Logs, once for each set of names, that a topic of states has more than one publisher."""
 
-    def __init__(self, node: Node, ports: Sequence[Port], session: str, warnings: Warnings) -> None:
+    def __init__(
+        self, node: Node, ports: Sequence[CharacterInterface], session: str, warnings: Warnings
+    ) -> None:
         self._node = node
         self._topics: list[Topic] = [port.states for port in ports]
         self._session = session

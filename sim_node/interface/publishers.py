@@ -14,13 +14,15 @@ from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Outgoing, Topic
 from msgs_config.messages.wrenches import ContactEncoder, WrenchArrays, encode_wrenches
 from sim_node.interface.display import Display
-from sim_node.physics.simulated_character import Actor
+from sim_node.physics.simulated_character import SimulatedCharacter
 
 
-class Outputs:
+class Publishers:
     """The publishers of one character. A topic that nobody listens to costs nothing."""
 
-    def __init__(self, node: Node, actor: Actor, display_ticks: int, session: str) -> None:
+    def __init__(
+        self, node: Node, actor: SimulatedCharacter, display_ticks: int, session: str
+    ) -> None:
         """Offer the topics, below the character's name; markers come every `display_ticks`.
 
         What is said names the simulator's session.

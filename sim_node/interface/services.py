@@ -8,7 +8,7 @@ from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 from msgs_config.errors import CommandError
-from msgs_config.runtime.polling import Spinner
+from msgs_config.runtime.polling import PollingExecutor
 from sim_node.timing.run_state import RunControl
 
 
@@ -40,7 +40,7 @@ class Services:
             self._steps.set_result(reason)
             self._steps = None
 
-    def end(self, spinner: Spinner) -> None:
+    def end(self, spinner: PollingExecutor) -> None:
         """Answer what is still to be answered; the simulation ends."""
         self.end_steps("the simulation ends")
         spinner.serve_pending()  # the last step may have been the run's last tick

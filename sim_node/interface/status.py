@@ -1,16 +1,18 @@
 """What the diagnostics say of one character."""
 
-from sim_node.interface.character_interface import Port
-from sim_node.timing.lockstep import Verdict
-from sim_node.timing.zero_order_hold import CommandHold
+from sim_node.interface.character_interface import CharacterInterface
+from sim_node.timing.lockstep import CommandStatus
+from sim_node.timing.zero_order_hold import ZeroOrderHold
 
 _MS = 1e-6  # of a nanosecond
 
 
-def report(port: Port) -> dict[str, object]:
+def report(port: CharacterInterface) -> dict[str, object]:
     """Counts of commands by verdict, of pushes and of saturations; the age of the commands."""
     collector, actor = port.collector, port.actor
-    values: dict[str, object] = {verdict.value: collector.counts[verdict] for verdict in Verdict}
+    values: dict[str, object] = {
+        verdict.value: collector.counts[verdict] for verdict in CommandStatus
+    }
     for verdict in ("accepted", "rejected"):
         values[f"{verdict}_pushes"] = port.push_counts[verdict]
     values |= port.foreign_counts
@@ -19,7 +21,7 @@ def report(port: Port) -> dict[str, object]:
     names = [n for n, yes in zip(actor.character.vector_names, saturated, strict=True) if yes]
     if names:
         values["saturated"] = " ".join(names)
-    if isinstance(collector, CommandHold):
+    if isinstance(collector, ZeroOrderHold):
         values["command_timeouts"] = collector.timeouts
         age_ns = collector.age_ns
         values["command_age_ms"] = "none" if age_ns is None else round(_MS * age_ns, 3)

@@ -6,15 +6,15 @@ from rclpy.node import Node
 
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, ball_names, encode_balls
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.topics import Outgoing
 from msgs_config.runtime.once_logger import Warnings
-from sim_node.interface.inbox import FirstTick, OwnSession, StampedInbox
+from sim_node.interface.inbox import FirstTick, OwnSession, StampedSubscription
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import ThrowSchedule
+from sim_node.physics.throws import ThrowQueue
 
 
-class WorldPort:
+class WorldInterface:
     """Takes throws, and says which ones began and where the balls are."""
 
     def __init__(
@@ -24,10 +24,10 @@ class WorldPort:
         self._session = session
         self._own = OwnSession(session, warnings)
         self._simulation = simulation
-        self._schedule = ThrowSchedule()
+        self._schedule = ThrowQueue()
         self._codec = ThrowCodec(session)
         self._told_ns = -1  # of the last throws that were published
-        self._inbox = StampedInbox(node, topics.THROW, "throw", "", self._own, warnings)
+        self._inbox = StampedSubscription(node, topics.THROW, "throw", "", self._own, warnings)
         self._applied = topics.create_publisher(node, topics.APPLIED_THROW)
         self._thrown = topics.create_publisher(node, topics.THROWN)
 
@@ -37,7 +37,7 @@ class WorldPort:
         counts = {f"{kind}_throws": self._inbox.counts[kind] for kind in ("accepted", "rejected")}
         return {**counts, "foreign_throws": self._own.counts[topics.THROW.name]}
 
-    def take_throws(self) -> list[Throw]:
+    def take_throws(self) -> list[ProjectileThrow]:
         """The throws that begin with the present state, with those just sent."""
         simulation = self._simulation
         self._inbox.take(simulation.clock, simulation.tick, self._use)

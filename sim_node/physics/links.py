@@ -12,7 +12,7 @@ from msgs_config.character.bullet import pybullet
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order, rotations
 from sim_node.physics.contacts import TouchedLinks
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 
 _FAR = 1e3  # m, beyond which the engine need not look for what is near
 
@@ -76,7 +76,7 @@ class Links:
             )
         return np.array(turn), np.array(linear), np.array(angular)
 
-    def push(self, pushes: Sequence[Push]) -> None:
+    def push(self, pushes: Sequence[ExternalWrench]) -> None:
         """Push links during the engine's next step, and only then.
 
         A force acts at its point, which makes the torque `r x f` about the centre of mass more.

@@ -5,7 +5,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
-from msgs_config.messages.probe import Probe
+from msgs_config.messages.probe import DynamicsSample
 from sim_node.physics.mass_matrix import (
     INSTANT,
     clear_of_limits,
@@ -23,7 +23,7 @@ _SPEED = 1.0  # rad/s or m/s, at the most
 _ACCELERATION = 10.0  # rad/s^2 or m/s^2 that one effort alone leads to, at the most
 
 
-def measure_probe(character: Character, gravity: float) -> Probe:
+def measure_probe(character: Character, gravity: float) -> DynamicsSample:
     """What the engine makes of a character in a state that has a bit of everything.
 
     The state is off the rest pose and within all limits; it moves in every degree of freedom. Each
@@ -54,7 +54,7 @@ def measure_probe(character: Character, gravity: float) -> Probe:
         body.apply(effort + passive.effort(position, velocity))
         world.step()
         acceleration = (body.read()[1] - velocity) / INSTANT
-    return Probe(position, velocity, effort, energy, acceleration)
+    return DynamicsSample(position, velocity, effort, energy, acceleration)
 
 
 def _position(character: Character, rng: np.random.Generator) -> FloatArray:

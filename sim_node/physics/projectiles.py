@@ -6,13 +6,13 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import pybullet
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.links import Links
 
 _AWAY = 10_000.0  # m along x
 
 
-class Balls:
+class Projectiles:
     """The balls of a world, in the order in which they were thrown."""
 
     def __init__(self, client: int, friction: float) -> None:
@@ -20,9 +20,9 @@ class Balls:
         self._friction = friction
         self._numbers: list[int] = []  # the engine's
         self._shapes: dict[float, int] = {}  # by radius
-        self.throws: tuple[Throw, ...] = ()
+        self.throws: tuple[ProjectileThrow, ...] = ()
 
-    def add(self, throw: Throw) -> None:
+    def add(self, throw: ProjectileThrow) -> None:
         """Put a ball into the world, as it is when it is let go."""
         client = self._client
         number = pybullet.createMultiBody(
@@ -42,7 +42,7 @@ class Balls:
         self._numbers.append(int(number))
         self.throws = (*self.throws, throw)
 
-    def have(self, throws: Sequence[Throw]) -> None:
+    def have(self, throws: Sequence[ProjectileThrow]) -> None:
         """Have the balls of these throws and no others, wherever they are.
 
         It is for what restores a state, which says where they are. The engine goes by the order of
@@ -89,7 +89,7 @@ class Balls:
             rows.append((*centre, *turn, *linear, *angular))
         return np.array(rows, dtype=float).reshape(-1, 13)
 
-    def _alike(self, throws: Sequence[Throw], place: int) -> bool:
+    def _alike(self, throws: Sequence[ProjectileThrow], place: int) -> bool:
         one, other = throws[place], self.throws[place]
         return (one.mass, one.radius) == (other.mass, other.radius)
 

@@ -12,13 +12,13 @@ from msgs_config.errors import ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedState
 from sim_node.physics.contacts import TouchedLinks
 from sim_node.physics.mass_matrix import make_passive_forces
-from sim_node.physics.projectiles import Balls
+from sim_node.physics.projectiles import Projectiles
 from sim_node.physics.world import World
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 
 
 @dataclass(frozen=True)
-class Role:
+class CharacterSetup:
     """A character, what of it may be commanded, and where it begins."""
 
     character: Character
@@ -44,24 +44,24 @@ class Contacts:
 
 
 @dataclass(frozen=True)
-class ActorMemory:
+class CharacterSnapshot:
     """What an actor knows between two ticks, beside the engine."""
 
     state: StampedState
     contacts: Contacts | None
-    pushes: tuple[Push, ...]
+    pushes: tuple[ExternalWrench, ...]
     delayed: tuple[FloatArray, ...]  # (n,) each, commands on their way
     saturated_ticks: IntArray  # (b,)
 
 
-class Actor:
+class SimulatedCharacter:
     """A character in a world."""
 
     state: StampedState
     contacts: Contacts | None  # over the last tick; None if nobody watched
-    pushes: tuple[Push, ...]  # what pushed it during the last tick
+    pushes: tuple[ExternalWrench, ...]  # what pushed it during the last tick
 
-    def __init__(self, role: Role, *, delay_ticks: int, step_s: float) -> None:
+    def __init__(self, role: CharacterSetup, *, delay_ticks: int, step_s: float) -> None:
         """Check the role, for efforts that come late by some ticks and engine steps of `step_s`.
 
         Raises:
@@ -100,7 +100,7 @@ class Actor:
         self._read(stamp_ns, effort=None)
 
     def begin_tick(
-        self, effort: FloatArray, pushes: Sequence[Push], watches_contacts: bool
+        self, effort: FloatArray, pushes: Sequence[ExternalWrench], watches_contacts: bool
     ) -> None:
         """Take the effort (n,) and the pushes of a tick."""
         self._delayed.append(effort + 0.0)  # -0.0 becomes 0.0: a tick has one effort, to the bit
@@ -136,9 +136,9 @@ class Actor:
         """Read the state that the tick has led to."""
         self._read(stamp_ns, self._applied)
 
-    def memory(self) -> ActorMemory:
+    def memory(self) -> CharacterSnapshot:
         """What `recall` needs, to be taken between two ticks."""
-        return ActorMemory(
+        return CharacterSnapshot(
             self.state,
             self.contacts,
             self.pushes,
@@ -146,7 +146,7 @@ class Actor:
             self.saturated_ticks.copy(),
         )
 
-    def recall(self, memory: ActorMemory) -> None:
+    def recall(self, memory: CharacterSnapshot) -> None:
         """Know again what was known then; the engine is restored by who owns it."""
         self.state, self.contacts, self.pushes = memory.state, memory.contacts, memory.pushes
         self._delayed = deque(memory.delayed)
@@ -157,7 +157,7 @@ class Actor:
         return self._body.links.frames()
 
     @property
-    def balls(self) -> Balls:
+    def balls(self) -> Projectiles:
         """The balls of the world that it is in."""
         return self._balls
 

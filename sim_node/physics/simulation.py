@@ -7,10 +7,14 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.state import StampedState
-from msgs_config.messages.throw import Throw
-from sim_node.physics.simulated_character import Actor, ActorMemory, Role
+from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.simulated_character import (
+    CharacterSetup,
+    CharacterSnapshot,
+    SimulatedCharacter,
+)
 from sim_node.physics.world import World, WorldSettings
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 
 
 @dataclass(frozen=True)
@@ -31,13 +35,13 @@ class Memory:
 
     tick: int
     episode: int
-    actors: tuple[ActorMemory, ...]
-    throws: tuple[Throw, ...]  # of the last tick
+    actors: tuple[CharacterSnapshot, ...]
+    throws: tuple[ProjectileThrow, ...]  # of the last tick
     thrown_at: tuple[int, ...]  # ticks, of the balls that are in the world
 
 
 @dataclass(frozen=True)
-class Saved:
+class InMemorySnapshot:
     """A state between two ticks, which the simulation that saved it can return to."""
 
     memory: Memory
@@ -49,7 +53,7 @@ class Snapshot:
     """A state between two ticks, for any simulation of equal roles and settings."""
 
     memory: Memory
-    balls: tuple[Throw, ...]
+    balls: tuple[ProjectileThrow, ...]
     world: bytes
 
 
@@ -61,7 +65,10 @@ class Simulation:
     """
 
     def __init__(
-        self, roles: Sequence[Role], settings: SimulationSettings, first_tick: int = FIRST_TICK
+        self,
+        roles: Sequence[CharacterSetup],
+        settings: SimulationSettings,
+        first_tick: int = FIRST_TICK,
     ) -> None:
         """Build the world and put the characters into their initial states, which are `first_tick`.
 
@@ -73,13 +80,17 @@ class Simulation:
         self.settings = settings
         self.clock = TickClock(settings.rate_hz)
         self.actors = tuple(
-            Actor(role, delay_ticks=settings.command_delay_ticks, step_s=settings.world.step_s)
+            SimulatedCharacter(
+                role, delay_ticks=settings.command_delay_ticks, step_s=settings.world.step_s
+            )
             for role in roles
         )
         self.tick = first_tick
         self.episode = 1
         self.watches_contacts = False  # whether to find out what touches, which takes time
-        self.throws: tuple[Throw, ...] = ()  # what was thrown at the beginning of the last tick
+        self.throws: tuple[
+            ProjectileThrow, ...
+        ] = ()  # what was thrown at the beginning of the last tick
         self._thrown_at: tuple[int, ...] = ()
         self._world = self._fresh_world()
 
@@ -99,7 +110,7 @@ class Simulation:
         return self.clock.stamp_ns(self.tick)
 
     @property
-    def balls(self) -> tuple[Throw, ...]:
+    def balls(self) -> tuple[ProjectileThrow, ...]:
         """What was thrown in this episode, and is still in the world."""
         return self._world.balls.throws
 
@@ -110,8 +121,8 @@ class Simulation:
     def step(
         self,
         efforts: Sequence[FloatArray],
-        pushes: Sequence[Sequence[Push]] | None = None,
-        throws: Sequence[Throw] = (),
+        pushes: Sequence[Sequence[ExternalWrench]] | None = None,
+        throws: Sequence[ProjectileThrow] = (),
     ) -> None:
         """Advance one tick: for each actor an effort (n,), clipped to its limits, and its pushes.
 
@@ -121,7 +132,7 @@ class Simulation:
             SimulationError: a next state is not finite or faster than the speed limit; it names
                 the degree of freedom.
         """
-        nothing: list[tuple[Push, ...]] = [()] * len(self.actors)
+        nothing: list[tuple[ExternalWrench, ...]] = [()] * len(self.actors)
         for actor, effort, its in zip(self.actors, efforts, pushes or nothing, strict=True):
             actor.begin_tick(effort, its, self.watches_contacts)
         self._move_balls(throws)
@@ -144,7 +155,7 @@ class Simulation:
             self.tick -= 1  # nobody is to see that state; a reset's first one has its stamp
             raise
 
-    def _move_balls(self, throws: Sequence[Throw]) -> None:
+    def _move_balls(self, throws: Sequence[ProjectileThrow]) -> None:
         """Let balls go, and take those out of the way whose time is over."""
         if self.settings.ball_ticks:
             over = self.tick - self.settings.ball_ticks
@@ -175,11 +186,11 @@ class Simulation:
         self._world.close()
         self._world = self._fresh_world()
 
-    def save(self) -> Saved:
+    def save(self) -> InMemorySnapshot:
         """Keep the present state in memory, until it is forgotten."""
-        return Saved(self._memory(), self._world.save())
+        return InMemorySnapshot(self._memory(), self._world.save())
 
-    def restore(self, saved: Saved) -> None:
+    def restore(self, saved: InMemorySnapshot) -> None:
         """Return to a saved state: what follows is what followed it, to the bit.
 
         That holds of states that a step has led to; in a world without a step yet, the engine has
@@ -188,7 +199,7 @@ class Simulation:
         self._world.restore(saved.world)
         self._recall(saved.memory)
 
-    def forget(self, saved: Saved) -> None:
+    def forget(self, saved: InMemorySnapshot) -> None:
         """Give back the memory of a saved state."""
         self._world.forget(saved.world)
 
@@ -196,7 +207,7 @@ class Simulation:
         """The present state, to be taken over by a simulation in another process."""
         return Snapshot(self._memory(), self.balls, self._world.to_bytes())
 
-    def take_over(self, snapshot: Snapshot) -> None:
+    def load_snapshot(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot, as its own simulation would, to the bit."""
         self._world.from_bytes(snapshot.world, snapshot.balls)
         self._recall(snapshot.memory)

@@ -7,7 +7,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, one_of
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.world import World, WorldSettings
 
 _CLOSE = 1e-6  # m that count as touching
@@ -61,7 +61,7 @@ def find_impact(
         target = np.array(body.links.centres()[row])
         far = target + distance * origin
         x, y, z = far.tolist()
-        world.balls.add(Throw(1.0, radius, (x, y, z), (0.0, 0.0, 0.0)))
+        world.balls.add(ProjectileThrow(1.0, radius, (x, y, z), (0.0, 0.0, 0.0)))
         gaps = world.balls.gaps(body.links)
         if not np.isfinite(gaps[row]):
             raise ConfigurationError(f"link '{link}' has no surface that could be hit")

@@ -3,20 +3,20 @@
 from dataclasses import dataclass, field
 
 from msgs_config.errors import CommandError
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 
 MOST_BALLS = 100
 """In an episode, lest a hostile sender fill the world."""
 
 
 @dataclass
-class ThrowSchedule:
+class ThrowQueue:
     """The throws of an episode that wait, in the order in which they were sent."""
 
-    _waiting: list[tuple[int, Throw]] = field(default_factory=list)  # with the tick
+    _waiting: list[tuple[int, ProjectileThrow]] = field(default_factory=list)  # with the tick
     _taken: int = 0
 
-    def add(self, throw: Throw, first_tick: int) -> None:
+    def add(self, throw: ProjectileThrow, first_tick: int) -> None:
         """Take a throw that begins in the state of a tick.
 
         Raises:
@@ -26,7 +26,7 @@ class ThrowSchedule:
             raise CommandError(f"an episode has at most {MOST_BALLS} balls")
         self._waiting.append((first_tick, throw))
 
-    def take(self, tick: int) -> list[Throw]:
+    def take(self, tick: int) -> list[ProjectileThrow]:
         """The throws that begin in the state of a tick."""
         if not self._waiting:
             return []

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from msgs_config.character.bullet import connect, load_urdf, pybullet
-from msgs_config.character.model import Character, Loading
-from msgs_config.messages.throw import Throw
+from msgs_config.character.model import Character, UrdfOptions
+from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.body import Body
 from sim_node.physics.contacts import TouchedLinks, read_contacts
-from sim_node.physics.projectiles import Balls
+from sim_node.physics.projectiles import Projectiles
 
 _STATE_FILE = "state.bullet"  # the engine writes to files alone
 
@@ -25,7 +25,7 @@ class WorldSettings:
     link_friction: float = 0.5  # of every link
     solver_iterations: int = 10
     ground: bool = True  # the plane z = 0
-    terrain: Loading | None = None  # what else lies there for ever
+    terrain: UrdfOptions | None = None  # what else lies there for ever
 
 
 class World:
@@ -61,8 +61,8 @@ class World:
             self._set_friction(ground, settings.friction)
         if settings.terrain is not None:
             self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
-        self.balls = Balls(self._client, settings.link_friction)
-        self._saved: dict[int, tuple[Throw, ...]] = {}  # the balls of each saved state
+        self.balls = Projectiles(self._client, settings.link_friction)
+        self._saved: dict[int, tuple[ProjectileThrow, ...]] = {}  # the balls of each saved state
 
     def __enter__(self) -> "World":
         return self
@@ -109,7 +109,7 @@ class World:
             pybullet.saveBullet(str(file), physicsClientId=self._client)
             return file.read_bytes()
 
-    def from_bytes(self, state: bytes, throws: Sequence[Throw] = ()) -> None:
+    def from_bytes(self, state: bytes, throws: Sequence[ProjectileThrow] = ()) -> None:
         """Take over a state from `to_bytes`, exactly, in which these balls were."""
         self.balls.have(throws)
         with tempfile.TemporaryDirectory() as directory:

@@ -13,7 +13,7 @@ _MOST_WAITING = 10_000  # pushes, lest a hostile sender fill the memory
 
 
 @dataclass(frozen=True)
-class Push:
+class ExternalWrench:
     """A force and a torque on one link, held for some ticks."""
 
     link: int  # index in `Character.links`
@@ -27,13 +27,13 @@ class Push:
         return self.first_tick <= tick < self.first_tick + self.ticks
 
 
-class PushSchedule:
+class WrenchQueue:
     """The pushes of one character that wait or act."""
 
     def __init__(self, character: Character) -> None:
         self._rows = {link.name: row for row, link in enumerate(character.links)}
         self._centres = np.array([link.inertial_pose.position for link in character.links])
-        self._pushes: list[Push] = []
+        self._pushes: list[ExternalWrench] = []
 
     def add(
         self,
@@ -44,7 +44,7 @@ class PushSchedule:
         first_tick: int,
         ticks: int,
     ) -> None:
-        """Take pushes on links by name, all or none; see `Push`.
+        """Take pushes on links by name, all or none; see `ExternalWrench`.
 
         `wrenches` is (m, 6); `points` is (m, 3), or (0, 3) for the links' centres of mass.
 
@@ -56,11 +56,11 @@ class PushSchedule:
         if not len(points):
             points = self._centres[rows]
         self._pushes += [
-            Push(row, wrench, point, first_tick, ticks)
+            ExternalWrench(row, wrench, point, first_tick, ticks)
             for row, wrench, point in zip(rows, wrenches.copy(), points.copy(), strict=True)
         ]
 
-    def take(self, tick: int) -> list[Push]:
+    def take(self, tick: int) -> list[ExternalWrench]:
         """The pushes that act during the step that begins at a tick; forgets what is over."""
         if not self._pushes:
             return []

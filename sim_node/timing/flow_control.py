@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass
-class BackPressure:
+class FlowControl:
     """Holds the simulation until its subscribers have acknowledged what was published.
 
     A publisher keeps the last few thousand messages for who is slow; a subscriber whose process

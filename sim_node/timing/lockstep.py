@@ -16,7 +16,7 @@ from msgs_config.errors import CommandError
 _REMEMBERED = 1000  # ticks
 
 
-class Verdict(Enum):
+class CommandStatus(Enum):
     """What the barrier made of a command."""
 
     ACCEPTED = "accepted"
@@ -53,10 +53,10 @@ class LockstepBarrier:
         self._required = required
         self._past: dict[int, _Tick] = {}  # by stamp, the oldest first
         self.stamp_ns = 0
-        self.counts: Counter[Verdict] = Counter()
+        self.counts: Counter[CommandStatus] = Counter()
         self._begin()
 
-    def open(self, stamp_ns: int) -> None:
+    def begin_tick(self, stamp_ns: int) -> None:
         """Begin to wait for the commands that answer the state of this stamp."""
         if stamp_ns != self.stamp_ns:
             self._tick.given &= ~self._filled
@@ -93,7 +93,7 @@ class LockstepBarrier:
         lacking = self._required & ~self._tick.given
         return [name for name, lacks in zip(self._dof_names, lacking, strict=True) if lacks]
 
-    def offer(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> Verdict:
+    def submit(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
         """Take a command: `effort` (m,) for the entries `indices` (m,), answering `stamp_ns`.
 
         Raises:
@@ -103,7 +103,7 @@ class LockstepBarrier:
         check_command(self._dof_names, self._required, indices, effort)
         verdict = self._judge(stamp_ns, indices, effort)
         self.counts[verdict] += 1
-        if verdict is Verdict.ACCEPTED:
+        if verdict is CommandStatus.ACCEPTED:
             self._tick.effort[indices] = effort
             self._tick.given[indices] = True
             self._missing = int(np.count_nonzero(self._required & ~self._tick.given))
@@ -111,7 +111,7 @@ class LockstepBarrier:
 
     def count_rejected(self) -> None:
         """Count a command that was refused, here or before it could be offered."""
-        self.counts[Verdict.REJECTED] += 1
+        self.counts[CommandStatus.REJECTED] += 1
 
     def fill_missing(self, effort: FloatArray) -> None:
         """Complete the tick with the entries of `effort` (n,) wherever a command is missing."""
@@ -120,19 +120,19 @@ class LockstepBarrier:
         self._tick.given |= self._filled
         self._missing = 0
 
-    def _judge(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> Verdict:
+    def _judge(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
         if stamp_ns > self.stamp_ns:
-            return Verdict.FUTURE
+            return CommandStatus.FUTURE
         tick = self._tick if stamp_ns == self.stamp_ns else self._past.get(stamp_ns)
         if tick is None:
-            return Verdict.STALE
+            return CommandStatus.STALE
         conflict = tick.conflict(indices, effort)
         if len(conflict):
             self.conflict = self._dof_names[conflict[0]]
-            return Verdict.CONFLICT
+            return CommandStatus.CONFLICT
         if tick is not self._tick:
-            return Verdict.STALE
-        return Verdict.DUPLICATE if tick.given[indices].all() else Verdict.ACCEPTED
+            return CommandStatus.STALE
+        return CommandStatus.DUPLICATE if tick.given[indices].all() else CommandStatus.ACCEPTED
 
 
 def check_command(

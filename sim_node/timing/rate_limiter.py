@@ -7,7 +7,7 @@ from msgs_config.runtime.durations import Durations
 _LONGEST_BACKLOG = 0.1  # s that is caught up with; beyond it the schedule begins anew
 
 
-class Pace:
+class RateLimiter:
     """A schedule of ticks in s of wall time; a period of 0 makes every tick due at once."""
 
     def __init__(self, period: float) -> None:

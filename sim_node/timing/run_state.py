@@ -18,7 +18,7 @@ class RunControl:
         return not self.paused or self.steps_left > 0
 
     @property
-    def is_stuck(self) -> bool:
+    def has_diverged(self) -> bool:
         """Whether the simulation diverged."""
         return self._stuck
 

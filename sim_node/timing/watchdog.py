@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 
-class Due(Enum):
+class WatchdogEvent(Enum):
     """What a long wait calls for."""
 
     REPUBLISH = "republish"  # somebody may have joined too late for the state
@@ -14,7 +14,7 @@ class Due(Enum):
 
 
 @dataclass
-class Patience:
+class Watchdog:
     """Times in s of wall time, counted from `restart`; a timeout of 0 never comes."""
 
     republish_period: float
@@ -30,16 +30,16 @@ class Patience:
         self._explain_at = now + self.explain_after
         self._timeout_at = now + self.timeout if self.timeout > 0.0 else math.inf
 
-    def due(self, now: float) -> list[Due]:
+    def due(self, now: float) -> list[WatchdogEvent]:
         """What has become due since it was last asked, each explanation and timeout once."""
         events = []
         if now >= self._republish_at:
-            events.append(Due.REPUBLISH)
+            events.append(WatchdogEvent.REPUBLISH)
             self._republish_at = now + self.republish_period
         if now >= self._explain_at:
-            events.append(Due.EXPLAIN)
+            events.append(WatchdogEvent.EXPLAIN)
             self._explain_at = math.inf
         if now >= self._timeout_at:
-            events.append(Due.TIMEOUT)
+            events.append(WatchdogEvent.TIMEOUT)
             self._timeout_at = math.inf
         return events

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from sim_node.timing.lockstep import Verdict, check_command
+from sim_node.timing.lockstep import CommandStatus, check_command
 
 _NEVER = -1
 
 
-class CommandHold:
+class ZeroOrderHold:
     """The last command of each degree of freedom, held until it is too old; then zero.
 
     Offers the same as `LockstepBarrier`, save that a tick never waits: it is always complete. Of
@@ -32,11 +32,11 @@ class CommandHold:
         self.timeout_ns = timeout_ns
         self.stamp_ns = 0
         self.conflict: str | None = None  # the first entry of the last conflict
-        self.counts: Counter[Verdict] = Counter()
+        self.counts: Counter[CommandStatus] = Counter()
         self.timeouts = 0  # times that a held command became too old
         self._was_held = np.zeros(len(allowed), dtype=np.bool_)
 
-    def open(self, stamp_ns: int) -> None:
+    def begin_tick(self, stamp_ns: int) -> None:
         """Go on to the tick of the state of this stamp."""
         self.stamp_ns = stamp_ns
         self.conflict = None
@@ -61,7 +61,7 @@ class CommandHold:
         held = self._held
         return int(self.stamp_ns - self._given_ns[held].min()) if held.any() else None
 
-    def offer(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> Verdict:
+    def submit(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
         """Take a command: `effort` (m,) for the entries `indices` (m,).
 
         It answers the state of `stamp_ns`, or whichever is the last one where the stamp is zero.
@@ -74,7 +74,7 @@ class CommandHold:
         answered_ns = stamp_ns or self.stamp_ns
         verdict = self._judge(stamp_ns, answered_ns, indices, effort)
         self.counts[verdict] += 1
-        if verdict in (Verdict.ACCEPTED, Verdict.CONFLICT):
+        if verdict in (CommandStatus.ACCEPTED, CommandStatus.CONFLICT):
             self._effort[indices] = effort
             self._given_ns[indices] = answered_ns
             self._stamp_of_command_ns[indices] = stamp_ns
@@ -83,7 +83,7 @@ class CommandHold:
 
     def count_rejected(self) -> None:
         """Count a command that was refused, here or before it could be offered."""
-        self.counts[Verdict.REJECTED] += 1
+        self.counts[CommandStatus.REJECTED] += 1
 
     @property
     def _held(self) -> BoolArray:
@@ -94,18 +94,18 @@ class CommandHold:
 
     def _judge(
         self, stamp_ns: int, answered_ns: int, indices: IntArray, effort: FloatArray
-    ) -> Verdict:
+    ) -> CommandStatus:
         if answered_ns > self.stamp_ns:
-            return Verdict.FUTURE
+            return CommandStatus.FUTURE
         oldest_ns = max(self._oldest_ns, int(self._given_ns[indices].max()))
         if answered_ns < oldest_ns or self.stamp_ns - answered_ns >= self.timeout_ns:
-            return Verdict.STALE
+            return CommandStatus.STALE
         if stamp_ns:
             same = self._stamp_of_command_ns[indices] == stamp_ns
             differs = same & (self._effort[indices] != effort)
             if differs.any():
                 self.conflict = self._dof_names[indices[int(np.argmax(differs))]]
-                return Verdict.CONFLICT
+                return CommandStatus.CONFLICT
             if same.all():
-                return Verdict.DUPLICATE
-        return Verdict.ACCEPTED
+                return CommandStatus.DUPLICATE
+        return CommandStatus.ACCEPTED

@@ -13,7 +13,7 @@ from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import (
     EVERY_CHARACTER,
     character,
@@ -365,7 +365,7 @@ class Stance:
             posture += self._balance.effort(model, self._gains)
         return layout.clipped(posture, self._posture.effort_limits)
 
-    def hold(self, seconds: float, *pushes: Push) -> None:
+    def hold(self, seconds: float, *pushes: ExternalWrench) -> None:
         for _ in range(round(seconds / self._period)):
             state = self._run.advance(self.effort(), *pushes)
             self.states += state.position.tobytes() + state.velocity.tobytes()
@@ -376,7 +376,7 @@ class Stance:
         chest = [link.name for link in character_.links].index("chest")
         wrench = np.array([*impulse, 0.0, 0.0, 0.0, 0.0]) / PUSH_S
         point = np.array(character_.links[chest].inertial_pose.position)
-        self.hold(PUSH_S, Push(chest, wrench, point, first_tick=0, ticks=10**9))
+        self.hold(PUSH_S, ExternalWrench(chest, wrench, point, first_tick=0, ticks=10**9))
 
     @property
     def stands(self) -> bool:

@@ -268,7 +268,7 @@ def test_an_episode_of_the_same_stamp_that_is_begun_has_nothing_of_the_one_befor
     driver, (first, second, third) = walker(law="pid"), states(3)
     before = [driver.answer(state, stamp(1))[0].tobytes() for state in (first, second)]
     weak = strengths_of(HUMANOID, ("chest",), (0.5,), stamp(2))
-    driver.weaken(weak, episode_ns=stamp(1))
+    driver.set_strengths(weak, episode_ns=stamp(1))
     points = points_of_lists(["left_knee"], [0.5], [[-1.0]], [[]], [[]])
     driver.follow(points, start_ns=stamp(3), now_ns=stamp(3), episode_ns=stamp(1))
     driver.answer(third, stamp(1))

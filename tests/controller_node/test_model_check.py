@@ -16,7 +16,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, Link
 from msgs_config.errors import CharacterError, MessageError
 from msgs_config.messages import configuration, topics
-from msgs_config.messages.probe import Probe, read_probe
+from msgs_config.messages.probe import DynamicsSample, read_probe
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.physics.probe import measure_probe
@@ -28,7 +28,7 @@ GRAVITY = 9.81
 every_character = pytest.mark.parametrize("name", EVERY_CHARACTER, ids=character_id)
 
 
-def check(whole: Character, probe: Probe, gravity: float = GRAVITY) -> None:
+def check(whole: Character, probe: DynamicsSample, gravity: float = GRAVITY) -> None:
     check_agreement(DynamicsModel(whole, gravity), whole.layout, probe)
 
 
@@ -187,7 +187,7 @@ def test_the_inertia_of_one_link_of_many_is_not_overlooked(link: str) -> None:
 def test_a_run_compares_before_it_starts_anything(monkeypatch: pytest.MonkeyPatch) -> None:
     real = measure_probe
 
-    def of_another_engine(whole: Character, gravity: float) -> Probe:
+    def of_another_engine(whole: Character, gravity: float) -> DynamicsSample:
         probe = real(whole, gravity)
         return replace(probe, kinetic_energy=1.5 * probe.kinetic_energy)
 
@@ -200,7 +200,7 @@ def test_a_run_compares_before_it_starts_anything(monkeypatch: pytest.MonkeyPatc
 # --- over topics ---------------------------------------------------------------------------------
 
 
-def description(name: str, probe: Probe | None, **given: object) -> str:
+def description(name: str, probe: DynamicsSample | None, **given: object) -> str:
     """What a simulator says of itself."""
     whole = character(name)
     parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)

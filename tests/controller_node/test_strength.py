@@ -28,7 +28,7 @@ def state(tick: int = 1, seed: int = 4) -> StampedState:
 def effort(given: Mapping[str, object], strengths: Strengths | None = None) -> FloatArray:
     driver = controller("humanoid", **given)
     if strengths is not None:
-        driver.weaken(strengths, episode_ns=FIRST_NS)
+        driver.set_strengths(strengths, episode_ns=FIRST_NS)
     return driver.answer(state(), FIRST_NS)[0]
 
 
@@ -92,16 +92,16 @@ def chest_effort(driver: Controller, tick: int, episode_ns: int = FIRST_NS) -> l
 
 def test_strengths_count_from_exactly_their_tick_until_the_next_or_the_episodes_end() -> None:
     driver = controller("humanoid", law="pd", **UNLIMITED)
-    driver.weaken(of(CLOCK.stamp_ns(4), chest=0.0), episode_ns=FIRST_NS)
-    driver.weaken(of(CLOCK.stamp_ns(3), chest=0.5), episode_ns=FIRST_NS)
+    driver.set_strengths(of(CLOCK.stamp_ns(4), chest=0.0), episode_ns=FIRST_NS)
+    driver.set_strengths(of(CLOCK.stamp_ns(3), chest=0.5), episode_ns=FIRST_NS)
 
     whole, same, half, none = (np.array(chest_effort(driver, tick)) for tick in (1, 2, 3, 4))
     assert same.tolist() == whole.tolist()
     assert half.tolist() == (0.5 * whole).tolist()
     assert not none.any()
-    driver.weaken(of(CLOCK.stamp_ns(5), neck=0.5), episode_ns=FIRST_NS)
+    driver.set_strengths(of(CLOCK.stamp_ns(5), neck=0.5), episode_ns=FIRST_NS)
     assert chest_effort(driver, 5) == whole.tolist()  # what is not named is at 1 again
-    driver.weaken(of(CLOCK.stamp_ns(6), chest=0.0), episode_ns=FIRST_NS)
+    driver.set_strengths(of(CLOCK.stamp_ns(6), chest=0.0), episode_ns=FIRST_NS)
     assert not np.any(chest_effort(driver, 6))
     assert chest_effort(driver, 7, episode_ns=CLOCK.stamp_ns(7)) == whole.tolist()
 

@@ -293,7 +293,7 @@ def test_what_both_nodes_must_agree_on_has_one_default(name: str) -> None:
 def test_the_defaults_of_one_node_are_a_simulation(character: Character) -> None:
     values = resolve(sim_node_parameters(character), {})
 
-    made = sim_parameters.make_role(character, values)
+    made = sim_parameters.make_character_setup(character, values)
 
     assert made.commanded_joints == tuple(character.layout.actuated_joint_names)
     assert made.initial_position == character.rest_position

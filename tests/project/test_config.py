@@ -30,7 +30,12 @@ from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import placed
 from sim_node.initial_state import begins_with_reference
-from sim_node.parameters import Part, make_cast, make_role, make_settings
+from sim_node.parameters import (
+    CharacterParameters,
+    load_parameters,
+    make_character_setup,
+    make_settings,
+)
 from sim_node.physics.simulation import Simulation
 from tests.support.ros import MODULES, Inbox, Process, Processes, SimulatorClient, stamp_ns
 
@@ -107,7 +112,7 @@ def test_everything_in_a_file_is_for_one_of_its_nodes(file: str) -> None:
 
 @pytest.mark.parametrize("file", NODES)
 def test_both_sides_agree_on_what_they_must_agree_on(file: str) -> None:
-    parts = make_cast(given(file, SIMULATOR)).parts
+    parts = load_parameters(given(file, SIMULATOR)).parts
 
     for part, node in zip(parts, controllers(file), strict=True):
         character, values = controller_values(file, node)
@@ -126,7 +131,7 @@ def test_the_file_of_a_motion_holds_no_state(file: str) -> None:
     parameters = given(file, SIMULATOR)
 
     assert not [name for name in parameters if "initial_pos" in name or "initial_vel" in name]
-    assert all(begins_with_reference(part.values) for part in make_cast(parameters).parts)
+    assert all(begins_with_reference(part.values) for part in load_parameters(parameters).parts)
 
 
 # What they do
@@ -200,7 +205,7 @@ class Ending:
     state_hash: str
 
 
-def ends_of(file: str, parts: Sequence[Part]) -> dict[str, Ending]:
+def ends_of(file: str, parts: Sequence[CharacterParameters]) -> dict[str, Ending]:
     """What characters of a file come to, together in one world, without ROS."""
     drivers, states = list[Controller](), dict[str, StampedState]()
     for part in parts:
@@ -209,7 +214,7 @@ def ends_of(file: str, parts: Sequence[Part]) -> dict[str, Ending]:
         motion = make_motion(character, values)
         drivers.append(for_controller.make_controller(character, motion.reference, values))
         states[part.name] = motion.first_state()
-    roles = [make_role(part.character, part.values, part.name) for part in parts]
+    roles = [make_character_setup(part.character, part.values, part.name) for part in parts]
     hashes = {part.name: StateHash() for part in parts}
     with Simulation(roles, make_settings(parts[0].values)) as simulation:
         simulation.begin_in(states)
@@ -232,12 +237,14 @@ def ends_of(file: str, parts: Sequence[Part]) -> dict[str, Ending]:
 
 @cache
 def ends_of_two() -> dict[str, Ending]:
-    return ends_of("two_humanoids.yaml", make_cast(given("two_humanoids.yaml", SIMULATOR)).parts)
+    return ends_of(
+        "two_humanoids.yaml", load_parameters(given("two_humanoids.yaml", SIMULATOR)).parts
+    )
 
 
 def test_two_humanoids_push_each_other() -> None:
     file = "two_humanoids.yaml"
-    parts = make_cast(given(file, SIMULATOR)).parts
+    parts = load_parameters(given(file, SIMULATOR)).parts
 
     together = ends_of_two()
     alone = {part.name: ends_of(file, [part])[part.name] for part in parts}
@@ -252,7 +259,7 @@ def test_two_humanoids_push_each_other() -> None:
 
 def record(processes: Processes, folder: Path, file: str, order: Sequence[str]) -> dict[str, str]:
     """Let a file's nodes run, started in an order; the hashes of the states of its characters."""
-    cast = make_cast(given(file, SIMULATOR))
+    cast = load_parameters(given(file, SIMULATOR))
     listening = {"directory": str(folder / "run"), "characters": list(cast.names)}
     recorder = processes.node(topics.RECORDER_NODE, **listening)
     more: dict[str, object] = {"wait_for_subscribers": 2}  # controller, or simulator, and recorder

@@ -16,7 +16,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import resolve
 from sim_node.initial_state import check_state
-from sim_node.parameters import make_cast
+from sim_node.parameters import load_parameters
 from sim_node.physics.simulation import Simulation
 from tests.support.physics import (
     EVERY_CHARACTER,
@@ -99,8 +99,8 @@ def test_a_state_is_either_given_or_asked_for(name: str) -> None:
     given: dict[str, object] = {"character": "pendulum", name: [0.1]}
 
     with pytest.raises(ConfigurationError, match=f"'{name}' is given, and 'initial_state' is"):
-        make_cast(given | {"initial_state": "reference"})
-    make_cast(given | {"initial_state": "given"})
+        load_parameters(given | {"initial_state": "reference"})
+    load_parameters(given | {"initial_state": "given"})
 
 
 def test_one_character_may_ask_while_another_is_given_its_state() -> None:
@@ -111,16 +111,16 @@ def test_one_character_may_ask_while_another_is_given_its_state() -> None:
         "two.initial_position": [0.2],
     }
 
-    one, two = make_cast(given).parts
+    one, two = load_parameters(given).parts
 
     assert one.values["initial_state"] == "reference"
     assert two.values["initial_state"] == "given"
     with pytest.raises(ConfigurationError, match=r"character 'one': .*'initial_position'"):
-        make_cast(given | {"one.initial_position": [0.2]})
+        load_parameters(given | {"one.initial_position": [0.2]})
 
 
 def test_values_of_one_character_leave_those_of_others() -> None:
-    cast = make_cast({"characters": ["one", "two"], "character": "pendulum"})
+    cast = load_parameters({"characters": ["one", "two"], "character": "pendulum"})
 
     changed = cast.with_values({"two": {"initial_position": [0.75]}})
 

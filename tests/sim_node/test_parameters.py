@@ -11,10 +11,10 @@ from sim_node.parameters import (
     CHARACTERS,
     PARAMETERS,
     WORLD_PARAMETERS,
-    Cast,
+    SimulatorParameters,
     character_parameters,
-    make_cast,
-    make_role,
+    load_parameters,
+    make_character_setup,
     make_settings,
 )
 from tests.support.physics import FLOATING_TURNED_FRAMES, character, joint_simulation, simulation
@@ -35,7 +35,7 @@ SLOPE = """
 """
 
 
-def declared_names(cast: Cast) -> list[str]:
+def declared_names(cast: SimulatorParameters) -> list[str]:
     return [parameter.name for parameter in cast.declared]
 
 
@@ -43,7 +43,7 @@ def declared_names(cast: Cast) -> list[str]:
 
 
 def test_without_names_there_is_one_character_whose_parameters_have_no_prefix() -> None:
-    cast = make_cast({})
+    cast = load_parameters({})
 
     (part,) = cast.parts
     assert part.name == ""
@@ -68,7 +68,7 @@ def test_the_one_has_the_values_that_its_parameters_alone_have(given: dict[str, 
     alone = resolve(PARAMETERS + character_parameters(whole), given)
 
     # Act
-    cast = make_cast(given)
+    cast = load_parameters(given)
 
     # Assert
     assert cast.parts[0].values == alone
@@ -76,12 +76,12 @@ def test_the_one_has_the_values_that_its_parameters_alone_have(given: dict[str, 
 
 
 def test_an_empty_list_of_characters_is_none_at_all() -> None:
-    assert make_cast({"characters": [], "rate": 100}) == make_cast({"rate": 100})
+    assert load_parameters({"characters": [], "rate": 100}) == load_parameters({"rate": 100})
 
 
 def test_the_defaults_of_a_character_are_declared_as_its_own() -> None:
     declared = {
-        parameter.name: parameter for parameter in make_cast({"character": "lift"}).declared
+        parameter.name: parameter for parameter in load_parameters({"character": "lift"}).declared
     }
 
     assert declared["commanded_joints"].default == ["height"]
@@ -91,7 +91,7 @@ def test_the_defaults_of_a_character_are_declared_as_its_own() -> None:
 @pytest.mark.parametrize("name", ["one.character", "one.initial_position", ".character", "a.b.c"])
 def test_a_prefix_that_is_no_characters_is_an_unknown_parameter(name: str) -> None:
     with pytest.raises(ConfigurationError, match=f"unknown parameter '{name}'"):
-        make_cast({name: "lift"})
+        load_parameters({name: "lift"})
 
 
 def test_what_is_made_of_the_parameters_is_the_simulation_of_the_one() -> None:
@@ -117,7 +117,7 @@ def test_what_is_made_of_the_parameters_is_the_simulation_of_the_one() -> None:
 
 def test_each_name_is_a_character_with_parameters_of_its_own() -> None:
     # Act
-    cast = make_cast({"characters": ["one", "arm"], "arm.character": "franka_panda"})
+    cast = load_parameters({"characters": ["one", "arm"], "arm.character": "franka_panda"})
 
     # Assert
     assert [part.name for part in cast.parts] == ["one", "arm"]
@@ -132,7 +132,7 @@ def test_each_name_is_a_character_with_parameters_of_its_own() -> None:
 
 
 def test_every_declared_default_passes_its_own_check() -> None:
-    cast = make_cast({"characters": ["one", "arm"], "arm.character": "franka_panda"})
+    cast = load_parameters({"characters": ["one", "arm"], "arm.character": "franka_panda"})
 
     for parameter in cast.declared:
         assert parameter.checked(parameter.default) == parameter.default, parameter.name
@@ -140,7 +140,7 @@ def test_every_declared_default_passes_its_own_check() -> None:
 
 
 def test_the_values_are_those_of_the_declared_parameters() -> None:
-    cast = make_cast({"characters": ["one", "two"], "rate": 100, "use_sim_time": True})
+    cast = load_parameters({"characters": ["one", "two"], "rate": 100, "use_sim_time": True})
 
     assert list(cast.values) == declared_names(cast)
     assert cast.values.integer("rate") == 100
@@ -148,7 +148,7 @@ def test_the_values_are_those_of_the_declared_parameters() -> None:
 
 def test_what_is_given_without_a_name_is_for_all_that_have_nothing_of_their_own() -> None:
     # Act
-    cast = make_cast(
+    cast = load_parameters(
         {
             "two.character": "pendulum",
             "character": "lift",
@@ -170,14 +170,14 @@ def test_a_characters_own_value_counts_wherever_it_is_given(own_first: bool) -> 
     items: list[tuple[str, object]] = [("one.character", "lift"), ("character", "pendulum")]
     given = dict(items if own_first else reversed(items))
 
-    cast = make_cast({"characters": ["one"], **given})
+    cast = load_parameters({"characters": ["one"], **given})
 
     assert cast.parts[0].character.name == "lift"
 
 
 def test_each_part_has_all_values_as_if_it_were_alone() -> None:
     # Act
-    cast = make_cast({"characters": ["one", "arm"], "arm.character": "lift", "rate": 100})
+    cast = load_parameters({"characters": ["one", "arm"], "arm.character": "lift", "rate": 100})
 
     # Assert
     alone = resolve(PARAMETERS + character_parameters(character("lift")), {"rate": 100} | LIFT)
@@ -189,7 +189,9 @@ LIFT = {"character": "lift"}
 
 def test_a_placement_moves_the_rest_pose_that_a_character_begins_in() -> None:
     # Act
-    cast = make_cast({"characters": ["one", "two"], "two.placement": [1.0, 2.0, 0.5, np.pi / 2]})
+    cast = load_parameters(
+        {"characters": ["one", "two"], "two.placement": [1.0, 2.0, 0.5, np.pi / 2]}
+    )
 
     # Assert: turned about z at the world's origin, then moved
     one, two = (part.values.numbers("initial_position") for part in cast.parts)
@@ -205,11 +207,11 @@ def test_a_placement_moves_the_rest_pose_that_a_character_begins_in() -> None:
 def test_a_placement_that_is_not_four_numbers_is_refused(placement: object) -> None:
     for given in ({}, {"characters": ["one"]}):
         with pytest.raises(ConfigurationError, match="placement"):
-            make_cast({**given, "placement": placement})
+            load_parameters({**given, "placement": placement})
 
 
 def test_one_file_may_be_several_characters() -> None:
-    cast = make_cast({"characters": ["a", "b"], "character": FLOATING_TURNED_FRAMES})
+    cast = load_parameters({"characters": ["a", "b"], "character": FLOATING_TURNED_FRAMES})
 
     assert cast.parts[0].character == cast.parts[1].character
 
@@ -232,7 +234,7 @@ def test_one_file_may_be_several_characters() -> None:
 )
 def test_a_name_that_cannot_be_a_namespace_is_refused(names: list[str]) -> None:
     with pytest.raises(ConfigurationError, match="parameter 'characters' has") as caught:
-        make_cast({"characters": names})
+        load_parameters({"characters": names})
 
     assert "\n" not in str(caught.value)
 
@@ -240,19 +242,19 @@ def test_a_name_that_cannot_be_a_namespace_is_refused(names: list[str]) -> None:
 @pytest.mark.parametrize("names", [["one", "one"], ["one", "two", "one"]])
 def test_a_name_that_is_there_twice_is_refused(names: list[str]) -> None:
     with pytest.raises(ConfigurationError, match="'one'; it must list different names"):
-        make_cast({"characters": names})
+        load_parameters({"characters": names})
 
 
 @pytest.mark.parametrize("names", ["one", [1], None, [["one"]], {"one": 1}])
 def test_what_is_no_list_of_names_is_refused(names: object) -> None:
     with pytest.raises(ConfigurationError, match="'characters'"):
-        make_cast({"characters": names})
+        load_parameters({"characters": names})
 
 
 def test_names_may_be_short_long_and_of_any_case() -> None:
     names = ["a", "B2", "left_One", "x" * 40]
 
-    cast = make_cast({"characters": names, "character": "lift"})
+    cast = load_parameters({"characters": names, "character": "lift"})
 
     assert [part.name for part in cast.parts] == names
 
@@ -260,7 +262,7 @@ def test_names_may_be_short_long_and_of_any_case() -> None:
 @pytest.mark.parametrize("name", ["three.character", "three.initial_position", "On.character"])
 def test_a_parameter_below_an_unknown_name_is_refused(name: str) -> None:
     with pytest.raises(ConfigurationError, match=f"unknown parameter '{name}'"):
-        make_cast({"characters": ["one", "two"], name: "lift"})
+        load_parameters({"characters": ["one", "two"], name: "lift"})
 
 
 @pytest.mark.parametrize("parameter", [p.name for p in [CHARACTERS, *WORLD_PARAMETERS]])
@@ -268,13 +270,13 @@ def test_a_parameter_of_the_world_below_a_characters_name_is_refused(parameter: 
     default = {p.name: p.default for p in [CHARACTERS, *WORLD_PARAMETERS]}[parameter]
 
     with pytest.raises(ConfigurationError, match=f"unknown parameter .*{parameter}'"):
-        make_cast({"characters": ["one", "two"], f"one.{parameter}": default})
+        load_parameters({"characters": ["one", "two"], f"one.{parameter}": default})
 
 
 @pytest.mark.parametrize("name", ["one.", "one.cuont", "one.one.character", "one"])
 def test_an_unknown_parameter_of_a_character_is_refused(name: str) -> None:
     with pytest.raises(ConfigurationError, match="unknown parameter"):
-        make_cast({"characters": ["one", "two"], name: "lift"})
+        load_parameters({"characters": ["one", "two"], name: "lift"})
 
 
 @pytest.mark.parametrize(
@@ -287,7 +289,7 @@ def test_an_unknown_parameter_of_a_character_is_refused(name: str) -> None:
 )
 def test_a_wrong_value_names_the_character(parameter: str, value: object, why: str) -> None:
     with pytest.raises(ConfigurationError, match=rf"character 'two': .*{why}"):
-        make_cast({"characters": ["one", "two"], f"two.{parameter}": value})
+        load_parameters({"characters": ["one", "two"], f"two.{parameter}": value})
 
 
 @pytest.mark.parametrize("given", [{}, {"characters": ["one"]}])
@@ -295,21 +297,21 @@ def test_a_character_that_does_not_exist_is_refused_with_those_that_do(
     given: dict[str, object],
 ) -> None:
     with pytest.raises(ActuatedCharactersError, match="franka_panda, humanoid"):
-        make_cast({**given, "character": "dragon"})
+        load_parameters({**given, "character": "dragon"})
 
 
 def test_roles_carry_the_names_their_topics_and_messages_have() -> None:
     # Arrange
-    cast = make_cast({"characters": ["one", "arm"], "arm.character": "lift"})
+    cast = load_parameters({"characters": ["one", "arm"], "arm.character": "lift"})
 
     # Act
-    roles = [make_role(part.character, part.values, part.name) for part in cast.parts]
+    roles = [make_character_setup(part.character, part.values, part.name) for part in cast.parts]
 
     # Assert
     assert [role.prefix for role in roles] == ["one/", "arm/"]
     assert roles[1].commanded_joints == ("height",)
     assert roles[1].initial_velocity == (0.0,)
-    assert make_role(cast.parts[0].character, cast.parts[0].values).prefix == ""
+    assert make_character_setup(cast.parts[0].character, cast.parts[0].values).prefix == ""
 
 
 # --- terrain -------------------------------------------------------------------------------------
@@ -410,7 +412,9 @@ def test_settings_know_which_ground_there_is(tmp_path: Path) -> None:
     (tmp_path / "ramp.urdf").write_text(SLOPE.format(height=0.0))
     grounds = {}
     for terrain in ("plane", "none", str(tmp_path / "ramp.urdf")):
-        world = make_settings(make_cast({"character": "lift", "terrain": terrain}).values).world
+        world = make_settings(
+            load_parameters({"character": "lift", "terrain": terrain}).values
+        ).world
         grounds[Path(terrain).stem] = (world.ground, world.terrain is not None)
 
     assert grounds == {"plane": (True, False), "none": (False, False), "ramp": (False, True)}
@@ -427,7 +431,7 @@ def test_settings_know_which_ground_there_is(tmp_path: Path) -> None:
     ],
 )
 def test_a_terrain_that_is_not_there_is_refused(terrain: str, why: str) -> None:
-    values = make_cast({"character": "lift", "terrain": terrain}).values
+    values = load_parameters({"character": "lift", "terrain": terrain}).values
 
     with pytest.raises(CharacterError, match=why) as caught:
         make_settings(values)
@@ -448,7 +452,7 @@ def test_a_terrain_that_is_not_there_is_refused(terrain: str, why: str) -> None:
 )
 def test_a_terrain_file_that_is_no_sound_urdf_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "broken.urdf").write_text(text)
-    values = make_cast({"character": "lift", "terrain": str(tmp_path / "broken.urdf")}).values
+    values = load_parameters({"character": "lift", "terrain": str(tmp_path / "broken.urdf")}).values
 
     with pytest.raises(CharacterError, match=r"broken\.urdf"):
         make_settings(values)

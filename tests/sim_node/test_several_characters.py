@@ -8,7 +8,7 @@ import pytest
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, SimulationError
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import character, joint_simulation
 
 pytestmark = pytest.mark.slow
@@ -99,7 +99,7 @@ def test_far_apart_the_order_of_the_characters_changes_no_bit() -> None:
 def test_a_push_moves_the_one_that_it_is_for() -> None:
     # Arrange
     nothing = np.zeros(HUMANOID.size)
-    push = Push(LINKS.index("chest"), np.array([500.0, 0, 0, 0, 0, 0]), np.zeros(3), 1, 1)
+    push = ExternalWrench(LINKS.index("chest"), np.array([500.0, 0, 0, 0, 0, 0]), np.zeros(3), 1, 1)
     with joint_simulation(FAR) as pushed, joint_simulation(FAR) as left_alone:
         # Act
         for tick in range(60):

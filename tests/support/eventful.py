@@ -15,9 +15,9 @@ from msgs_config.messages import configuration, topics
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches, select
 from msgs_config.parameters import Values
-from sim_node.parameters import make_role, make_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.bags import Said, said_configuration, said_references, said_states
 
 CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE)
@@ -77,7 +77,7 @@ def eventful_run(
     run = Eventful(plan)
     controller = make_controller(plan.character, plan.reference, plan.controller)
     names = [link.name for link in plan.character.links]
-    role = make_role(plan.character, plan.simulator)
+    role = make_character_setup(plan.character, plan.simulator)
     now = START_NS
     with Simulation([role], make_settings(plan.simulator)) as simulation:
         simulation.watches_contacts = True
@@ -94,7 +94,9 @@ def eventful_run(
                 effort, desired = controller.answer(actor.state, episode_ns)
                 run.references.append(desired)
                 acting = [
-                    Push(names.index(link), np.array((*force, 0.0, 0.0, 0.0)), np.zeros(3), 0, 1)
+                    ExternalWrench(
+                        names.index(link), np.array((*force, 0.0, 0.0, 0.0)), np.zeros(3), 0, 1
+                    )
                     for first, count, link, force in pushed
                     if first <= tick < first + count
                 ]

@@ -8,20 +8,20 @@ from actuated_characters.bags.recording import ModeChange, Recording
 from actuated_characters.metrics.run_metrics import Measurement, Tick
 from actuated_characters.runs.plan import Plan, make_plan
 from actuated_characters.runs.planned_throws import plan_throws
-from actuated_characters.studies.framework.study import Case, Outcome
+from actuated_characters.studies.framework.study import RunResult, RunSpec
 from controller_node.behaviours.base import ModeReport
 from controller_node.parameters import make_controller
 from msgs_config.errors import SimulationError
 from msgs_config.messages import configuration
 from msgs_config.messages.projectiles import BallStates, ball_names
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays, select
-from sim_node.parameters import make_role, make_settings, push_ticks
-from sim_node.physics.simulated_character import Actor
+from sim_node.parameters import make_character_setup, make_settings, push_ticks
+from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import ThrowSchedule
-from sim_node.physics.wrenches import PushSchedule
+from sim_node.physics.throws import ThrowQueue
+from sim_node.physics.wrenches import WrenchQueue
 
 
 class InProcessLaboratory:
@@ -29,9 +29,9 @@ class InProcessLaboratory:
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
-        self.cases: list[Case] = []  # that were run
+        self.cases: list[RunSpec] = []  # that were run
 
-    def run(self, case: Case) -> Outcome:
+    def run(self, case: RunSpec) -> RunResult:
         """Run a case to its end, or until it diverges."""
         self.cases.append(case)
         plan = make_plan(
@@ -43,7 +43,7 @@ class InProcessLaboratory:
             run.go_on()
         except SimulationError as error:
             diverged = str(error)
-        return Outcome(run.recording(), run.summary(), diverged)
+        return RunResult(run.recording(), run.summary(), diverged)
 
     def write(self, name: str, text: str) -> str:
         """Write a file; returns its path."""
@@ -55,21 +55,21 @@ class InProcessLaboratory:
 class _Run:
     """One run, and what a bag would hold of it."""
 
-    def __init__(self, plan: Plan, case: Case) -> None:
+    def __init__(self, plan: Plan, case: RunSpec) -> None:
         self._plan, self._case = plan, case
         self._states: list[StampedState] = []
         self._references: list[StampedReference] = []
         self._contacts: list[WrenchArrays] = []
         self._pushes: list[WrenchArrays] = []
         self._modes: list[ModeReport] = []
-        self._throws: list[tuple[Throw, ...]] = []
+        self._throws: list[tuple[ProjectileThrow, ...]] = []
         self._balls: list[BallStates | None] = [None]
 
     def go_on(self) -> None:
         """Run to the end. Raises SimulationError if it diverges."""
         plan = self._plan
         controller = make_controller(plan.character, plan.reference, plan.controller)
-        role = make_role(plan.character, plan.simulator)
+        role = make_character_setup(plan.character, plan.simulator)
         with Simulation([role], make_settings(plan.simulator)) as simulation:
             simulation.watches_contacts = self._case.contacts or controller.needs_contacts
             balls = self._throw_schedule(simulation)
@@ -87,8 +87,8 @@ class _Run:
                 self._add(actor)
                 self._add_balls(simulation)
 
-    def _throw_schedule(self, simulation: Simulation) -> ThrowSchedule:
-        schedule = ThrowSchedule()
+    def _throw_schedule(self, simulation: Simulation) -> ThrowQueue:
+        schedule = ThrowQueue()
         for each in plan_throws(self._plan, self._case.throws)[0]:
             schedule.add(each.throw, simulation.clock.first_tick_from(each.stamp_ns))
         return schedule
@@ -99,9 +99,9 @@ class _Run:
         there = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
         self._balls.append(there if names else None)
 
-    def _schedule(self, simulation: Simulation) -> PushSchedule:
+    def _schedule(self, simulation: Simulation) -> WrenchQueue:
         """The pushes as the simulator's node takes them: from the first tick not before a stamp."""
-        schedule = PushSchedule(self._plan.character)
+        schedule = WrenchQueue(self._plan.character)
         for push in self._case.pushes:
             arrays = push.arrays()
             schedule.add(
@@ -113,7 +113,7 @@ class _Run:
             )
         return schedule
 
-    def _add(self, actor: Actor) -> None:
+    def _add(self, actor: SimulatedCharacter) -> None:
         state, names = actor.state, [link.name for link in actor.character.links]
         self._states.append(state)
         self._pushes.append(

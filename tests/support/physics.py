@@ -25,10 +25,10 @@ from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.physics.body import Body
-from sim_node.physics.simulated_character import Role
+from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.world import World, WorldSettings
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 
 DATA = Path(__file__).parents[1] / "data"
 TURNED_FRAMES = [str(path) for path in sorted(DATA.glob("turned_frames*.yaml"))]
@@ -110,7 +110,7 @@ class LoneWorld(World):
 class LoneSimulation(Simulation):
     """A simulation of one actor."""
 
-    def __init__(self, role: Role, settings: SimulationSettings) -> None:
+    def __init__(self, role: CharacterSetup, settings: SimulationSettings) -> None:
         super().__init__([role], settings)
         (self.actor,) = self.actors
         self.layout = self.actor.layout
@@ -120,7 +120,7 @@ class LoneSimulation(Simulation):
         """Its present state."""
         return self.actor.state
 
-    def advance(self, effort: FloatArray, *pushes: Push) -> StampedState:
+    def advance(self, effort: FloatArray, *pushes: ExternalWrench) -> StampedState:
         """Advance one tick; the next state."""
         self.step([effort], [pushes])
         return self.actor.state
@@ -251,14 +251,14 @@ def simulation(name: str, **given: object) -> LoneSimulation:
     parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
     values = resolve(parameters, given)
     return LoneSimulation(
-        for_simulator.make_role(whole, values), for_simulator.make_settings(values)
+        for_simulator.make_character_setup(whole, values), for_simulator.make_settings(values)
     )
 
 
 def joint_simulation(given: Mapping[str, object]) -> Simulation:
     """A simulation of several characters, with the parameters given."""
-    cast = for_simulator.make_cast(given)
-    roles = [for_simulator.make_role(p.character, p.values, p.name) for p in cast.parts]
+    cast = for_simulator.load_parameters(given)
+    roles = [for_simulator.make_character_setup(p.character, p.values, p.name) for p in cast.parts]
     return Simulation(roles, for_simulator.make_settings(cast.values))
 
 

@@ -35,7 +35,7 @@ _BALL = """<robot name="ball"><link name="ball">
 
 
 @dataclass(frozen=True)
-class Throw:
+class ProjectileThrow:
     """A ball that flies at a link of the humanoid from some side."""
 
     speed: float  # m/s
@@ -86,7 +86,7 @@ def driver(given: Mapping[str, object], whole: Character = HUMANOID) -> Controll
 def run(
     given: Mapping[str, object],
     ticks: int,
-    throws: tuple[Throw, ...] = (),
+    throws: tuple[ProjectileThrow, ...] = (),
     mass: float = 2.0,
     is_over: Callable[[Sequence[ModeReport], int], bool] = lambda modes, stamp_ns: False,
 ) -> Run:
@@ -144,7 +144,7 @@ def run(
     )
 
 
-def _throw(simulation: Simulation, throw: Throw) -> None:
+def _throw(simulation: Simulation, throw: ProjectileThrow) -> None:
     """Put the ball beside the link, on its way to it; it flies with the link's own root."""
     actor, ball = simulation.actors
     origins, turns = actor.link_frames()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from std_msgs.msg import String
 
-from actuated_characters.bags.directory_lock import Claim, writer_of
+from actuated_characters.bags.directory_lock import DirectoryLock, writer_of
 from actuated_characters.bags.metadata import METADATA
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recovery.rewriting import Contents, Progress, rewrite, storage_files
@@ -95,9 +95,9 @@ def _recover_bag(bag: Path, report: Progress) -> Recovered:
     return Recovered(bag, contents, damaged)
 
 
-def _claim(bag: Path) -> Claim:
+def _claim(bag: Path) -> DirectoryLock:
     try:
-        return Claim(bag)
+        return DirectoryLock(bag)
     except BlockingIOError as error:
         raise RecordingError(f"a recorder is still at work on {bag}; end it first") from error
 

@@ -51,7 +51,7 @@ class Box(NamedTuple):
 
 
 @dataclass(frozen=True)
-class View:
+class CameraPose:
     """A pinhole camera that looks at a point, its picture upright in the z-up world.
 
     At yaw and pitch 0 it looks along +y, so that +x leads to the right. A yaw turns it about z, to
@@ -124,13 +124,13 @@ class View:
             min(max(ceil(0.5 * width + scale * right + 0.5), 0), width),
         )
 
-    def moved(self, x: float, y: float) -> "View":
+    def moved(self, x: float, y: float) -> "CameraPose":
         """The same view of a place that is so many m further on in the world."""
         here_x, here_y, here_z = self.target
         return replace(self, target=(here_x + x, here_y + y, here_z))
 
 
-def framing(points: FloatArray, radii: FloatArray, aspect: float, like: View) -> View:
+def framing(points: FloatArray, radii: FloatArray, aspect: float, like: CameraPose) -> CameraPose:
     """The nearest view in which spheres lie in the middle of the picture, whole, with a margin.
 
     A sphere at (x, y, z) of the camera's axes, seen from the distance d, is clear of the picture's
@@ -158,14 +158,14 @@ def framing(points: FloatArray, radii: FloatArray, aspect: float, like: View) ->
     return replace(like, target=(x, y, z), distance=float(np.max(needed)))
 
 
-def extents(points: FloatArray, radii: FloatArray, like: View) -> FloatArray:
+def extents(points: FloatArray, radii: FloatArray, like: CameraPose) -> FloatArray:
     """How much (3,) of a view's axes spheres take up, m: across, upwards, towards the camera."""
     lowest, highest = _box(points @ like.axes().T, radii)
     extent: FloatArray = highest - lowest
     return extent
 
 
-def natural_aspect(points: FloatArray, radii: FloatArray, like: View) -> float:
+def natural_aspect(points: FloatArray, radii: FloatArray, like: CameraPose) -> float:
     """Width over height of what spheres fill of a picture, with its margin, seen from far away."""
     extent = extents(points, radii, like)
     width, height = (extent[:2] + 2.0 * _MARGIN * extent.max()).tolist()

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuated_characters.render.engine import ground, layers
-from actuated_characters.render.engine.camera_pose import Box, View, framing
+from actuated_characters.render.engine.camera_pose import Box, CameraPose, framing
 from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.layers import Drawing
-from actuated_characters.render.engine.render_scene import LIGHT_VIEW, Size, Stage
+from actuated_characters.render.engine.render_scene import LIGHT_VIEW, RenderScene, Size
 from msgs_config.arrays import FloatArray
 
 Picture: TypeAlias = NDArray[np.uint8]
@@ -19,10 +19,10 @@ _SHADOW = 0.72  # of the ground's brightness
 _SHADOW_SIZE = (384, 384)  # of the picture from the light
 
 
-class Canvas:
+class Compositor:
     """What a view sees, from the ground upwards."""
 
-    def __init__(self, view: View, size: Size, *, samples: int, has_ground: bool) -> None:
+    def __init__(self, view: CameraPose, size: Size, *, samples: int, has_ground: bool) -> None:
         """Begin with the ground and the sky.
 
         Args:
@@ -46,7 +46,7 @@ class Canvas:
         finished: Picture = np.rint(self._colors).astype(np.uint8)
         return finished
 
-    def darken(self, stage: Stage, points: FloatArray, radii: FloatArray) -> None:
+    def darken(self, stage: RenderScene, points: FloatArray, radii: FloatArray) -> None:
         """Darken the ground where the links keep the light off: what is seen from the light.
 
         The engine's own shadows darken the ground as a whole. Spheres (m, 3) and (m,) in m are
@@ -63,7 +63,7 @@ class Canvas:
         share = layers.shrunk(shadow, self._samples)[:, :, np.newaxis]
         self._colors[box.rows, box.columns] *= 1.0 - (1.0 - _SHADOW) * share
 
-    def draw_solid(self, stage: Stage, box: Box) -> None:
+    def draw_solid(self, stage: RenderScene, box: Box) -> None:
         """Draw what a stage has in a part of the picture, wherever the ground does not hide it."""
         if not box:
             return
@@ -73,7 +73,7 @@ class Canvas:
         layers.lay(self._colors, box, layer, self._samples)
         self._solid = drawing, fine
 
-    def draw_over(self, stage: Stage, box: Box, opacity: float, hidden: float = 0.0) -> None:
+    def draw_over(self, stage: RenderScene, box: Box, opacity: float, hidden: float = 0.0) -> None:
         """Blend in what a stage has in a part of the picture.
 
         With one opacity where it is before all that is solid, and with another where it is not.

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from actuated_characters.render.engine.camera_pose import View
+from actuated_characters.render.engine.camera_pose import CameraPose
 from msgs_config.arrays import FloatArray
 
 Samples: TypeAlias = NDArray[np.float32]
@@ -24,7 +24,7 @@ _LEAST_FOOTPRINT = np.float32(1e-4)  # of a pixel, in tiles: what single precisi
 _TILES_A_VIEW = 6  # or up to 2.5 times as many, along the view's distance
 
 
-def depths(view: View, height: int, rows: FloatArray) -> FloatArray:
+def depths(view: CameraPose, height: int, rows: FloatArray) -> FloatArray:
     """How far away along the camera's axis the ground is (m,), m; infinite above the horizon.
 
     Args:
@@ -40,7 +40,7 @@ def depths(view: View, height: int, rows: FloatArray) -> FloatArray:
 
 
 def places(
-    view: View, size: tuple[int, int], rows: FloatArray, columns: FloatArray
+    view: CameraPose, size: tuple[int, int], rows: FloatArray, columns: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """x and y (m, k) in m of the ground at rows (m,) and columns (k,), pixels from the corner.
 
@@ -61,7 +61,7 @@ def places(
     return x, y
 
 
-def colors(view: View, size: tuple[int, int]) -> Samples:
+def colors(view: CameraPose, size: tuple[int, int]) -> Samples:
     """What is seen of ground and sky (h, w, 3), 0 to 255, each pixel the mean of what it covers."""
     width, height = size
     rows, columns = np.arange(0.5, height), np.arange(0.5, width)
@@ -86,7 +86,7 @@ def haze(distance: FloatArray | Samples) -> Samples:
     return share
 
 
-def tile_length(view: View) -> float:
+def tile_length(view: CameraPose) -> float:
     """Edge of a tile, m: 1, 2 or 5 times a power of ten."""
     length = view.distance / _TILES_A_VIEW
     power = 10.0 ** np.floor(np.log10(length))
@@ -94,7 +94,7 @@ def tile_length(view: View) -> float:
 
 
 def _share_of_light(
-    view: View, size: tuple[int, int], rows: FloatArray, columns: FloatArray
+    view: CameraPose, size: tuple[int, int], rows: FloatArray, columns: FloatArray
 ) -> Samples:
     """The share (m, k) of light tiles in what pixels with these centres cover.
 
@@ -131,12 +131,12 @@ def _triangle_wave(place: Samples) -> Samples:
     return 1.0 - distance
 
 
-def _scale(view: View, height: int) -> float:
+def _scale(view: CameraPose, height: int) -> float:
     """How far a pixel goes sideways for each metre along the camera's axis."""
     return 2.0 * tan(0.5 * view.field_of_view) / height
 
 
-def _slopes(view: View, height: int, rows: FloatArray) -> FloatArray:
+def _slopes(view: CameraPose, height: int, rows: FloatArray) -> FloatArray:
     """How far the ray of a row rises for each metre along the camera's axis."""
     _, up, back = view.axes()
     upwards: FloatArray = _scale(view, height) * (0.5 * height - rows)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from actuated_characters.render.engine import ground
-from actuated_characters.render.engine.camera_pose import Box, View
+from actuated_characters.render.engine.camera_pose import Box, CameraPose
 from actuated_characters.render.engine.ground import Samples
 from msgs_config.arrays import BoolArray
 
@@ -29,7 +29,7 @@ class Layer(NamedTuple):
     clear: Samples  # (h, w): the share of what is below that shines through
 
 
-def solid(drawing: Drawing, ground_depth: Samples, view: View) -> Layer:
+def solid(drawing: Drawing, ground_depth: Samples, view: CameraPose) -> Layer:
     """What was drawn, wherever it is nearer than the ground in its row (h,), m."""
     seen = drawing.depth < ground_depth[:, np.newaxis]
     paint = np.where(seen[:, :, np.newaxis], drawing.color, np.float32(0.0))
@@ -92,7 +92,7 @@ def shrunk(fine: Samples, samples: int) -> Samples:
     return mean
 
 
-def shadow_box(light: View, view: View, size: tuple[int, int]) -> Box:
+def shadow_box(light: CameraPose, view: CameraPose, size: tuple[int, int]) -> Box:
     """The part of a view's picture where what is seen from the light can darken the ground."""
     edges = np.array((0.0, 1.0))
     x, y = ground.places(light, (1, 1), edges, edges)
@@ -100,7 +100,9 @@ def shadow_box(light: View, view: View, size: tuple[int, int]) -> Box:
     return view.box(corners, np.zeros(4), size)
 
 
-def shadow(dark: BoolArray, light: View, view: View, size: tuple[int, int], box: Box) -> Samples:
+def shadow(
+    dark: BoolArray, light: CameraPose, view: CameraPose, size: tuple[int, int], box: Box
+) -> Samples:
     """Where (h, w) in a part of a view's picture the ground has no light: 1, elsewhere 0.
 
     Args:

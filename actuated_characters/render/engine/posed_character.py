@@ -9,7 +9,7 @@ from msgs_config.geometry import rotations
 from sim_node.physics.world import World, WorldSettings
 
 
-class Puppet:
+class PosedCharacter:
     """The shapes of a character of n degrees of freedom, and where they are at a position.
 
     The links are put where a `Body`, in a world of its own, has them.

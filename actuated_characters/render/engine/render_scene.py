@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from actuated_characters.render.engine.camera_pose import Box, View
+from actuated_characters.render.engine.camera_pose import Box, CameraPose
 from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.layers import Drawing
 from actuated_characters.render.engine.surfaces import (
@@ -21,14 +21,14 @@ from actuated_characters.render.engine.surfaces import (
 )
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
-from msgs_config.character.model import Loading, Quadruple, Shape, ShapeType
+from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 
 Size: TypeAlias = tuple[int, int]
 """Width and height of a picture in pixels."""
 
-LIGHT_VIEW = View(yaw=0.6, pitch=1.1, field_of_view=0.06)  # from the light
+LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # from the light
 
 _NEAR, _FAR = 0.02, 50.0  # of the view's distance: what is nearer or farther is not drawn
 _LIGHT = {"lightAmbientCoeff": 0.6, "lightDiffuseCoeff": 0.45, "lightSpecularCoeff": 0.0}
@@ -47,16 +47,16 @@ class Arrow:
     tail: FloatArray  # (3,), m
     tip: FloatArray  # (3,), m
 
-    def outline(self, view: View) -> tuple[FloatArray, FloatArray]:
+    def outline(self, view: CameraPose) -> tuple[FloatArray, FloatArray]:
         """Spheres around it: centres (2, 3), radii (2,), in m."""
         return np.array((self.tail, self.tip)), np.full(2, HEAD_WIDTH * self.radius(view))
 
-    def radius(self, view: View) -> float:
+    def radius(self, view: CameraPose) -> float:
         """Of its shaft, m."""
         return _ARROW_RADIUS * view.distance
 
 
-class Stage:
+class RenderScene:
     """What is seen: the links of characters, a terrain, balls, arrows."""
 
     def __init__(self) -> None:
@@ -84,7 +84,7 @@ class Stage:
                 self._parts += [(row, self._add_shape(shape)) for shape in own]
                 self._colors += [_opaque(shape.color_rgba) for shape in own]
 
-    def add_terrain(self, terrain: Loading) -> None:
+    def add_terrain(self, terrain: UrdfOptions) -> None:
         """Add what lies there for ever. Raises CharacterError if the engine refuses its URDF."""
         body = load_urdf(self._client, terrain)
         for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):
@@ -126,7 +126,7 @@ class Stage:
     def _add_ball(self, radius: float) -> int:
         return self._add_shape(Shape(ShapeType.SPHERE, (radius,), color_rgba=_BALL_COLOR))
 
-    def show_arrows(self, arrows: Sequence[Arrow], view: View) -> None:
+    def show_arrows(self, arrows: Sequence[Arrow], view: CameraPose) -> None:
         """Have these arrows, none of length zero, and no others."""
         for body in self._arrows:
             pybullet.removeBody(body, physicsClientId=self._client)
@@ -139,7 +139,7 @@ class Stage:
             self._put(body, arrow.tail, _turn_from_z(along / length))
             self._arrows.append(body)
 
-    def draw(self, view: View, size: Size, box: Box) -> Drawing:
+    def draw(self, view: CameraPose, size: Size, box: Box) -> Drawing:
         """What is seen in a part of a view's picture of a size; the part is not empty."""
         near, far = _NEAR * view.distance, _FAR * view.distance
         width, height = size

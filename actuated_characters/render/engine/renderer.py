@@ -8,19 +8,19 @@ import numpy as np
 
 from actuated_characters.render.engine.camera_pose import (
     Box,
-    View,
+    CameraPose,
     extents,
     framing,
     natural_aspect,
 )
-from actuated_characters.render.engine.compositor import Canvas, Picture
-from actuated_characters.render.engine.posed_character import Puppet
-from actuated_characters.render.engine.render_scene import Arrow, Size, Stage
+from actuated_characters.render.engine.compositor import Compositor, Picture
+from actuated_characters.render.engine.posed_character import PosedCharacter
+from actuated_characters.render.engine.render_scene import Arrow, RenderScene, Size
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.model import Character, Loading, Shape, Vector
+from msgs_config.character.model import Character, Shape, UrdfOptions, Vector
 from msgs_config.geometry import rotations
 
-__all__ = ["DEFAULT_SIZE", "Camera", "LinkForce", "Picture"]
+__all__ = ["DEFAULT_SIZE", "LinkForce", "Picture", "Renderer"]
 
 DEFAULT_SIZE = (640, 480)
 
@@ -47,7 +47,7 @@ class LinkForce:
     arrow: FloatArray  # (3,) from tail to tip, m in the world
 
 
-class Camera:
+class Renderer:
     """Takes pictures of characters; of their references, too, as transparent ghosts.
 
     Of several characters a position (n,) is theirs one after the other. The ghosts are drawn alone
@@ -59,7 +59,7 @@ class Camera:
         character: Character | Sequence[Character],
         *,
         ground: bool = True,
-        terrain: Loading | None = None,
+        terrain: UrdfOptions | None = None,
         samples: int = 2,
     ) -> None:
         """Start the engines.
@@ -76,13 +76,13 @@ class Camera:
         """
         characters = (character,) if isinstance(character, Character) else character
         self._samples = samples
-        self._ghost: Stage | None = None
-        self._arrows: Stage | None = None
-        self._stages: list[Stage] = []
-        self._puppets: list[Puppet] = []
+        self._ghost: RenderScene | None = None
+        self._arrows: RenderScene | None = None
+        self._stages: list[RenderScene] = []
+        self._puppets: list[PosedCharacter] = []
         try:
             for each in characters:
-                self._puppets.append(Puppet(each))
+                self._puppets.append(PosedCharacter(each))
             self._shapes = [shapes for puppet in self._puppets for shapes in puppet.shapes]
             self._ends = np.cumsum([puppet.layout.size for puppet in self._puppets])
             self._has_ground = ground and self._stands(characters)
@@ -93,7 +93,7 @@ class Camera:
             self.close()
             raise
 
-    def __enter__(self) -> "Camera":
+    def __enter__(self) -> "Renderer":
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -115,7 +115,7 @@ class Camera:
         forces: Sequence[LinkForce] = (),
         touching: BoolArray | None = None,
         balls: FloatArray = _NO_BALLS,
-        view: View | None = None,
+        view: CameraPose | None = None,
         size: Size = DEFAULT_SIZE,
     ) -> Picture:
         """A picture (h, w, 3) at a position (n,), message form.
@@ -138,7 +138,7 @@ class Camera:
         self._stage.place(*frames)
         self._stage.mark(np.zeros(len(frames[0]), np.bool_) if touching is None else touching)
         self._stage.show_balls(balls)
-        canvas = Canvas(view, size, samples=samples, has_ground=self._has_ground)
+        canvas = Compositor(view, size, samples=samples, has_ground=self._has_ground)
         if self._has_ground:
             is_near = np.linalg.norm(balls[:, :3] - view.target, axis=1) < view.distance
             canvas.darken(self._stage, *_with_balls(outline, balls[is_near]))
@@ -162,8 +162,8 @@ class Camera:
         return canvas.picture()
 
     def view(
-        self, positions: FloatArray, *, size: Size = DEFAULT_SIZE, like: View | None = None
-    ) -> View:
+        self, positions: FloatArray, *, size: Size = DEFAULT_SIZE, like: CameraPose | None = None
+    ) -> CameraPose:
         """The nearest view of a position (n,), or of the first of several (p, n), that fits all.
 
         `followed` moves it on to the others. It has the directions and the angle of `like`; by
@@ -181,8 +181,8 @@ class Camera:
         ghost_offset: Vector = _NO_OFFSET,
         besides: Sequence[FloatArray] = (),
         size: Size = DEFAULT_SIZE,
-        like: View | None = None,
-    ) -> View:
+        like: CameraPose | None = None,
+    ) -> CameraPose:
         """The nearest view that fits all positions (p, n) when it is moved along ways (p, 2), m.
 
         The same ways go with `ghosts` (p, n), of which those that are NaN are not looked at. It
@@ -194,13 +194,13 @@ class Camera:
         if ghosts is not None:
             points, radii = self._joint_outline(ghosts, ways)
             outlines.append((points + ghost_offset, radii))
-        return framing(*_joined(outlines), size[0] / size[1], like or View())
+        return framing(*_joined(outlines), size[0] / size[1], like or CameraPose())
 
     def tail(self, position: FloatArray, force: LinkForce) -> FloatArray:
         """Where (3,) the arrow of a force begins, m in the world."""
         return self._arrow(force, self._frames(position)).tail
 
-    def extents(self, positions: FloatArray, ways: FloatArray, like: View) -> FloatArray:
+    def extents(self, positions: FloatArray, ways: FloatArray, like: CameraPose) -> FloatArray:
         """How much (3,) in m of the axes of `like` all positions (p, n) take up together.
 
         Each of them is moved back by its way (p, 2) in m.
@@ -210,9 +210,9 @@ class Camera:
     def aspect(self, positions: FloatArray) -> float:
         """Width over height of the picture that suits all of positions (p, n) best."""
         rows = np.atleast_2d(positions)
-        return natural_aspect(*self._joint_outline(rows, self._ways(rows)), View())
+        return natural_aspect(*self._joint_outline(rows, self._ways(rows)), CameraPose())
 
-    def followed(self, view: View, start: FloatArray, position: FloatArray) -> View:
+    def followed(self, view: CameraPose, start: FloatArray, position: FloatArray) -> CameraPose:
         """The view of a position (n,) that is what `view` is of `start` (n,).
 
         It goes with the root along the ground, not with its height, which is to be seen.
@@ -284,20 +284,20 @@ class Camera:
             first += len(puppet.shapes)
         return puppet.link_outline(link - first, frames[0][link], frames[1][link])
 
-    def _ghost_stage(self) -> Stage:
+    def _ghost_stage(self) -> RenderScene:
         if self._ghost is None:
             self._ghost = self._new_stage(
                 [tuple(replace(s, color_rgba=_GHOST_COLOR) for s in own) for own in self._shapes]
             )
         return self._ghost
 
-    def _arrow_stage(self) -> Stage:
+    def _arrow_stage(self) -> RenderScene:
         if self._arrows is None:
             self._arrows = self._new_stage(())
         return self._arrows
 
-    def _new_stage(self, shapes: Sequence[tuple[Shape, ...]]) -> Stage:
-        stage = Stage()
+    def _new_stage(self, shapes: Sequence[tuple[Shape, ...]]) -> RenderScene:
+        stage = RenderScene()
         self._stages.append(stage)
         stage.add_links(shapes)
         return stage

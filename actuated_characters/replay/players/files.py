@@ -9,7 +9,7 @@ import yaml
 from msgs_config import files
 from msgs_config.character.layout import JointType
 from msgs_config.character.meshes import resolve_meshes
-from msgs_config.character.model import Character, Loading
+from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import CharacterError
 
 _NO_LIMIT = 1e300  # N m or N; a file cannot say infinity
@@ -34,7 +34,7 @@ def write_character(directory: Path, character: Character, *, lift_limits: bool 
     return file
 
 
-def write_urdf(file: Path, loading: Loading) -> Path:
+def write_urdf(file: Path, loading: UrdfOptions) -> Path:
     """Write a URDF from its text, its meshes named by absolute paths; the file.
 
     Raises:

@@ -33,7 +33,7 @@ from msgs_config.messages.session import (
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare, given_parameters
 from msgs_config.shared_parameters import RATE
@@ -81,7 +81,7 @@ class CommandPlayer(Node):
         Raises:
             RunError: the simulator does not answer, or it leaves out a state.
         """
-        spinner, watch = Spinner(self), Watch()
+        spinner, watch = PollingExecutor(self), Watch()
         try:
             while not stop and not self._is_heard():
                 spinner.rest()
@@ -95,7 +95,7 @@ class CommandPlayer(Node):
         heard = [self._thrower.is_heard, *(part.is_heard for part in self._parts)]
         return self._resetting.service_is_ready() and all(heard)
 
-    def _play(self, stop: StopSignal, spinner: Spinner) -> None:
+    def _play(self, stop: StopSignal, spinner: PollingExecutor) -> None:
         """Answer state after state, each when all characters have it."""
         watch, ticks = Watch(), Ticks()
         self._played = 0  # states that all characters have

@@ -31,7 +31,7 @@ from msgs_config.messages.joint_state import JointStateDecoder, encode_clock
 from msgs_config.messages.session import ANONYMOUS, SESSION, given_session, make_session, session_of
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.runtime.once_logger import Warnings
-from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare, given_parameters
 
@@ -108,7 +108,7 @@ class StatePlayer(Node):
         Raises:
             RunError: no answer comes, or the controller does not take a parameter.
         """
-        self._stop, self._spinner = stop, Spinner(self)
+        self._stop, self._spinner = stop, PollingExecutor(self)
         try:
             self._configuration.publish(self._said.configuration(self._stream.configuration))
             self._wait(

@@ -10,7 +10,7 @@ from actuated_characters.bags.recording import CommandArrays, Recording, read_re
 from actuated_characters.replay.world import common_rows, left_out, worlds
 from msgs_config.errors import CommandError, LayoutError, RecordingError
 from msgs_config.messages.wrenches import WrenchArrays
-from sim_node.timing.lockstep import LockstepBarrier, Verdict
+from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
 
 Commands = tuple[CommandArrays, ...]
 
@@ -126,14 +126,14 @@ def _sent(recording: Recording, tick: int) -> Commands | None:
     for command in recording.commands[tick] if recording.commands else ():
         try:
             indices = layout.indices(command.names)
-            verdict = barrier.offer(barrier.stamp_ns, indices, command.efforts)
+            verdict = barrier.submit(barrier.stamp_ns, indices, command.efforts)
         except (LayoutError, CommandError):
             continue
-        if verdict is Verdict.CONFLICT:
+        if verdict is CommandStatus.CONFLICT:
             barrier.clear()
             kept.clear()
-            barrier.offer(barrier.stamp_ns, indices, command.efforts)
-        if verdict in (Verdict.ACCEPTED, Verdict.CONFLICT):
+            barrier.submit(barrier.stamp_ns, indices, command.efforts)
+        if verdict in (CommandStatus.ACCEPTED, CommandStatus.CONFLICT):
             kept.append(command)
         if barrier.complete:
             return tuple(kept)

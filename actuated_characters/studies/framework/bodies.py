@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuated_characters.studies.framework.study import Laboratory
+from actuated_characters.studies.framework.study import StudyRunner
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, Vector
@@ -53,13 +53,13 @@ class Box:
 """
 
 
-def write_box(laboratory: Laboratory, box: Box) -> str:
+def write_box(laboratory: StudyRunner, box: Box) -> str:
     """Write a box that floats; returns the character's path."""
     return _write(laboratory, box.name, box.link())
 
 
 def write_hinged_boxes(
-    laboratory: Laboratory, name: str, parent: Box, child: Box, *, joint_in_parent: Vector
+    laboratory: StudyRunner, name: str, parent: Box, child: Box, *, joint_in_parent: Vector
 ) -> str:
     """Write two boxes that float, joined by a hinge about y; returns the character's path.
 
@@ -73,7 +73,7 @@ def write_hinged_boxes(
     return _write(laboratory, name, parent.link() + child.link() + joint)
 
 
-def _write(laboratory: Laboratory, name: str, elements: str) -> str:
+def _write(laboratory: StudyRunner, name: str, elements: str) -> str:
     text = f'<?xml version="1.0"?>\n<robot name="{name}">\n{elements}</robot>\n'
     laboratory.write(f"{name}.urdf", text)
     return laboratory.write(f"{name}.yaml", f"urdf: {name}.urdf\ninertia: file\n")

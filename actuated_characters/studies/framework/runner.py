@@ -14,7 +14,7 @@ from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned_throws import plan_throws
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.run_directory import prepare_directory, read_figures
-from actuated_characters.studies.framework.study import Case, Findings, Outcome
+from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyResult
 from msgs_config.errors import RunError
 
 Report = Callable[[str, float], None]
@@ -34,7 +34,7 @@ class TopicLaboratory:
         self._keep_runs = keep_runs
         self._report = report
 
-    def run(self, case: Case) -> Outcome:
+    def run(self, case: RunSpec) -> RunResult:
         """Run a case; one that diverges ends there."""
         plan = make_plan(
             case.character, case.duration, case.reference, case.simulator, case.controller
@@ -65,7 +65,7 @@ class TopicLaboratory:
             shutil.rmtree(directory)
             with suppress(OSError):  # others are kept there
                 directory.parent.rmdir()
-        return Outcome(recording, summary, diverged)
+        return RunResult(recording, summary, diverged)
 
     def write(self, name: str, text: str) -> str:
         """Write a file below the study."""
@@ -86,7 +86,7 @@ def _check_pushes(pushes: Sequence[PlannedPush], run: Recording) -> None:
             raise RunError(f"the push on '{push.link}' at {push.stamp_ns} ns did not act")
 
 
-def write_findings(directory: Path, name: str, findings: Findings) -> list[Path]:
+def write_findings(directory: Path, name: str, findings: StudyResult) -> list[Path]:
     """Write table (CSV), curves (CSV) and pictures (PNG and SVG); returns the files."""
     directory.mkdir(parents=True, exist_ok=True)
     assert name not in findings.curves, "the table has that file's name"

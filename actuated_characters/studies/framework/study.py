@@ -16,7 +16,7 @@ Cell = str | int | float | bool | None
 
 
 @dataclass(frozen=True)
-class Case:
+class RunSpec:
     """One run of a study: what `actuated_characters run` takes."""
 
     label: str  # unique in its study; also the name of its directory
@@ -31,7 +31,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunResult:
     """What a run gave."""
 
     recording: Recording
@@ -39,10 +39,10 @@ class Outcome:
     diverged: str = ""  # why it ended before its time; "" if it did not
 
 
-class Laboratory(Protocol):
+class StudyRunner(Protocol):
     """Where runs are made."""
 
-    def run(self, case: Case) -> Outcome:
+    def run(self, case: RunSpec) -> RunResult:
         """Run a case over topics, to its end or until it diverges.
 
         Raises:
@@ -56,7 +56,7 @@ class Laboratory(Protocol):
 
 
 @dataclass(frozen=True)
-class Findings:
+class StudyResult:
     """A table, pictures, and the curves behind them."""
 
     columns: Sequence[str]  # with their units
@@ -74,6 +74,6 @@ class Study(Protocol):
     title: str  # one line
     runs: int  # how many it asks for, about; for the progress bar
 
-    def conduct(self, laboratory: Laboratory) -> Findings:
+    def run(self, laboratory: StudyRunner) -> StudyResult:
         """Run its cases and say what was found."""
         ...

@@ -16,7 +16,7 @@ from controller_node.references.keyframes import Keyframes, overshoots
 from controller_node.references.limits import LARGEST_NUMBER, SHORTEST_TIME, JointLimits
 from msgs_config import files
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character, Placement
 from msgs_config.errors import MotionError, one_of
 from msgs_config.geometry import rotations
@@ -140,7 +140,7 @@ def _rest_in_own_world(character: Character) -> FloatArray:
     return rest
 
 
-def _configurations(character: Character, positions: FloatArray) -> Configuration:
+def _configurations(character: Character, positions: FloatArray) -> GeneralizedPosition:
     """Poses (p, n) of the character's own world, in the world where it was placed."""
     placed = character.layout.configuration(positions)
     if character.layout.has_floating_base:

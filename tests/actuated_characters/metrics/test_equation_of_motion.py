@@ -17,7 +17,7 @@ from msgs_config.geometry import rotations
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import decode_wrenches
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import (
     EVERY_CHARACTER,
     LoneSimulation,
@@ -56,14 +56,14 @@ class Watched:
     whole: Character
     equation: EquationOfMotion
 
-    def advance(self, effort: FloatArray, *pushes: Push) -> Balance:
+    def advance(self, effort: FloatArray, *pushes: ExternalWrench) -> Balance:
         """Take a tick."""
         self.before = self.run.state
         self.run.watches_contacts = True
         self.run.advance(effort, *pushes)
         return self.balance()
 
-    def balance(self, **instead: FloatArray | tuple[Push, ...]) -> Balance:
+    def balance(self, **instead: FloatArray | tuple[ExternalWrench, ...]) -> Balance:
         """The equation of the last tick; or of what it was not."""
         actor, after = self.run.actor, self.run.state
         assert after.effort is not None and actor.contacts is not None
@@ -227,8 +227,10 @@ def test_pushes_off_the_centre_of_mass_are_a_part_of_it(watch: Watch) -> None:
     links = [link.name for link in watched.whole.links]
     rng = np.random.default_rng(2)
 
-    def push(name: str) -> Push:
-        return Push(links.index(name), rng.uniform(-60, 60, 6), rng.uniform(-0.2, 0.2, 3), 1, 1)
+    def push(name: str) -> ExternalWrench:
+        return ExternalWrench(
+            links.index(name), rng.uniform(-60, 60, 6), rng.uniform(-0.2, 0.2, 3), 1, 1
+        )
 
     for _ in range(40):
         pushes = push("chest"), push("left_wrist")

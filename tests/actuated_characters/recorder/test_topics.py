@@ -21,13 +21,13 @@ from std_msgs.msg import Header
 
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.recorder.node import RecorderNode
-from actuated_characters.recorder.topic_reader import Inbox
+from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.topics import Topic
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import character, simulation
 from tests.support.ros import Processes, SimulatorClient, tick_of, wrench_message
 
@@ -80,10 +80,10 @@ def vectors(wrench: Any) -> list[float]:
     return [getattr(part, axis) for part in (wrench.force, wrench.torque) for axis in "xyz"]
 
 
-def pushes_of(message: Any) -> list[Push]:
+def pushes_of(message: Any) -> list[ExternalWrench]:
     """What a message on `applied_wrench` says, as pushes of one tick."""
     return [
-        Push(
+        ExternalWrench(
             LINKS.index(name),
             np.array(vectors(wrench)),
             np.array([getattr(turn.translation, axis) for axis in "xyz"]),
@@ -340,7 +340,7 @@ def test_a_topic_gives_no_more_at_a_time_than_is_asked_for(client: SimulatorClie
     # who publishes faster than a recorder takes would otherwise never let it flush, or end
     topic = Topic("flood", Header, topics.STREAM_QOS)
     publisher = client.speak(topic)
-    inbox = Inbox(client.node, RecordedTopic(topic, "/flood", "flood", None))
+    inbox = TopicReader(client.node, RecordedTopic(topic, "/flood", "flood", None))
     client.spin_until(publisher.get_subscription_count, "a recorder's inbox")
     for _ in range(12):
         publisher.publish(Header())

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from actuated_characters.render.engine.camera_pose import View, framing, natural_aspect
+from actuated_characters.render.engine.camera_pose import CameraPose, framing, natural_aspect
 
 coordinates = st.floats(-5.0, 5.0)
 views = st.builds(
-    View,
+    CameraPose,
     target=st.tuples(coordinates, coordinates, coordinates),
     distance=st.floats(0.5, 20.0),
     yaw=st.floats(-pi, pi),
@@ -21,7 +21,9 @@ views = st.builds(
 
 
 @given(views)
-def test_the_axes_are_orthonormal_and_right_handed_and_the_picture_is_upright(view: View) -> None:
+def test_the_axes_are_orthonormal_and_right_handed_and_the_picture_is_upright(
+    view: CameraPose,
+) -> None:
     right, up, back = view.axes()
 
     np.testing.assert_allclose(view.axes() @ view.axes().T, np.eye(3), atol=1e-12)
@@ -30,7 +32,7 @@ def test_the_axes_are_orthonormal_and_right_handed_and_the_picture_is_upright(vi
 
 
 def test_at_yaw_and_pitch_zero_it_looks_along_y_with_x_to_the_right() -> None:
-    view = View((1.0, 2.0, 3.0), distance=4.0, yaw=0.0, pitch=0.0)
+    view = CameraPose((1.0, 2.0, 3.0), distance=4.0, yaw=0.0, pitch=0.0)
 
     np.testing.assert_allclose(view.eye(), (1.0, -2.0, 3.0))
     np.testing.assert_allclose(view.axes(), [(1, 0, 0), (0, 0, 1), (0, -1, 0)], atol=1e-15)
@@ -38,13 +40,15 @@ def test_at_yaw_and_pitch_zero_it_looks_along_y_with_x_to_the_right() -> None:
 
 def test_a_yaw_leads_to_the_side_of_x_and_a_pitch_upwards() -> None:
     np.testing.assert_allclose(
-        View(distance=2.0, yaw=0.5 * pi, pitch=0.0).eye(), (2, 0, 0), atol=1e-15
+        CameraPose(distance=2.0, yaw=0.5 * pi, pitch=0.0).eye(), (2, 0, 0), atol=1e-15
     )
-    assert View(distance=2.0, yaw=0.3, pitch=0.5).eye()[2] == pytest.approx(2.0 * sin(0.5))
+    assert CameraPose(distance=2.0, yaw=0.3, pitch=0.5).eye()[2] == pytest.approx(2.0 * sin(0.5))
 
 
 @given(views, st.integers(1, 40), st.integers(1, 40))
-def test_what_is_seen_at_a_pixel_is_seen_at_that_pixel(view: View, width: int, height: int) -> None:
+def test_what_is_seen_at_a_pixel_is_seen_at_that_pixel(
+    view: CameraPose, width: int, height: int
+) -> None:
     pixels = np.mgrid[:height, :width].reshape(2, -1)
     depth = np.random.default_rng(1).uniform(0.5, 9.0, width * height)
 
@@ -62,7 +66,7 @@ def test_what_is_seen_at_a_pixel_is_seen_at_that_pixel(view: View, width: int, h
     views,
 )
 def test_framing_shows_every_sphere_whole_and_comes_as_near_as_that_allows(
-    centres: list[tuple[float, float, float]], radius: float, aspect: float, like: View
+    centres: list[tuple[float, float, float]], radius: float, aspect: float, like: CameraPose
 ) -> None:
     points, radii = np.array(centres), np.full(len(centres), radius)
 
@@ -74,7 +78,7 @@ def test_framing_shows_every_sphere_whole_and_comes_as_near_as_that_allows(
     assert clearance == pytest.approx(0.05 * extent, rel=1e-6)
 
 
-def _clearance(view: View, points: np.ndarray, radii: np.ndarray, aspect: float) -> float:
+def _clearance(view: CameraPose, points: np.ndarray, radii: np.ndarray, aspect: float) -> float:
     """The smallest distance of a sphere from a plane through the eye and an edge of the picture."""
     right, up, back = view.axes()
     half = tan(0.5 * view.field_of_view)
@@ -85,7 +89,7 @@ def _clearance(view: View, points: np.ndarray, radii: np.ndarray, aspect: float)
 
 
 def test_the_natural_aspect_is_that_of_the_extents() -> None:
-    upright = View(yaw=0.0, pitch=0.0)
+    upright = CameraPose(yaw=0.0, pitch=0.0)
     corners = np.array([(0.0, 0.0, 0.0), (1.0, 5.0, 2.0)])
 
     # 5 m is the largest extent, of which a twentieth is left free on either side
@@ -98,7 +102,7 @@ def test_the_natural_aspect_is_that_of_the_extents() -> None:
     views,
 )
 def test_a_box_has_all_that_is_seen_of_spheres(
-    centres: list[tuple[float, float, float]], radius: float, view: View
+    centres: list[tuple[float, float, float]], radius: float, view: CameraPose
 ) -> None:
     size = (50, 40)
     directions = np.random.default_rng(2).normal(size=(30, 3))
@@ -115,7 +119,9 @@ def test_a_box_has_all_that_is_seen_of_spheres(
 
 
 def test_a_box_is_no_larger_than_what_it_is_of() -> None:
-    view = View((0.0, 0.0, 0.0), distance=10.0, yaw=0.0, pitch=0.0, field_of_view=2.0 * atan(0.1))
+    view = CameraPose(
+        (0.0, 0.0, 0.0), distance=10.0, yaw=0.0, pitch=0.0, field_of_view=2.0 * atan(0.1)
+    )
 
     box = view.box(np.array([(0.5, 0.0, 0.25)]), np.zeros(1), (200, 100))  # 50 pixels a metre
 
@@ -125,6 +131,6 @@ def test_a_box_is_no_larger_than_what_it_is_of() -> None:
 
 
 def test_where_a_sphere_is_at_the_camera_the_box_is_the_whole_picture() -> None:
-    view = View(distance=2.0)
+    view = CameraPose(distance=2.0)
 
     assert view.box(view.eye()[np.newaxis], np.ones(1), (200, 100)) == (0, 100, 0, 200)

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actuated_characters.render.engine import ground
-from actuated_characters.render.engine.camera_pose import View
+from actuated_characters.render.engine.camera_pose import CameraPose
 
 SIZE = (24, 16)
 views = st.builds(
-    View,
+    CameraPose,
     target=st.tuples(*[st.floats(-5.0, 5.0)] * 2, st.floats(0.0, 2.0)),
     distance=st.floats(0.5, 20.0),
     yaw=st.floats(-pi, pi),
@@ -22,7 +22,7 @@ views = st.builds(
 
 
 @given(views)
-def test_the_ground_is_where_rays_meet_it(view: View) -> None:
+def test_the_ground_is_where_rays_meet_it(view: CameraPose) -> None:
     width, height = SIZE
     rows, columns = np.arange(height), np.arange(width)
     depth = ground.depths(view, height, rows + 0.5)
@@ -43,7 +43,7 @@ def test_the_ground_is_where_rays_meet_it(view: View) -> None:
 @pytest.mark.parametrize("yaw", [0.0, 0.45, -2.0])
 @pytest.mark.parametrize("pitch", [0.15, 0.9])
 def test_a_pixel_has_the_mean_of_what_it_covers(yaw: float, pitch: float) -> None:
-    view, size, fine = View((0.3, 0.1, 0.8), 4.0, yaw, pitch), (96, 64), 8
+    view, size, fine = CameraPose((0.3, 0.1, 0.8), 4.0, yaw, pitch), (96, 64), 8
     sharp = ground.depths(view, 64, np.arange(64.0)) < 1.6 * view.distance  # no haze so far
 
     seen = ground.colors(view, size)[sharp, :, 0]
@@ -58,7 +58,7 @@ def test_a_pixel_has_the_mean_of_what_it_covers(yaw: float, pitch: float) -> Non
     assert abs(((seen - dark) / contrast).mean() - cast.mean()) < 0.01
 
 
-def _light_tiles(view: View, size: tuple[int, int], fine: int) -> np.ndarray:
+def _light_tiles(view: CameraPose, size: tuple[int, int], fine: int) -> np.ndarray:
     """1 where a ray meets a light tile, with so many rays along each edge of a pixel."""
     rows, columns = ((np.arange(edge * fine) + 0.5) / fine for edge in size[::-1])
     x, y = ground.places(view, size, rows, columns)
@@ -68,7 +68,7 @@ def _light_tiles(view: View, size: tuple[int, int], fine: int) -> np.ndarray:
 
 
 def test_far_away_there_is_nothing_but_the_background() -> None:
-    seen = ground.colors(View(pitch=0.05), (40, 60))
+    seen = ground.colors(CameraPose(pitch=0.05), (40, 60))
 
     np.testing.assert_array_equal(seen[:20], np.broadcast_to(ground.BACKGROUND, (20, 40, 3)))
     assert (seen[-1] != ground.BACKGROUND).all()
@@ -76,7 +76,7 @@ def test_far_away_there_is_nothing_but_the_background() -> None:
 
 @pytest.mark.parametrize("height", [0.0, -1.0])
 def test_from_the_ground_or_below_there_is_none(height: float) -> None:
-    view = View(target=(0.0, 0.0, height), pitch=0.0)
+    view = CameraPose(target=(0.0, 0.0, height), pitch=0.0)
 
     seen = ground.colors(view, SIZE)
 
@@ -84,6 +84,6 @@ def test_from_the_ground_or_below_there_is_none(height: float) -> None:
 
 
 def test_tiles_are_1_2_or_5_times_a_power_of_ten() -> None:
-    lengths = {ground.tile_length(View(distance=d)) for d in (0.7, 3.0, 5.9, 6.1, 13.0, 31.0)}
+    lengths = {ground.tile_length(CameraPose(distance=d)) for d in (0.7, 3.0, 5.9, 6.1, 13.0, 31.0)}
 
     assert lengths == {0.1, 0.5, 1.0, 2.0, 5.0}

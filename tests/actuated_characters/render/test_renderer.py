@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuated_characters.render.engine.camera_pose import View
-from actuated_characters.render.engine.renderer import Camera, Picture
+from actuated_characters.render.engine.camera_pose import CameraPose
+from actuated_characters.render.engine.renderer import Picture, Renderer
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.bullet import pybullet
 from msgs_config.character.loading import load_character
-from msgs_config.character.model import Character, Loading
+from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import CharacterError
 from tests.support.physics import EVERY_CHARACTER, character, character_id, random_state
 
 BOX = (0.4, 0.2, 0.6)  # m
 SIZE = (320, 240)
-UPRIGHT = View((0.0, 0.0, 0.0), distance=3.0, yaw=0.0, pitch=0.0, field_of_view=0.6)
+UPRIGHT = CameraPose((0.0, 0.0, 0.0), distance=3.0, yaw=0.0, pitch=0.0, field_of_view=0.6)
 STILL = np.zeros(6)
 STEP = 0.25  # m that a box is moved
 GHOST_GREEN = 1  # the channel in which a ghost is strongest
@@ -42,9 +42,9 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Character:
 
 
 @pytest.fixture(scope="module")
-def camera(box: Character) -> Iterator[Camera]:
+def camera(box: Character) -> Iterator[Renderer]:
     """A camera that has only the box before it, one sample a pixel."""
-    with Camera(box, ground=False, samples=1) as camera:
+    with Renderer(box, ground=False, samples=1) as camera:
         yield camera
 
 
@@ -74,9 +74,9 @@ def at(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> FloatArray:
 
 
 @pytest.mark.parametrize("size", [(320, 240), (100, 300), (511, 77)])
-@pytest.mark.parametrize("view", [UPRIGHT, View((0, 0, 0), 5.0, 0.0, 0.0, 1.0)])
+@pytest.mark.parametrize("view", [UPRIGHT, CameraPose((0, 0, 0), 5.0, 0.0, 0.0, 1.0)])
 def test_a_box_covers_as_many_pixels_as_the_pinhole_model_says(
-    camera: Camera, view: View, size: tuple[int, int]
+    camera: Renderer, view: CameraPose, size: tuple[int, int]
 ) -> None:
     width, height = size
 
@@ -108,17 +108,17 @@ def test_what_moves_in_the_world_moves_as_far_in_the_picture(
     moved: tuple[float, float, float],
     direction: tuple[float, float],
 ) -> None:
-    view = View((0.0, 0.0, 0.0), distance=50.0, yaw=yaw, pitch=pitch, field_of_view=0.03)
+    view = CameraPose((0.0, 0.0, 0.0), distance=50.0, yaw=yaw, pitch=pitch, field_of_view=0.03)
     pixel = 2.0 * 50.0 * tan(0.015) / SIZE[1]  # m; from so far away, nearly everywhere
 
-    with Camera(make_box(tmp_path, (0.1, 0.1, 0.1)), ground=False, samples=1) as camera:
+    with Renderer(make_box(tmp_path, (0.1, 0.1, 0.1)), ground=False, samples=1) as camera:
         before = centre(seen(camera.picture(STILL, view=view, size=SIZE)))
         after = centre(seen(camera.picture(at(*moved), view=view, size=SIZE)))
 
     np.testing.assert_allclose(after - before, np.array(direction) * STEP / pixel, atol=1.0)
 
 
-def test_what_is_farther_away_is_smaller(camera: Camera) -> None:
+def test_what_is_farther_away_is_smaller(camera: Renderer) -> None:
     near, far = (seen(camera.picture(at(y=y), view=UPRIGHT, size=SIZE)).sum() for y in (0.0, 3.0))
 
     # areas are as the squares of the distances of the nearer face
@@ -130,9 +130,9 @@ def test_a_pendulum_hangs_where_its_angle_says(angle: float) -> None:
     # its rod of 1 m turns about +y: a positive angle leads its lower end towards -x
     where = np.array((-0.5 * sin(angle), -0.5 * cos(angle)))  # x and z of the rod's middle
 
-    view = View((0.0, 0.0, 0.0), distance=3.0, yaw=0.0, pitch=0.0, field_of_view=0.8)
+    view = CameraPose((0.0, 0.0, 0.0), distance=3.0, yaw=0.0, pitch=0.0, field_of_view=0.8)
 
-    with Camera(character("pendulum"), samples=1) as camera:
+    with Renderer(character("pendulum"), samples=1) as camera:
         mask = seen(camera.picture(np.array([angle]), view=view, size=SIZE))
 
     pixel = 2.0 * 3.0 * tan(0.4) / SIZE[1]
@@ -140,7 +140,7 @@ def test_a_pendulum_hangs_where_its_angle_says(angle: float) -> None:
     np.testing.assert_allclose(centre(mask), (row, column), atol=1.0)
 
 
-def test_a_turned_box_shows_its_other_face(camera: Camera) -> None:
+def test_a_turned_box_shows_its_other_face(camera: Renderer) -> None:
     quarter = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * pi))  # about z
 
     (_, left), (_, right) = box_of(seen(camera.picture(quarter, view=UPRIGHT, size=SIZE)))
@@ -155,7 +155,7 @@ def test_more_samples_a_pixel_smooth_the_edges_and_change_nothing_else(
     turned = np.array((0.0, 0.0, 0.0, 0.0, 0.4, 0.0))
     pictures = []
     for samples in (1, 4):
-        with Camera(box, ground=False, samples=samples) as camera:
+        with Renderer(box, ground=False, samples=samples) as camera:
             pictures.append(camera.picture(turned, view=UPRIGHT, size=SIZE).astype(float))
     rough, smooth = pictures
 
@@ -179,7 +179,7 @@ def test_the_default_view_has_all_of_a_character_and_not_much_else(name: str) ->
     rng = np.random.default_rng(3)
     positions = [np.array(whole.rest_position), *(random_state(whole, rng)[0] for _ in range(2))]
 
-    with Camera(whole, ground=False, samples=1) as camera:
+    with Renderer(whole, ground=False, samples=1) as camera:
         for position in positions:
             (top, left), (bottom, right) = box_of(seen(camera.picture(position, size=(160, 120))))
 
@@ -194,7 +194,7 @@ def test_one_view_has_all_of_several_poses_each_in_its_turn() -> None:
     positions = np.array([random_state(whole, rng)[0] for _ in range(4)])
     positions[:, 0] += (0.0, 3.0, 6.0, 9.0)
 
-    with Camera(whole, ground=False, samples=1) as camera:
+    with Renderer(whole, ground=False, samples=1) as camera:
         view = camera.view(positions, size=SIZE)
         for position in positions:
             own = camera.followed(view, positions[0], position)
@@ -205,7 +205,7 @@ def test_one_view_has_all_of_several_poses_each_in_its_turn() -> None:
             assert own.distance == view.distance
 
 
-def test_the_view_follows_the_root_along_the_ground_alone(camera: Camera) -> None:
+def test_the_view_follows_the_root_along_the_ground_alone(camera: Renderer) -> None:
     view = camera.followed(UPRIGHT, at(1.0, 2.0, 3.0), at(1.5, 4.0, 9.0))
 
     assert view.target == (0.5, 2.0, 0.0)
@@ -216,14 +216,14 @@ def test_the_view_of_an_arm_stays_where_it_is() -> None:
     arm = character("franka_panda")
     rest = np.array(arm.rest_position)
 
-    with Camera(arm, samples=1) as camera:
+    with Renderer(arm, samples=1) as camera:
         assert camera.followed(UPRIGHT, rest, rest + 0.3) == UPRIGHT
 
 
 def test_links_of_a_humanoid_have_different_colours() -> None:
     whole = character("humanoid")
 
-    with Camera(whole, ground=False, samples=1) as camera:
+    with Renderer(whole, ground=False, samples=1) as camera:
         picture = camera.picture(np.array(whole.rest_position), size=SIZE).astype(float)
 
     shown = picture[seen(picture.astype(np.uint8))]
@@ -238,9 +238,9 @@ def test_links_of_a_humanoid_have_different_colours() -> None:
 def test_a_character_above_the_ground_darkens_it_where_it_keeps_the_light_off(
     box: Character,
 ) -> None:
-    view = View((0.0, 0.0, 0.0), distance=5.0, yaw=0.0, pitch=1.0, field_of_view=0.6)
+    view = CameraPose((0.0, 0.0, 0.0), distance=5.0, yaw=0.0, pitch=1.0, field_of_view=0.6)
 
-    with Camera(box, samples=1) as camera, Camera(box, ground=False, samples=1) as alone:
+    with Renderer(box, samples=1) as camera, Renderer(box, ground=False, samples=1) as alone:
         low, high = (
             camera.picture(at(z=z), view=view, size=SIZE).astype(float).mean(axis=2)
             for z in (0.5, 100.0)
@@ -261,7 +261,7 @@ def test_the_ground_has_the_worlds_own_grid() -> None:
         moved[0] += x
         return camera.picture(moved, view=camera.followed(view, rest, moved), size=SIZE)
 
-    with Camera(whole, samples=1) as camera:
+    with Renderer(whole, samples=1) as camera:
         view = camera.view(rest, size=SIZE)
         # tiles are of 1, 2 or 5 times a power of ten: at this distance 0.5 m
         assert 3.0 <= view.distance < 6.0
@@ -274,11 +274,11 @@ def test_the_ground_has_the_worlds_own_grid() -> None:
 
 
 def test_what_hangs_below_the_ground_is_not_hidden_by_it() -> None:
-    view = View((0.0, 0.0, -0.5), distance=4.0, yaw=0.0, pitch=0.5)
+    view = CameraPose((0.0, 0.0, -0.5), distance=4.0, yaw=0.0, pitch=0.5)
 
     with (
-        Camera(character("pendulum")) as camera,
-        Camera(character("pendulum"), ground=False) as groundless,
+        Renderer(character("pendulum")) as camera,
+        Renderer(character("pendulum"), ground=False) as groundless,
     ):
         picture, alone = (
             it.picture(np.array([0.3]), view=view, size=SIZE) for it in (camera, groundless)
@@ -296,11 +296,11 @@ def test_a_terrain_is_drawn(box: Character, tmp_path: Path) -> None:
         '<origin xyz="0 0 -0.5"/><geometry><box size="20 20 0.2"/></geometry></collision>'
         "</link></robot>"
     )
-    terrain = Loading(path, path.read_text(), fixed_base=True)
+    terrain = UrdfOptions(path, path.read_text(), fixed_base=True)
 
     with (
-        Camera(box, ground=False, samples=1) as bare,
-        Camera(box, ground=False, terrain=terrain, samples=1) as with_terrain,
+        Renderer(box, ground=False, samples=1) as bare,
+        Renderer(box, ground=False, terrain=terrain, samples=1) as with_terrain,
     ):
         alone, on_slab = (
             seen(it.picture(STILL, view=UPRIGHT, size=SIZE)) for it in (bare, with_terrain)
@@ -313,7 +313,7 @@ def test_a_terrain_is_drawn(box: Character, tmp_path: Path) -> None:
 # The ghost
 
 
-def test_a_ghost_is_seen_where_it_is_and_what_is_behind_it_shines_through(camera: Camera) -> None:
+def test_a_ghost_is_seen_where_it_is_and_what_is_behind_it_shines_through(camera: Renderer) -> None:
     def picture(ghost: FloatArray | None) -> Picture:
         return camera.picture(STILL, ghost=ghost, view=UPRIGHT, size=SIZE).astype(int)
 
@@ -331,7 +331,7 @@ def test_a_ghost_is_seen_where_it_is_and_what_is_behind_it_shines_through(camera
     assert haunted[before_nothing].mean() > haunted[before_box].mean() + 10.0
 
 
-def test_a_ghost_behind_the_character_is_hidden(camera: Camera) -> None:
+def test_a_ghost_behind_the_character_is_hidden(camera: Renderer) -> None:
     alone = camera.picture(STILL, view=UPRIGHT, size=SIZE)
     haunted = camera.picture(STILL, ghost=at(y=1.0), view=UPRIGHT, size=SIZE)
 
@@ -347,7 +347,7 @@ def test_a_picture_is_the_same_each_time_whatever_was_taken_before() -> None:
     positions = [random_state(whole, rng)[0] for _ in range(3)]
 
     def last_of(order: list[int]) -> bytes:
-        with Camera(whole) as camera:
+        with Renderer(whole) as camera:
             view = camera.view(positions[0], size=SIZE)
             for row in order:
                 picture = camera.picture(
@@ -359,7 +359,7 @@ def test_a_picture_is_the_same_each_time_whatever_was_taken_before() -> None:
 
 
 def test_a_picture_is_bright_bytes_of_the_size_asked_for() -> None:
-    with Camera(character("humanoid")) as camera:
+    with Renderer(character("humanoid")) as camera:
         picture = camera.picture(np.array(character("humanoid").rest_position), size=(90, 60))
 
     assert picture.shape == (60, 90, 3) and picture.dtype == np.uint8
@@ -377,12 +377,14 @@ def test_no_engine_is_left_when_a_camera_is_closed_or_cannot_be_made(
 ) -> None:
     before = engines()
     mesh = '<collision><geometry><mesh filename="none.obj"/></geometry></collision>'
-    nowhere = Loading(tmp_path / "x.urdf", f'<robot name="x"><link name="a">{mesh}</link></robot>')
+    nowhere = UrdfOptions(
+        tmp_path / "x.urdf", f'<robot name="x"><link name="a">{mesh}</link></robot>'
+    )
 
-    with Camera(box) as camera:
+    with Renderer(box) as camera:
         camera.picture(STILL, ghost=STILL, size=SIZE)
         assert engines() == before + 3
     with pytest.raises(CharacterError):
-        Camera(box, terrain=nowhere)
+        Renderer(box, terrain=nowhere)
 
     assert engines() == before

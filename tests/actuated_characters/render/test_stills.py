@@ -11,7 +11,7 @@ from matplotlib.image import imread
 
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.cli import main
-from actuated_characters.render.engine.renderer import Camera, Picture
+from actuated_characters.render.engine.renderer import Picture, Renderer
 from actuated_characters.render.movie import Movie, MovieSettings
 from actuated_characters.render.stills import pose_strip, save_png, strip
 from msgs_config.arrays import BoolArray
@@ -78,7 +78,7 @@ def test_a_strip_has_the_states_nearest_to_the_times(recording: Recording, walk:
 
     positions = np.stack([walk.states[row].position for row in (0, 10, 60)])
     assert whole.shape == (80, 3 * 60 + 2 * GAP, 3)
-    with Camera(walk.plan.character) as camera:
+    with Renderer(walk.plan.character) as camera:
         view = camera.view(positions, size=SIZE)
         for position, tile in zip(positions, tiles(whole, 3), strict=True):
             own = camera.followed(view, positions[0], position)

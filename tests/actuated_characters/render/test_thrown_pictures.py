@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import ModeChange, Recording
-from actuated_characters.render.engine.renderer import Camera
+from actuated_characters.render.engine.renderer import Renderer
 from actuated_characters.render.scene import make_scene
 from actuated_characters.report.reactions import (
     ModeSpan,
@@ -15,17 +15,17 @@ from actuated_characters.report.reactions import (
     throw_marks,
     thrown_line,
 )
-from actuated_characters.studies.framework.study import Case
+from actuated_characters.studies.framework.study import RunSpec
 from msgs_config.messages.projectiles import BallStates, ball_names, decode_balls, encode_balls
-from msgs_config.messages.throw import Throw
+from msgs_config.messages.throw import ProjectileThrow
 from tests.support.in_process import InProcessLaboratory
 from tests.support.physics import character
 
 HUMANOID = character("humanoid")
 REST = np.array(HUMANOID.rest_position)
 SIZE = (160, 160)
-ONE = Throw(2.0, 0.1, (1.0, 0.0, 1.0), (-3.0, 0.0, 4.0))
-OTHER = Throw(3.0, 0.2, (0.0, 2.0, 1.0), (0.0, -1.0, 0.0))
+ONE = ProjectileThrow(2.0, 0.1, (1.0, 0.0, 1.0), (-3.0, 0.0, 4.0))
+OTHER = ProjectileThrow(3.0, 0.2, (0.0, 2.0, 1.0), (0.0, -1.0, 0.0))
 
 
 def balls_at(stamp_ns: int, *centres: tuple[float, float, float]) -> BallStates:
@@ -37,7 +37,7 @@ def balls_at(stamp_ns: int, *centres: tuple[float, float, float]) -> BallStates:
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """A recording of five ticks with a reset, in which three balls are thrown."""
     laboratory = InProcessLaboratory(tmp_path_factory.mktemp("laboratory"))
-    case = Case("one", "humanoid", 5.0 / 240.0, {"reference": "hold"}, {}, {})
+    case = RunSpec("one", "humanoid", 5.0 / 240.0, {"reference": "hold"}, {}, {})
     plain = laboratory.run(case).recording
     effort = plain.effort.copy()
     effort[2] = np.nan  # that tick is a reset
@@ -84,7 +84,7 @@ def test_a_scene_has_the_balls_of_each_state_with_their_radii(recording: Recordi
 
 @pytest.mark.parametrize("ground", [False, True])
 def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
-    with Camera(HUMANOID, ground=ground) as camera:
+    with Renderer(HUMANOID, ground=ground) as camera:
         view = camera.view(REST, size=SIZE)
         ball = np.array([[*view.target, 0.15]])
         ball[0, :3] += 0.8 * view.axes()[2]  # towards the camera: before the character
@@ -107,7 +107,7 @@ def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
 
 
 def test_a_ball_behind_the_character_is_hidden() -> None:
-    with Camera(HUMANOID, ground=False) as camera:
+    with Renderer(HUMANOID, ground=False) as camera:
         view = camera.view(REST, size=SIZE)
         behind = np.array([[*view.target, 0.02]])
         behind[0, :3] -= 1.0 * view.axes()[2]

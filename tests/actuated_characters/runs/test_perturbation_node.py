@@ -26,9 +26,9 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
-from sim_node.parameters import make_role, make_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import character
 from tests.support.ros import Processes
 
@@ -62,16 +62,18 @@ def centre_of(link: str) -> FloatArray:
     return np.array(HUMANOID.links[LINKS.index(link)].inertial_pose.position)
 
 
-def as_acting(tick: int, link: str, wrench: Sequence[float], point: Sequence[float] | None) -> Push:
+def as_acting(
+    tick: int, link: str, wrench: Sequence[float], point: Sequence[float] | None
+) -> ExternalWrench:
     """A push as the simulation takes it."""
     where = centre_of(link) if point is None else np.array(point)
-    return Push(LINKS.index(link), np.array(wrench), where, tick, HELD)
+    return ExternalWrench(LINKS.index(link), np.array(wrench), where, tick, HELD)
 
 
-def states_without_ros(plan: Plan, pushes: Sequence[Push]) -> list[StampedState]:
+def states_without_ros(plan: Plan, pushes: Sequence[ExternalWrench]) -> list[StampedState]:
     """The states of a plan when simulation and controller are called one after the other."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    role = make_role(plan.character, plan.simulator)
+    role = make_character_setup(plan.character, plan.simulator)
     with Simulation([role], make_settings(plan.simulator)) as run:
         (actor,) = run.actors
         states = [actor.state]

@@ -29,8 +29,8 @@ from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.throw import Throw, natural_radius
-from sim_node.parameters import make_role, make_settings
+from msgs_config.messages.throw import ProjectileThrow, natural_radius
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.sphere_sweep import find_impact
 from tests.support.physics import character
@@ -64,7 +64,7 @@ def first_hit(plan: Plan, planned: PlannedThrow) -> Hit:
     """Run a plan with a throw until the ball touches something."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
     with Simulation(
-        [make_role(plan.character, plan.simulator)], make_settings(plan.simulator)
+        [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
     ) as run:
         (actor,) = run.actors
         start, let_go = run.stamp_ns, run.clock.first_tick_from(planned.stamp_ns)
@@ -246,7 +246,9 @@ def test_no_more_balls_than_an_episode_may_have() -> None:
 
 
 def test_what_is_written_is_read_to_the_bit(tmp_path: Path) -> None:
-    exact = PlannedThrow(2**53 + 1, Throw(0.1, 1 / 3, (1e-300, -0.0, 1 / 7), (0.3, 0.0, -1.0)))
+    exact = PlannedThrow(
+        2**53 + 1, ProjectileThrow(0.1, 1 / 3, (1e-300, -0.0, 1 / 7), (0.3, 0.0, -1.0))
+    )
     early = PlannedThrow(1, exact.throw)
 
     write_throws(tmp_path / "throws.json", [exact, early])
@@ -361,7 +363,7 @@ def test_a_replay_sees_a_ball_that_is_missing_another_or_elsewhere(thrown: Made)
     ticks = [tick for tick, each in enumerate(recording.throws) if each]
     one = recording.throws[ticks[0]][0]
 
-    def changed(*throws: Throw) -> Recording:
+    def changed(*throws: ProjectileThrow) -> Recording:
         rows = [*recording.throws]
         rows[ticks[0]] = throws
         return replace(recording, throws=tuple(rows))

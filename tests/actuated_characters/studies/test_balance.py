@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.studies import balance
-from actuated_characters.studies.framework.study import Case, Outcome
+from actuated_characters.studies.framework.study import RunResult, RunSpec
 from msgs_config.geometry import rotations
 from tests.support.in_process import InProcessLaboratory
 
@@ -17,12 +17,12 @@ pytestmark = pytest.mark.slow
 class Weakling:
     """A laboratory in which all who are pushed harder than by an impulse lie down."""
 
-    def __init__(self, outcome: Outcome, impulse: float) -> None:
+    def __init__(self, outcome: RunResult, impulse: float) -> None:
         self._outcome = outcome
         self._impulse = impulse
         self.impulses: list[float] = []
 
-    def run(self, case: Case) -> Outcome:
+    def run(self, case: RunSpec) -> RunResult:
         impulse = sum(np.linalg.norm(push.wrench[:3]) for push in case.pushes) * 0.1
         self.impulses.append(impulse)
         if impulse <= self._impulse:
@@ -37,12 +37,12 @@ class Weakling:
 
 
 @pytest.fixture(scope="module")
-def stood(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+def stood(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
     laboratory = InProcessLaboratory(tmp_path_factory.mktemp("balance"))
     return laboratory.run(balance._case("stand", 2.0))
 
 
-def test_it_stands_by_joint_efforts_alone(stood: Outcome) -> None:
+def test_it_stands_by_joint_efforts_alone(stood: RunResult) -> None:
     assert balance.survives(stood)
     assert balance.standing_time(stood.recording) == pytest.approx(2.0, abs=0.01)
     assert not stood.recording.effort[:, :6].any()
@@ -67,7 +67,7 @@ def test_a_push_has_its_impulse_and_its_direction(tmp_path: Path, x: float, y: f
 
 
 @pytest.mark.parametrize("bearable", [0.3, 7.0, 12.6, 31.9])
-def test_bisection_finds_the_largest_impulse(stood: Outcome, bearable: float) -> None:
+def test_bisection_finds_the_largest_impulse(stood: RunResult, bearable: float) -> None:
     laboratory = Weakling(stood, bearable)
 
     limit = balance._largest_impulse(laboratory, "left")
@@ -77,7 +77,7 @@ def test_bisection_finds_the_largest_impulse(stood: Outcome, bearable: float) ->
     assert len(laboratory.impulses) <= balance.STUDY.runs / 4
 
 
-def test_who_lies_on_the_back_in_the_end_has_not_survived(stood: Outcome) -> None:
+def test_who_lies_on_the_back_in_the_end_has_not_survived(stood: RunResult) -> None:
     run = stood.recording
     position = run.position.copy()
     backwards = rotations.exp(np.array((0.0, -1.5, 0.0)))
@@ -91,7 +91,7 @@ def test_who_lies_on_the_back_in_the_end_has_not_survived(stood: Outcome) -> Non
     assert not balance.survives(fallen)
 
 
-def test_the_time_until_the_fall_is_that_of_the_last_state_that_stood(stood: Outcome) -> None:
+def test_the_time_until_the_fall_is_that_of_the_last_state_that_stood(stood: RunResult) -> None:
     position = stood.recording.position.copy()
     position[100:, 2] = 0.3
 

@@ -8,7 +8,7 @@ import pytest
 from actuated_characters.bags.recording import Recording
 from actuated_characters.studies.catalogue import load_study
 from actuated_characters.studies.equation import TickTime, close
-from actuated_characters.studies.framework.study import Case, Findings
+from actuated_characters.studies.framework.study import RunSpec, StudyResult
 from msgs_config.messages.wrenches import WrenchArrays
 from tests.support.in_process import InProcessLaboratory
 
@@ -24,18 +24,18 @@ def laboratory(tmp_path_factory: pytest.TempPathFactory) -> InProcessLaboratory:
 
 
 @pytest.fixture(scope="module")
-def findings(laboratory: InProcessLaboratory) -> Findings:
-    return load_study("equation").conduct(laboratory)
+def findings(laboratory: InProcessLaboratory) -> StudyResult:
+    return load_study("equation").run(laboratory)
 
 
 @pytest.fixture(scope="module")
 def stood(laboratory: InProcessLaboratory) -> Recording:
     """Half a second of standing with assistance, its contacts recorded."""
-    return laboratory.run(Case("short", "humanoid", 0.5, contacts=True)).recording
+    return laboratory.run(RunSpec("short", "humanoid", 0.5, contacts=True)).recording
 
 
 def test_the_equation_closes_in_every_tick_and_not_without_the_contacts(
-    findings: Findings,
+    findings: StudyResult,
 ) -> None:
     rows = {str(row[0]): dict(zip(findings.columns, row, strict=True)) for row in findings.rows}
 

@@ -12,7 +12,7 @@ from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies.catalogue import load_study
 from actuated_characters.studies.framework import motion_replay
 from actuated_characters.studies.framework.runner import TopicLaboratory
-from actuated_characters.studies.framework.study import Case, Findings
+from actuated_characters.studies.framework.study import RunSpec, StudyResult
 from controller_node.effort_series import read_effort_series
 from controller_node.references.signals import SineReference
 from msgs_config.character.dynamics import DynamicsModel
@@ -31,17 +31,17 @@ def laboratory(tmp_path_factory: pytest.TempPathFactory) -> InProcessLaboratory:
 
 
 @pytest.fixture(scope="module")
-def feedforward(laboratory: InProcessLaboratory) -> Findings:
-    return load_study("feedforward").conduct(laboratory)
+def feedforward(laboratory: InProcessLaboratory) -> StudyResult:
+    return load_study("feedforward").run(laboratory)
 
 
 @pytest.fixture(scope="module")
-def forward_inverse(tmp_path_factory: pytest.TempPathFactory) -> Findings:
+def forward_inverse(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
     laboratory = InProcessLaboratory(Path(tmp_path_factory.mktemp("studies")))
-    return load_study("forward_inverse").conduct(laboratory)
+    return load_study("forward_inverse").run(laboratory)
 
 
-def rows(findings: Findings, **wanted: object) -> list[dict[str, object]]:
+def rows(findings: StudyResult, **wanted: object) -> list[dict[str, object]]:
     """The rows of a table that have these cells; a column by the first word of its name."""
     whole = [dict(zip(findings.columns, row, strict=True)) for row in findings.rows]
     first = {column.split(" ")[0]: column for column in reversed(findings.columns)}
@@ -119,7 +119,7 @@ def test_the_order_of_an_error_is_its_power() -> None:
 
 @pytest.mark.parametrize("name", ["kuka", "humanoid"])
 def test_left_alone_the_torques_give_the_same_states_to_the_bit(
-    feedforward: Findings, name: str
+    feedforward: StudyResult, name: str
 ) -> None:
     opened, pushed = rows(feedforward, character=name, loop="open")
 
@@ -130,7 +130,7 @@ def test_left_alone_the_torques_give_the_same_states_to_the_bit(
 
 
 def test_pushed_the_arm_drifts_away_in_open_loop_and_comes_back_in_closed_loop(
-    feedforward: Findings,
+    feedforward: StudyResult,
 ) -> None:
     last = "in the last 0.5 s (rad)"
     alone, closed = rows(feedforward, character="kuka", loop="closed")
@@ -143,13 +143,13 @@ def test_pushed_the_arm_drifts_away_in_open_loop_and_comes_back_in_closed_loop(
     assert number(opened, last) > 100.0 * number(closed, last)
 
 
-def test_pushed_the_walk_falls_in_open_loop_alone(feedforward: Findings) -> None:
+def test_pushed_the_walk_falls_in_open_loop_alone(feedforward: StudyResult) -> None:
     fell = [row["fell"] for row in rows(feedforward, character="humanoid")]
 
     assert fell == [False, False, False, True]  # closed, open; pushed: closed, open
 
 
-def test_the_four_curves_are_one_until_the_push(feedforward: Findings) -> None:
+def test_the_four_curves_are_one_until_the_push(feedforward: StudyResult) -> None:
     for name in ("kuka", "humanoid"):
         columns, values = feedforward.curves[f"feedforward_{name}"]
         before = values[values[:, 0] <= 1.0]
@@ -159,7 +159,7 @@ def test_the_four_curves_are_one_until_the_push(feedforward: Findings) -> None:
 
 
 def test_the_study_draws_errors_and_poses(
-    feedforward: Findings, laboratory: InProcessLaboratory
+    feedforward: StudyResult, laboratory: InProcessLaboratory
 ) -> None:
     assert set(feedforward.figures) == {"feedforward_error", "feedforward_walk"}
     assert all(isinstance(figure, Figure) for figure in feedforward.figures.values())
@@ -170,7 +170,7 @@ def test_the_study_draws_errors_and_poses(
 
 
 def test_on_a_fixed_base_the_motion_comes_back_but_for_a_share_of_the_tick(
-    forward_inverse: Findings,
+    forward_inverse: StudyResult,
 ) -> None:
     arm = rows(forward_inverse, character="kuka")
     errors = [number(row, "joint error after 0.2 s (rad)") for row in arm]
@@ -181,7 +181,7 @@ def test_on_a_fixed_base_the_motion_comes_back_but_for_a_share_of_the_tick(
         assert slower / faster == pytest.approx(2.0, rel=0.05)
 
 
-def test_so_does_a_floating_base_with_the_roots_efforts(forward_inverse: Findings) -> None:
+def test_so_does_a_floating_base_with_the_roots_efforts(forward_inverse: StudyResult) -> None:
     walk = rows(forward_inverse, character="humanoid", root="fed forward")
 
     assert len(walk) == 3
@@ -190,14 +190,16 @@ def test_so_does_a_floating_base_with_the_roots_efforts(forward_inverse: Finding
     assert [row["fell"] for row in walk] == [False, False, False]
 
 
-def test_without_them_it_falls(forward_inverse: Findings) -> None:
+def test_without_them_it_falls(forward_inverse: StudyResult) -> None:
     (joints,) = rows(forward_inverse, character="humanoid", root="left out")
 
     assert joints["fell"] is True
     assert joints["ground"] == "yes"
 
 
-def test_the_force_that_no_joint_gives_is_the_weight_in_the_mean(forward_inverse: Findings) -> None:
+def test_the_force_that_no_joint_gives_is_the_weight_in_the_mean(
+    forward_inverse: StudyResult,
+) -> None:
     columns, values = forward_inverse.curves["forward_inverse_root"]
     cycle = (values[:, 0] >= 1.2667 / 12.0) & (values[:, 0] < 1.2667 * 13.0 / 12.0)
     weight = character("humanoid").mass * GRAVITY
@@ -207,7 +209,7 @@ def test_the_force_that_no_joint_gives_is_the_weight_in_the_mean(forward_inverse
     assert f"{weight:.0f} N upwards" in forward_inverse.notes[2]
 
 
-def test_the_weight_is_drawn_beside_the_force(forward_inverse: Findings) -> None:
+def test_the_weight_is_drawn_beside_the_force(forward_inverse: StudyResult) -> None:
     figure = forward_inverse.figures["forward_inverse_root"]
     (force, weight) = figure.axes[0].lines
 
@@ -222,7 +224,7 @@ def test_a_run_in_this_process_is_that_of_the_nodes_to_the_bit(domain: int, tmp_
     # Arrange
     del domain
     stamp_ns = TickClock(240).stamp_ns(30)
-    case = Case(
+    case = RunSpec(
         label="pushed",
         character="pendulum",
         duration=0.5,

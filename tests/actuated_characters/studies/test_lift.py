@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from actuated_characters.studies.catalogue import load_study
-from actuated_characters.studies.framework.study import Findings
+from actuated_characters.studies.framework.study import StudyResult
 from actuated_characters.studies.theory import second_order
 from actuated_characters.studies.theory.lift_responses import Gains, Response, find_bound
 from msgs_config.arrays import FloatArray
@@ -28,11 +28,11 @@ def laboratory(tmp_path_factory: pytest.TempPathFactory) -> InProcessLaboratory:
 
 
 @pytest.fixture(scope="module")
-def findings(laboratory: InProcessLaboratory) -> Findings:
-    return load_study("lift").conduct(laboratory)
+def findings(laboratory: InProcessLaboratory) -> StudyResult:
+    return load_study("lift").run(laboratory)
 
 
-def rows(findings: Findings) -> list[dict[str, object]]:
+def rows(findings: StudyResult) -> list[dict[str, object]]:
     return [dict(zip(findings.columns, row, strict=True)) for row in findings.rows]
 
 
@@ -157,7 +157,7 @@ def test_a_bound_is_found_between_the_stable_and_the_unstable() -> None:
 # The runs
 
 
-def test_every_row_is_what_theory_says(findings: Findings) -> None:
+def test_every_row_is_what_theory_says(findings: StudyResult) -> None:
     for row in rows(findings):
         stable, _, by_theory = str(row["stable / by theory"]).partition(" / ")
         assert stable == by_theory, row
@@ -172,7 +172,7 @@ def test_every_row_is_what_theory_says(findings: Findings) -> None:
             )
 
 
-def test_the_table_has_what_the_lecture_shows(findings: Findings) -> None:
+def test_the_table_has_what_the_lecture_shows(findings: StudyResult) -> None:
     by_gains = {
         (r["law"], r["kp (N/m)"], r["kd (N s/m)"], r["ki (N/(m s))"]): r for r in rows(findings)
     }
@@ -194,7 +194,7 @@ def test_the_table_has_what_the_lecture_shows(findings: Findings) -> None:
     ("law", "bound"), [("pd", (2 * math.sqrt(2) - 2) ** 2), ("stable_pd", 4.0)]
 )
 def test_the_bounds_are_found_within_five_percent(
-    findings: Findings, law: str, bound: float
+    findings: StudyResult, law: str, bound: float
 ) -> None:
     """For critical damping, in units of m / h^2; just below it is stable, just above it is not."""
     stiff = [r for r in rows(findings) if r["law"] == law and r["overshoot (%)"] is None]
@@ -206,7 +206,7 @@ def test_the_bounds_are_found_within_five_percent(
 
 
 def test_the_study_asks_for_as_many_runs_as_it_says_each_with_its_own_label(
-    findings: Findings, laboratory: InProcessLaboratory
+    findings: StudyResult, laboratory: InProcessLaboratory
 ) -> None:
     labels = [case.label for case in laboratory.cases]
 
@@ -215,7 +215,7 @@ def test_the_study_asks_for_as_many_runs_as_it_says_each_with_its_own_label(
     assert set(findings.figures) == {"lift_laws", "lift_error", "lift_stability"}
 
 
-def test_the_figures_draw_what_was_simulated(findings: Findings) -> None:
+def test_the_figures_draw_what_was_simulated(findings: StudyResult) -> None:
     figure = findings.figures["lift_error"]
     assert isinstance(figure, Figure)
     (axes,) = figure.axes

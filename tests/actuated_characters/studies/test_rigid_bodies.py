@@ -9,7 +9,7 @@ import pytest
 from actuated_characters.studies import joint_torque, rigid_body
 from actuated_characters.studies.catalogue import load_study
 from actuated_characters.studies.framework.bodies import HINGE, Box, momenta, write_box
-from actuated_characters.studies.framework.study import Findings
+from actuated_characters.studies.framework.study import StudyResult
 from actuated_characters.studies.theory.euler import (
     Load,
     Motion,
@@ -178,23 +178,23 @@ def test_forces_that_sum_to_zero_have_the_torque_about_any_point() -> None:
 
 
 @pytest.fixture(scope="module")
-def rigid(tmp_path_factory: pytest.TempPathFactory) -> Findings:
-    return load_study("rigid_body").conduct(InProcessLaboratory(tmp_path_factory.mktemp("rigid")))
+def rigid(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
+    return load_study("rigid_body").run(InProcessLaboratory(tmp_path_factory.mktemp("rigid")))
 
 
 @pytest.fixture(scope="module")
-def jointed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Findings, InProcessLaboratory]:
+def jointed(tmp_path_factory: pytest.TempPathFactory) -> tuple[StudyResult, InProcessLaboratory]:
     laboratory = InProcessLaboratory(tmp_path_factory.mktemp("jointed"))
-    return load_study("joint_torque").conduct(laboratory), laboratory
+    return load_study("joint_torque").run(laboratory), laboratory
 
 
-def column(findings: Findings, start_of_name: str) -> list[float]:
+def column(findings: StudyResult, start_of_name: str) -> list[float]:
     (index,) = [k for k, name in enumerate(findings.columns) if name.startswith(start_of_name)]
     cells = [row[index] for row in findings.rows]
     return [float("nan") if cell is None else float(cell) for cell in cells]
 
 
-def test_each_load_accelerates_a_box_as_newton_and_euler_say(rigid: Findings) -> None:
+def test_each_load_accelerates_a_box_as_newton_and_euler_say(rigid: StudyResult) -> None:
     assert max(column(rigid, "relative difference")) < 1e-9
     assert max(column(rigid, "Euler residual")) < 1e-9
     assert max(column(rigid, "P off")) < 1e-9
@@ -208,7 +208,7 @@ def test_each_load_accelerates_a_box_as_newton_and_euler_say(rigid: Findings) ->
     assert angular[long] == pytest.approx(0.3 / (6.0 / 12.0 * (1.2**2 + 0.15**2)))
 
 
-def test_the_turn_is_off_theory_by_the_step_alone(rigid: Findings) -> None:
+def test_the_turn_is_off_theory_by_the_step_alone(rigid: StudyResult) -> None:
     off = column(rigid, "turn off theory")
     *loaded, free, finer = off
 
@@ -218,7 +218,7 @@ def test_the_turn_is_off_theory_by_the_step_alone(rigid: Findings) -> None:
     assert drift / half == pytest.approx(2.0, rel=0.05)
 
 
-def test_a_box_spun_about_its_middle_axis_turns_over(rigid: Findings) -> None:
+def test_a_box_spun_about_its_middle_axis_turns_over(rigid: StudyResult) -> None:
     names, values = rigid.curves["rigid_body_spin"]
     curve = dict(zip(names, values.T, strict=True))
     about_middle = curve["angular_velocity_y_rad_s"]
@@ -229,7 +229,7 @@ def test_a_box_spun_about_its_middle_axis_turns_over(rigid: Findings) -> None:
 
 
 def test_forces_between_two_bodies_do_what_the_joint_torque_does(
-    jointed: tuple[Findings, InProcessLaboratory],
+    jointed: tuple[StudyResult, InProcessLaboratory],
 ) -> None:
     findings, laboratory = jointed
     names, values = findings.curves["joint_torque_hinge"]
@@ -250,7 +250,7 @@ def test_forces_between_two_bodies_do_what_the_joint_torque_does(
 
 @pytest.mark.parametrize("pair", [0, 1, 2])
 def test_without_one_of_the_pairs_the_motion_is_another(
-    jointed: tuple[Findings, InProcessLaboratory], pair: int
+    jointed: tuple[StudyResult, InProcessLaboratory], pair: int
 ) -> None:
     # Arrange
     findings, laboratory = jointed
@@ -268,7 +268,7 @@ def test_without_one_of_the_pairs_the_motion_is_another(
 
 
 def test_a_joint_torque_changes_no_momentum_and_a_root_force_does(
-    jointed: tuple[Findings, InProcessLaboratory],
+    jointed: tuple[StudyResult, InProcessLaboratory],
 ) -> None:
     findings, _ = jointed
     coarse, fine, _, root, _ = range(len(findings.rows))

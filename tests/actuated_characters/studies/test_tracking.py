@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.studies import assistance, clips, delay, gains
-from actuated_characters.studies.framework.study import Case, Cell, Findings, Outcome
+from actuated_characters.studies.framework.study import Cell, RunResult, RunSpec, StudyResult
 from actuated_characters.studies.framework.tracking import (
     delayed_spectral_radius,
     errors_by_joint,
@@ -226,7 +226,7 @@ def test_clearances_are_the_engines_distances_to_the_ground() -> None:
 # What the lecture expects of runs
 
 
-def by_key(findings: Findings, keys: int) -> Mapping[tuple[Cell, ...], dict[str, Cell]]:
+def by_key(findings: StudyResult, keys: int) -> Mapping[tuple[Cell, ...], dict[str, Cell]]:
     """The table's rows by their first cells, each by the names of its columns."""
     return {
         tuple(row[:keys]): dict(zip(findings.columns, row, strict=True)) for row in findings.rows
@@ -243,7 +243,7 @@ def test_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gains, "_PICTURES", 1)
     laboratory = InProcessLaboratory(tmp_path)
 
-    findings = gains.STUDY.conduct(laboratory)
+    findings = gains.STUDY.run(laboratory)
 
     table = by_key(findings, 2)
     error, late, theory = "joint error (rad)", "knee lag (ms)", "by theory (ms)"
@@ -268,7 +268,7 @@ def test_delay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(delay, "_RATES", (240, 960))
     monkeypatch.setattr(delay, "_DELAYS", (0, 1, 4))
 
-    findings = delay.STUDY.conduct(InProcessLaboratory(tmp_path))
+    findings = delay.STUDY.run(InProcessLaboratory(tmp_path))
 
     table = by_key(findings, 2)
     error, growth = "mean joint error (rad)", "growth a tick by theory"
@@ -287,7 +287,7 @@ def test_assistance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(assistance, "_PICTURES", 1)
     laboratory = InProcessLaboratory(tmp_path)
 
-    findings = assistance.STUDY.conduct(laboratory)
+    findings = assistance.STUDY.run(laboratory)
 
     table = by_key(findings, 1)
     falls, force = "falls at (s)", "root force / weight until then"
@@ -319,7 +319,7 @@ def test_clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clips, "_PICTURES", 1)
     monkeypatch.setattr(clips, "available_clips", lambda _: ["crawl", "kick", "walk"])
 
-    findings = clips.STUDY.conduct(InProcessLaboratory(tmp_path))
+    findings = clips.STUDY.run(InProcessLaboratory(tmp_path))
 
     table = by_key(findings, 1)
     for row in table.values():
@@ -337,7 +337,7 @@ def test_a_clip_without_assistance_is_told_to_fall(
     laboratory = InProcessLaboratory(tmp_path)
     run = laboratory.run
 
-    def unassisted(case: Case) -> Outcome:
+    def unassisted(case: RunSpec) -> RunResult:
         return run(replace(case, duration=1.5, controller={"root_assistance": False}))
 
     monkeypatch.setattr(laboratory, "run", unassisted)

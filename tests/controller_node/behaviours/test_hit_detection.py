@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller_node.behaviours.bounding_spheres import Hull
+from controller_node.behaviours.bounding_spheres import BoundingSpheres
 from controller_node.behaviours.hit_detection import HitDetector, beyond_cone
 from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
@@ -14,7 +14,7 @@ from msgs_config.character.layout import ROOT
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from tests.support.physics import LoneSimulation, run_together
-from tests.support.struck import HUMANOID, LINKS, RATE_HZ, Throw, driver, run
+from tests.support.struck import HUMANOID, LINKS, RATE_HZ, ProjectileThrow, driver, run
 
 THRESHOLD = 3.0  # N s, the default
 CHEST = LINKS.index("chest")
@@ -55,7 +55,7 @@ def clip_run(clip: str) -> LoneSimulation:
             "initial_velocity": start.velocity.tolist(),
         },
     )
-    role = for_simulator.make_role(HUMANOID, values)
+    role = for_simulator.make_character_setup(HUMANOID, values)
     simulation = LoneSimulation(role, for_simulator.make_settings(values))
     simulation.watches_contacts = True
     return simulation
@@ -84,7 +84,9 @@ def test_no_clip_hits_itself(clip: str) -> None:
 def test_a_ball_is_detected_with_the_momentum_that_it_loses(direction: float) -> None:
     # Arrange, Act: nothing but the ball touches anything above the feet
     mass, speed = 0.5, 10.0
-    struck = run({"clip": "walk"}, 60, (Throw(speed, 40, direction=direction),), mass=mass)
+    struck = run(
+        {"clip": "walk"}, 60, (ProjectileThrow(speed, 40, direction=direction),), mass=mass
+    )
 
     # Assert
     watch = Watch()
@@ -154,7 +156,7 @@ def test_beyond_the_cone_is_the_shortest_way_out_of_it(force: FloatArray) -> Non
 
 def test_the_spheres_of_a_standing_humanoid_reach_from_its_soles_to_its_head() -> None:
     MODEL.update(STANDING, np.zeros(HUMANOID.layout.size))
-    hull = Hull(HUMANOID)
+    hull = BoundingSpheres(HUMANOID)
     lowest = hull.lowest(hull.centres(*MODEL.link_poses()))
 
     feet = [LINKS.index(foot) for foot in HUMANOID.feet]

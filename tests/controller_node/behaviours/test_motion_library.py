@@ -9,7 +9,7 @@ import pytest
 from controller_node.behaviours.motion_library import MotionLibrary, Window
 from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import read_clip
-from controller_node.references.transformed import Carry
+from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
@@ -25,12 +25,12 @@ LIBRARY = MotionLibrary(HUMANOID, CLIPS, LASTING)
 SEEN_FROM_BELOW = np.array((1.0, 1.0, 0.0))
 
 
-def window(clip: str, time: float, carry: Carry | None = None) -> Window:
+def window(clip: str, time: float, carry: PlanarTransform | None = None) -> Window:
     """A window of a clip, from the engine of the dynamics, and from anywhere on the ground."""
     reference, model = ClipReference(LAYOUT, read_clip(HUMANOID, clip)), DynamicsModel(HUMANOID)
     origins, turns, root = [], [], None
     for number in range(SAMPLES):
-        state = (carry or Carry()).moved(LAYOUT, reference.sample(time + number / RATE))
+        state = (carry or PlanarTransform()).moved(LAYOUT, reference.sample(time + number / RATE))
         root = state.configuration.position[:3] if root is None else root
         model.update(state.configuration.position, state.velocity)
         places, axes = model.link_poses()
@@ -83,7 +83,7 @@ def distance(one: Window, other: Window) -> tuple[float, float]:
 
 
 def test_the_distance_is_that_of_its_definition() -> None:
-    ours = window("walk", 0.31, Carry(2.0, 1.0, -3.0))
+    ours = window("walk", 0.31, PlanarTransform(2.0, 1.0, -3.0))
     distances, turns = LIBRARY.distances(ours)
 
     compared = {"walk": 0.5, "kick": 0.7, "getup_facedown": 0.3}
@@ -97,7 +97,7 @@ def test_the_distance_is_that_of_its_definition() -> None:
 
 @pytest.mark.parametrize(("clip", "time"), [("walk", 0.4), ("getup_facedown", 1.0)])
 def test_a_moment_is_found_again_wherever_it_happens(clip: str, time: float) -> None:
-    match = LIBRARY.nearest(window(clip, time, Carry(-1.1, 4.0, 2.0)))
+    match = LIBRARY.nearest(window(clip, time, PlanarTransform(-1.1, 4.0, 2.0)))
 
     assert (match.clip, match.time) == (clip, pytest.approx(time))
     assert match.distance == pytest.approx(0.0, abs=1e-5)

@@ -9,13 +9,13 @@ import pytest
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.behaviours.base import Mode, ModeReport
-from controller_node.behaviours.compliance import GiveWay, softened
+from controller_node.behaviours.compliance import ComplianceProfile, softened
 from controller_node.controller import Controller
-from controller_node.laws import GainArrays, Instant
+from controller_node.laws import GainArrays, TrackingInput
 from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import read_clip
 from controller_node.references.trajectory import points_of_lists
-from controller_node.references.transformed import Carry
+from controller_node.references.transformed import PlanarTransform
 from controller_node.strength import strengths_of
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -23,7 +23,7 @@ from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from tests.support.physics import controller
-from tests.support.struck import HUMANOID, LINKS, RATE_HZ, Run, Throw, driver, run
+from tests.support.struck import HUMANOID, LINKS, RATE_HZ, ProjectileThrow, Run, driver, run
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
@@ -39,7 +39,7 @@ SECONDS = 3.3  # until who was hit a bit tracks again
 @lru_cache
 def walk(impulse: float, behaviour: str = "reactive", seconds: float = SECONDS) -> Run:
     """A walk with a ball of so many N s that is thrown against the chest."""
-    throw = Throw(SPEED, HIT, direction=FROM_FRONT)
+    throw = ProjectileThrow(SPEED, HIT, direction=FROM_FRONT)
     given = {"clip": "walk", "behaviour": behaviour}
     return run(given, round(seconds * RATE_HZ), (throw,), mass=impulse / SPEED)
 
@@ -200,7 +200,7 @@ def test_one_hit_has_one_reaction_however_short(duration: float, impulse: float)
     given = {"clip": "walk", "behaviour": "reactive", "react.duration": duration}
     if impulse > 10.0:
         given["limp.threshold"] = 1e4  # of which it is a slight one
-    throw = Throw(SPEED, 240, direction=FROM_FRONT)
+    throw = ProjectileThrow(SPEED, 240, direction=FROM_FRONT)
 
     whole = run(given, 300, (throw,), mass=impulse / SPEED)
 
@@ -225,7 +225,7 @@ def test_the_same_again_is_the_same_to_the_bit() -> None:
     again = run(
         {"clip": "walk", "behaviour": "reactive"},
         3 * RATE_HZ,
-        (Throw(SPEED, HIT, direction=FROM_FRONT),),
+        (ProjectileThrow(SPEED, HIT, direction=FROM_FRONT),),
         mass=2.0,
     )
 
@@ -261,7 +261,7 @@ def recovers(seed: int, behaviour: str, **given: object) -> Run:
     return run(
         {"clip": "walk", "behaviour": behaviour, **given},
         tick + 8 * RATE_HZ,
-        (Throw(SPEED, tick, direction=direction),),
+        (ProjectileThrow(SPEED, tick, direction=direction),),
         mass=mass,
         is_over=is_back,
     )
@@ -317,7 +317,7 @@ def test_with_a_planner_it_falls_lies_and_begins_to_rise_by_its_joints_alone() -
     whole = run(
         {"clip": "walk", "behaviour": "active_ragdoll", "planner": "predictive", **few},
         8 * RATE_HZ,
-        (Throw(SPEED, 60, direction=FROM_FRONT),),
+        (ProjectileThrow(SPEED, 60, direction=FROM_FRONT),),
         mass=6.0,
         is_over=rises,
     )
@@ -349,7 +349,7 @@ def test_a_trajectory_leads_from_where_it_got_up_to_where_it_says() -> None:
     control, episode_ns = driver({"behaviour": "reactive"}), CLOCK.stamp_ns(1)
     nothing = np.zeros((len(LINKS), 6))
     control.answer(states_at(control, 1, first=True), episode_ns, nothing)
-    control._behaviour.carry = Carry(1.0, 3.0, -2.0)
+    control._behaviour.carry = PlanarTransform(1.0, 3.0, -2.0)
     _, carried = control.answer(states_at(control, 2), episode_ns, nothing)
     goal = np.array(HUMANOID.rest_position)
     goal[:2] = 7.0, 0.0
@@ -381,7 +381,7 @@ def test_strengths_and_gains_of_zero_count_while_it_gives_way() -> None:
     used: list[GainArrays] = []
     law = control._effort
 
-    def watched(instant: Instant, gains: GainArrays) -> FloatArray:
+    def watched(instant: TrackingInput, gains: GainArrays) -> FloatArray:
         used.append(gains)
         return law(instant, gains)
 
@@ -390,7 +390,7 @@ def test_strengths_and_gains_of_zero_count_while_it_gives_way() -> None:
     hit[LINKS.index("neck"), 0] = 2000.0
 
     # Act
-    control.weaken(taken, episode_ns=episode_ns)
+    control.set_strengths(taken, episode_ns=episode_ns)
     control.answer(states_at(control, 1, first=True), episode_ns, 0.0 * hit)
     control.answer(states_at(control, 2), episode_ns, hit)
 
@@ -410,7 +410,7 @@ def test_a_joint_without_gains_does_not_count_in_their_mean() -> None:
     off = {"gains.left_knee.p": 0.0, "gains.left_knee.d": 0.0}
     gains, ones = driver(off).settings.gains, np.ones(len(LAYOUT.vector_starts))
 
-    scaled = GiveWay(HUMANOID, np.diag(model.mass_matrix())).gains(gains, ones, 1.0, 1.0)
+    scaled = ComplianceProfile(HUMANOID, np.diag(model.mass_matrix())).gains(gains, ones, 1.0, 1.0)
 
     heads = [joint.start for joint in LAYOUT.joints[1:] if joint.name != "left_knee"]
     assert scaled.stiffness[LAYOUT.joint("left_knee").start] == 0.0
@@ -427,7 +427,7 @@ def test_gains_by_inertia_keep_their_mean_and_make_all_joints_swing_alike() -> N
 
     # Act
     strengths = np.ones(len(LAYOUT.vector_starts))
-    scaled = GiveWay(HUMANOID, diagonal).gains(gains, strengths, 88.0, 77.0)
+    scaled = ComplianceProfile(HUMANOID, diagonal).gains(gains, strengths, 88.0, 77.0)
 
     # Assert: stiffness over inertia, the square of a frequency, is that of all
     squares = [scaled.stiffness[j.start] / diagonal[j.entries].mean() for j in joints]

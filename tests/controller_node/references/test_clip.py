@@ -15,7 +15,7 @@ from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import available_clips, read_clip
 from controller_node.references.hold import HoldReference
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration
+from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 from tests.support.physics import character, link_poses, still_world
@@ -521,6 +521,6 @@ def test_a_hold_is_the_rest_pose_at_rest_for_ever(name: str) -> None:
     for time in (0.0, 0.5, 1e6):
         state = reference.sample(time)
 
-        assert isinstance(state.configuration, Configuration)
+        assert isinstance(state.configuration, GeneralizedPosition)
         np.testing.assert_array_equal(state.configuration.position, whole.rest_position)
         np.testing.assert_array_equal(state.velocity, np.zeros(whole.layout.size))

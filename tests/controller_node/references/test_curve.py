@@ -9,7 +9,7 @@ from numpy.polynomial import Polynomial
 from controller_node.references.base import ReferenceState
 from controller_node.references.curve import Curve, Knots
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.geometry import rotations
 from tests.support.motion import (
     FLOATING,
@@ -47,7 +47,7 @@ def times_within(count: int = 40) -> FloatArray:
 def at_knot(layout: JointLayout, knots: Knots, number: int) -> ReferenceState:
     whole = knots.configurations
     still = np.zeros(layout.size)
-    place = Configuration(whole.position[number], whole.orientations_xyzw[number])
+    place = GeneralizedPosition(whole.position[number], whole.orientations_xyzw[number])
     return ReferenceState(place, still, still)
 
 
@@ -131,7 +131,9 @@ def test_a_turn_about_one_axis_is_that_of_a_hinge(name: str, angle: float) -> No
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     turned = rotations.multiply(rest.orientations_xyzw, rotations.exp(angle * axes))
     still = np.zeros((2, layout.size))
-    ends = Configuration(np.tile(rest.position, (2, 1)), np.array([rest.orientations_xyzw, turned]))
+    ends = GeneralizedPosition(
+        np.tile(rest.position, (2, 1)), np.array([rest.orientations_xyzw, turned])
+    )
     curve = Curve(layout, Knots(np.array([0.0, 2.0]), ends, still, still))
     rest_to_rest = angle * Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 
@@ -210,7 +212,7 @@ def test_parts_of_different_degrees_join(name: str) -> None:
         assert knots.velocities is not None and knots.accelerations is not None
         return Knots(
             TIMES[rows],
-            Configuration(whole_knots.position[rows], whole_knots.orientations_xyzw[rows]),
+            GeneralizedPosition(whole_knots.position[rows], whole_knots.orientations_xyzw[rows]),
             knots.velocities[rows],
             knots.accelerations[rows],
         )

@@ -11,7 +11,7 @@ from controller_node.references.curve import Curve
 from controller_node.references.files.clip import read_clip
 from controller_node.references.hold import HoldReference
 from controller_node.references.inertialised import InertialisedReference
-from controller_node.references.transformed import Carry, MovedReference
+from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from tests.support.motion import (
@@ -25,7 +25,7 @@ from tests.support.motion import (
 from tests.support.physics import character, character_id
 
 START, DURATION = 0.7, 0.4  # s
-CARRY = Carry(turn=2.1, x=0.4, y=-1.7)
+CARRY = PlanarTransform(turn=2.1, x=0.4, y=-1.7)
 
 every_moved = pytest.mark.parametrize("name", MOVED, ids=character_id)
 every_floating = pytest.mark.parametrize("name", FLOATING, ids=character_id)
@@ -92,7 +92,7 @@ def test_from_rest_to_rest_the_offset_is_the_quintic() -> None:
 @every_floating
 def test_a_carried_motion_moves_as_it_says(name: str) -> None:
     whole, layout = loaded(name)
-    moved = MovedReference(layout, moving(whole, 5), CARRY, start=START, motion_start=0.2)
+    moved = TransformedReference(layout, moving(whole, 5), CARRY, start=START, motion_start=0.2)
 
     assert_moves_as_it_says(layout, moved.sample, [START + 0.1, START + 0.9])
 
@@ -101,7 +101,7 @@ def test_a_carried_motion_moves_as_it_says(name: str) -> None:
 def test_a_carried_motion_is_turned_and_shifted_and_begins_in_its_middle(name: str) -> None:
     whole, layout = loaded(name)
     motion = moving(whole, 5)
-    moved = MovedReference(layout, motion, CARRY, start=START, motion_start=0.2)
+    moved = TransformedReference(layout, motion, CARRY, start=START, motion_start=0.2)
 
     there, here = motion.sample(0.5), moved.sample(START + 0.3)
 
@@ -120,7 +120,7 @@ def test_a_carried_motion_is_turned_and_shifted_and_begins_in_its_middle(name: s
 
 def test_what_leads_from_one_place_and_heading_to_another_does_so() -> None:
     here, there = np.array([1.0, 2.0, 0.9]), np.array([-3.0, 0.5, 0.1])
-    carry = Carry.leading(here, 3.0, there, -3.0)
+    carry = PlanarTransform.leading(here, 3.0, there, -3.0)
 
     assert carry.turn == pytest.approx(math.tau - 6.0)  # the shorter way round
     place = complex(1.0, 2.0) * np.exp(1j * carry.turn) + complex(carry.x, carry.y)
@@ -130,7 +130,7 @@ def test_what_leads_from_one_place_and_heading_to_another_does_so() -> None:
 def test_no_carry_changes_no_bit() -> None:
     humanoid = character("humanoid")
     motion = ClipReference(humanoid.layout, read_clip(humanoid, "walk"))
-    moved = MovedReference(humanoid.layout, motion)
+    moved = TransformedReference(humanoid.layout, motion)
 
     for time in (0.0, 0.31, 2.7):
         one, other = motion.sample(time), moved.sample(time)

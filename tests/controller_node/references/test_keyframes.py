@@ -14,7 +14,7 @@ from controller_node.references.base import ReferenceState
 from controller_node.references.files.keyframes import read_keyframes
 from controller_node.references.keyframes import Keyframes, KeyframesReference
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import Configuration, JointLayout
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character, Placement
 from msgs_config.errors import MotionError
 from msgs_config.geometry import rotations
@@ -43,7 +43,7 @@ def random_keyframes(whole: Character, smooth: bool, period: float | None) -> Ke
 
 def still_at(layout: JointLayout, keyframes: Keyframes, number: int) -> ReferenceState:
     whole, still = keyframes.configurations, np.zeros(layout.size)
-    place = Configuration(whole.position[number], whole.orientations_xyzw[number])
+    place = GeneralizedPosition(whole.position[number], whole.orientations_xyzw[number])
     return ReferenceState(place, still, still)
 
 

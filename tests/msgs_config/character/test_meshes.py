@@ -14,7 +14,7 @@ from msgs_config.character import meshes
 from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
 from msgs_config.character.file import read_character_file, shipped_characters
 from msgs_config.character.loading import load_character
-from msgs_config.character.model import Loading
+from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 
 CUBE = Path(pybullet_data.getDataPath()) / "cube.obj"
@@ -219,7 +219,7 @@ def test_a_mesh_that_is_only_seen_may_be_of_any_type(write: WriteRobot, tmp_path
 # What the engine is given is the URDF
 
 
-def inertias(loading: Loading, path: Path) -> list[object]:
+def inertias(loading: UrdfOptions, path: Path) -> list[object]:
     """All numbers that the engine has of a body's links and joints."""
     client = connect()
     flags = pybullet.URDF_USE_INERTIA_FROM_FILE if loading.inertia_from_file else 0

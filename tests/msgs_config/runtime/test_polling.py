@@ -8,7 +8,7 @@ from std_msgs.msg import String
 
 from msgs_config.messages.joint_state import decode
 from msgs_config.messages.topics import Topic
-from msgs_config.runtime.polling import DirectSubscription, Spinner
+from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from tests.support.ros import wait_until
 
 DEPTH = 5
@@ -22,7 +22,7 @@ def test_of_more_than_it_keeps_the_oldest_go_and_that_is_said_once(
     topic = Topic("flood", String, QoSProfile(depth=depth))
     speaker, listener = (Node(name, context=context) for name in ("speaker", "listener"))
     publisher = speaker.create_publisher(String, "flood", QoSProfile(depth=100))
-    subscription, spinner = DirectSubscription(listener, topic), Spinner(listener)
+    subscription, spinner = DirectSubscription(listener, topic), PollingExecutor(listener)
     try:
         wait_until(publisher.get_subscription_count, "a listener", step=spinner.serve_pending)
 

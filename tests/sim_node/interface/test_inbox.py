@@ -19,7 +19,7 @@ from msgs_config.character.layout import ROOT, JointLayout
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import character, controller, simulation
 from tests.support.ros import (
     LOG_LINES,
@@ -211,7 +211,9 @@ def test_no_bytes_on_the_topic_of_pushes_push_anything_but_pushes(
         for tick in range(2, tick_of(state) + 1):
             message = pushes.get(tick, MultiDOFJointState())
             acts = [
-                Push(rows[link], np.array(_numbers(one)[:6]), np.array(_numbers(one)[6:]), tick, 1)
+                ExternalWrench(
+                    rows[link], np.array(_numbers(one)[:6]), np.array(_numbers(one)[6:]), tick, 1
+                )
                 for link, one in _each(message)
             ]
             expected = run.advance(np.zeros(run.layout.size), *acts)

@@ -11,7 +11,7 @@ from msgs_config.character.layout import ROOT
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import simulation
 from tests.support.ros import Processes, SimulatorClient, stamp_ns, tick_of, wrench_message
 
@@ -190,7 +190,7 @@ def test_the_last_of_steps_is_answered_where_the_run_ends_with_it(
 
 
 def expected_states(
-    first_tick: int, ticks: int, seed: int, *pushes: Push, **parameters: object
+    first_tick: int, ticks: int, seed: int, *pushes: ExternalWrench, **parameters: object
 ) -> list[StampedState]:
     """The states of a fresh simulation of the humanoid under the client's random commands."""
     rng = np.random.default_rng(seed)

@@ -13,7 +13,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.projectiles import decode_balls
-from msgs_config.messages.throw import NUMBERS, Throw, natural_radius
+from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius
 from sim_node.physics.throws import MOST_BALLS
 from tests.support.physics import character, joint_simulation, simulation
 from tests.support.ros import (
@@ -27,11 +27,11 @@ from tests.support.ros import (
 )
 
 CLOCK = TickClock(240)
-AT_CHEST = Throw(2.0, 0.1, (0.4, 0.02, 1.2), (-8.0, 0.0, 1.0))
-FAR = Throw(3.0, natural_radius(3.0), (5.0, 5.0, 0.4), (1.0, 0.0, 0.0))
+AT_CHEST = ProjectileThrow(2.0, 0.1, (0.4, 0.02, 1.2), (-8.0, 0.0, 1.0))
+FAR = ProjectileThrow(3.0, natural_radius(3.0), (5.0, 5.0, 0.4), (1.0, 0.0, 0.0))
 
 
-def throw_message(stamp: int, throw: Throw) -> JointState:
+def throw_message(stamp: int, throw: ProjectileThrow) -> JointState:
     """A throw, stamped in ns."""
     return joint_state(stamp, NUMBERS, throw.numbers().tolist())
 
@@ -155,7 +155,7 @@ def test_a_ball_is_felt_like_any_other_contact_and_a_reset_removes_it(
     processes.simulator("humanoid", gravity=0.0, terrain="none", wait_for_subscribers=1)
     state = client.first_state()
     above = float(state.position[2]) + 0.2
-    ball = Throw(2.0, 0.1, (0.4, 0.0, above), (-8.0, 0.0, 0.0))
+    ball = ProjectileThrow(2.0, 0.1, (0.4, 0.0, above), (-8.0, 0.0, 0.0))
     send(client, throws, throw_message(0, ball))
     pushed: list[MultiDOFJointState] = []
 

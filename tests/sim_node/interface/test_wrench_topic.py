@@ -10,7 +10,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import DATA, character, simulation
 from tests.support.ros import Inbox, Processes, SimulatorClient, tick_of, wrench_message
 
@@ -42,7 +42,11 @@ def row_of(name: str, link: str) -> int:
 
 
 def assert_as_without_ros(
-    client: SimulatorClient, name: str, ticks: int, pushes: Sequence[Push], **parameters: object
+    client: SimulatorClient,
+    name: str,
+    ticks: int,
+    pushes: Sequence[ExternalWrench],
+    **parameters: object,
 ) -> None:
     """The first states are, to the bit, those of a simulation without ROS that is pushed alike."""
     messages = client.states.by_tick()
@@ -85,7 +89,9 @@ def test_a_push_without_a_stamp_acts_from_the_next_tick_and_is_held_for_its_dura
     assert pushed == {
         tick: [expected] if first <= tick < first + 3 else [] for tick in range(1, 21)
     }
-    acts = Push(row_of("humanoid", "chest"), np.array(push), np.array(expected[2]), first - 1, 3)
+    acts = ExternalWrench(
+        row_of("humanoid", "chest"), np.array(push), np.array(expected[2]), first - 1, 3
+    )
     assert_as_without_ros(client, "humanoid", 19, [acts])
 
 
@@ -105,7 +111,7 @@ def test_a_push_with_a_future_stamp_acts_from_exactly_that_tick(
 
     assert [tick for tick, content in pushed.items() if content] == [16, 17, 18]
     centre = np.array(centre_of("pendulum", link))
-    acts = Push(row_of("pendulum", link), np.array(push), centre, 15, 3)
+    acts = ExternalWrench(row_of("pendulum", link), np.array(push), centre, 15, 3)
     assert_as_without_ros(client, "pendulum", 24, [acts])
 
 
@@ -157,7 +163,7 @@ def test_several_links_are_pushed_at_once_where_the_message_says(
     ]
     assert [pushed[tick] for tick in (12, 13, 14, 15, 16)] == [[], *[expected] * 3, []]
     acts = [
-        Push(row_of("humanoid", link), wrench, point, 12, 3)
+        ExternalWrench(row_of("humanoid", link), wrench, point, 12, 3)
         for link, wrench, point in zip(links, wrenches, points, strict=True)
     ]
     assert_as_without_ros(client, "humanoid", 29, acts)

@@ -9,7 +9,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import pybullet
 from msgs_config.errors import SimulationError
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import LoneSimulation, character, joint_simulation, simulation
 
 HUMANOID = character("humanoid").layout
@@ -24,9 +24,9 @@ def humanoid_efforts(ticks: int, size: float, seed: int = 1) -> list[FloatArray]
     return [size * motors * rng.normal(size=HUMANOID.size) for _ in range(ticks)]
 
 
-def a_push(link: str, *force: float) -> Push:
+def a_push(link: str, *force: float) -> ExternalWrench:
     """A push at a link's origin."""
-    return Push(LINKS.index(link), np.array([*force, 0.0, 0.0, 0.0]), np.zeros(3), 1, 1)
+    return ExternalWrench(LINKS.index(link), np.array([*force, 0.0, 0.0, 0.0]), np.zeros(3), 1, 1)
 
 
 SETTINGS = [

@@ -16,11 +16,11 @@ from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.bullet import pybullet
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
-from msgs_config.character.model import Character, Loading
+from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.geometry import rotations
 from sim_node.physics.body import Body
 from sim_node.physics.world import World, WorldSettings
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import (
     EVERY_CHARACTER,
     INSTANT,
@@ -152,9 +152,9 @@ def generalised_force(
     return result
 
 
-def as_push(row: int, force: FloatArray, torque: FloatArray, point: FloatArray) -> Push:
+def as_push(row: int, force: FloatArray, torque: FloatArray, point: FloatArray) -> ExternalWrench:
     """A push of one tick."""
-    return Push(row, np.concatenate((force, torque)), point, first_tick=1, ticks=1)
+    return ExternalWrench(row, np.concatenate((force, torque)), point, first_tick=1, ticks=1)
 
 
 @dataclass
@@ -411,7 +411,7 @@ def test_a_slope_carries_the_weight_too_by_pressure_and_friction(
 ) -> None:
     # Arrange
     text = SLOPE_URDF.format(roll=roll, pitch=pitch)
-    terrain = Loading(tmp_path / "slope.urdf", text, fixed_base=True)
+    terrain = UrdfOptions(tmp_path / "slope.urdf", text, fixed_base=True)
     settings = WorldSettings(friction=2.0, link_friction=1.0, ground=False, terrain=terrain)
     start = at_height(0.62)
     turn = rotations.multiply(

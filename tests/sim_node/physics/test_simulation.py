@@ -8,7 +8,7 @@ import pytest
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT
 from msgs_config.errors import ConfigurationError, LayoutError, SimulationError
-from sim_node.physics.wrenches import Push
+from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import LoneSimulation, character, momentum, simulation
 
 HUMANOID = character("humanoid").layout
@@ -257,9 +257,11 @@ def test_a_delayed_run_is_the_run_of_the_commands_moved_by_the_delay() -> None:
 # --- pushes --------------------------------------------------------------------------------------
 
 
-def a_push(link: str, force: tuple[float, float, float], ticks: int = 1) -> Push:
+def a_push(link: str, force: tuple[float, float, float], ticks: int = 1) -> ExternalWrench:
     """A push at a link's origin, from the first tick on."""
-    return Push(LINKS.index(link), np.array([*force, 0.0, 0.0, 0.0]), np.zeros(3), 1, ticks)
+    return ExternalWrench(
+        LINKS.index(link), np.array([*force, 0.0, 0.0, 0.0]), np.zeros(3), 1, ticks
+    )
 
 
 @pytest.mark.parametrize("substeps", [1, 4])

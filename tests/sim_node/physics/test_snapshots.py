@@ -9,7 +9,7 @@ import pytest
 from actuated_characters.runs.plan import Plan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
-from sim_node.parameters import make_role, make_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 
 TICKS = 36
@@ -39,7 +39,9 @@ def simulation(plan: Plan) -> Iterator[Simulation]:
 
 
 def fresh(plan: Plan) -> Simulation:
-    return Simulation([make_role(plan.character, plan.simulator)], make_settings(plan.simulator))
+    return Simulation(
+        [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
+    )
 
 
 def advance(plan: Plan, simulation: Simulation, ticks: int, noise: float = 0.0) -> FloatArray:
@@ -86,7 +88,7 @@ def test_another_simulation_goes_on_from_a_snapshot(
 
     with fresh(plan) as other:
         advance(plan, other, 20 if dirty else 0, noise=1.0)
-        other.take_over(snapshot)
+        other.load_snapshot(snapshot)
 
         assert other.tick == 91
         assert advance(plan, other, TICKS).tobytes() == followed.tobytes()

@@ -13,11 +13,11 @@ from actuated_characters.runs.plan import Plan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import CommandError, ConfigurationError
-from msgs_config.messages.throw import NUMBERS, Throw, natural_radius, throw_of
+from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius, throw_of
 from msgs_config.parameters import Values
-from sim_node.parameters import make_role, make_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import MOST_BALLS, ThrowSchedule
+from sim_node.physics.throws import MOST_BALLS, ThrowQueue
 from sim_node.physics.world import WorldSettings
 from tests.support.physics import DATA, LoneWorld, character, joint_simulation, momentum, simulation
 
@@ -25,11 +25,11 @@ FREE_BOX = str(DATA / "free_box.yaml")
 RATE = 240
 STEP = 1.0 / RATE
 WEIGHTLESS = {"gravity": 0.0, "terrain": "none"}
-AT_CHEST = Throw(2.0, 0.1, (2.3, 0.02, 1.2), (-8.0, 0.0, 1.0))
-FAR = Throw(3.0, 0.1, (5.0, 5.0, 0.4), (1.0, 0.0, 0.0))  # falls, and rolls on the ground
+AT_CHEST = ProjectileThrow(2.0, 0.1, (2.3, 0.02, 1.2), (-8.0, 0.0, 1.0))
+FAR = ProjectileThrow(3.0, 0.1, (5.0, 5.0, 0.4), (1.0, 0.0, 0.0))  # falls, and rolls on the ground
 
 
-def ball_momentum(throw: Throw, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+def ball_momentum(throw: ProjectileThrow, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Linear (N s) and angular momentum (N m s, about the world's origin) of a solid ball."""
     centre, velocity, turning = motion[:3], motion[7:10], motion[10:]
     linear = throw.mass * velocity
@@ -37,7 +37,7 @@ def ball_momentum(throw: Throw, motion: FloatArray) -> tuple[FloatArray, FloatAr
     return linear, np.cross(centre, linear) + inertia * turning
 
 
-def as_thrown(throw: Throw) -> FloatArray:
+def as_thrown(throw: ProjectileThrow) -> FloatArray:
     """Its motion (13,) when it is let go."""
     return np.array((*throw.position, 0.0, 0.0, 0.0, 1.0, *throw.velocity, 0.0, 0.0, 0.0))
 
@@ -74,14 +74,16 @@ def walk() -> Plan:
 
 
 def fresh(plan: Plan) -> Simulation:
-    return Simulation([make_role(plan.character, plan.simulator)], make_settings(plan.simulator))
+    return Simulation(
+        [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
+    )
 
 
 def walked(
     plan: Plan,
     simulation: Simulation,
     ticks: int,
-    throws: Mapping[int, Sequence[Throw]] | None = None,
+    throws: Mapping[int, Sequence[ProjectileThrow]] | None = None,
 ) -> tuple[list[FloatArray], list[bool]]:
     """States (2 n + 13 m,), with those of the balls; whether a ball touched in each tick."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
@@ -108,7 +110,7 @@ def _a_ball_touches(simulation: Simulation) -> bool:
 
 
 def test_a_ball_flies_as_thrown_things_do() -> None:
-    throw = Throw(2.0, 0.1, (1.0, 2.0, 3.0), (4.0, -1.0, 2.0))
+    throw = ProjectileThrow(2.0, 0.1, (1.0, 2.0, 3.0), (4.0, -1.0, 2.0))
 
     with simulation(FREE_BOX, terrain="none") as run:
         run.step([np.zeros(6)], None, [throw])
@@ -125,7 +127,7 @@ def test_a_ball_flies_as_thrown_things_do() -> None:
 
 
 def test_a_ball_that_slides_begins_to_roll_at_five_sevenths_of_its_speed_and_rolls_on() -> None:
-    throw = Throw(2.0, 0.1, (5.0, 0.0, 0.1), (2.0, 0.0, 0.0))
+    throw = ProjectileThrow(2.0, 0.1, (5.0, 0.0, 0.1), (2.0, 0.0, 0.0))
 
     with simulation(FREE_BOX, solver_iterations=50) as run:
         run.step([np.zeros(6)], None, [throw])
@@ -142,7 +144,7 @@ def test_a_ball_that_slides_begins_to_roll_at_five_sevenths_of_its_speed_and_rol
 
 
 def test_momentum_is_conserved_through_an_impact_on_a_free_body(block: str) -> None:
-    throw = Throw(0.5, 0.05, (1.0, 0.06, 0.02), (-3.0, 0.0, 0.0))  # beside its middle
+    throw = ProjectileThrow(0.5, 0.05, (1.0, 0.06, 0.02), (-3.0, 0.0, 0.0))  # beside its middle
     before = np.concatenate(ball_momentum(throw, as_thrown(throw)))
 
     with simulation(block, **WEIGHTLESS) as run:
@@ -168,7 +170,7 @@ def test_momentum_is_conserved_through_an_impact_on_a_free_body(block: str) -> N
 
 
 def test_momentum_is_conserved_through_an_impact_on_a_humanoid() -> None:
-    throw = Throw(2.0, 0.1, (1.0, 0.03, 3.25), (-8.0, 0.0, 0.0))
+    throw = ProjectileThrow(2.0, 0.1, (1.0, 0.03, 3.25), (-8.0, 0.0, 0.0))
     whole = character("humanoid")
     place, nothing = np.zeros(whole.layout.size), np.zeros(whole.layout.size)
     place[2] = 3.0
@@ -189,7 +191,7 @@ def test_momentum_is_conserved_through_an_impact_on_a_humanoid() -> None:
 
 
 def test_the_impulse_on_what_cannot_move_is_all_that_the_ball_has(wall: str) -> None:
-    throw = Throw(2.0, 0.1, (3.0, 0.0, 0.1), (-6.0, 0.0, 0.0))
+    throw = ProjectileThrow(2.0, 0.1, (3.0, 0.0, 0.1), (-6.0, 0.0, 0.0))
 
     with simulation(wall, **WEIGHTLESS) as run:
         run.watches_contacts = True
@@ -208,8 +210,8 @@ def test_the_impulse_on_what_cannot_move_is_all_that_the_ball_has(wall: str) -> 
 
 
 def test_balls_collide_with_each_other() -> None:
-    one = Throw(1.0, 0.1, (0.0, 5.0, 1.0), (2.0, 0.0, 0.0))
-    other = Throw(3.0, 0.2, (2.0, 5.0, 1.0), (-2.0, 0.0, 0.0))
+    one = ProjectileThrow(1.0, 0.1, (0.0, 5.0, 1.0), (2.0, 0.0, 0.0))
+    other = ProjectileThrow(3.0, 0.2, (2.0, 5.0, 1.0), (-2.0, 0.0, 0.0))
 
     with simulation(FREE_BOX, **WEIGHTLESS) as run:
         run.step([np.zeros(6)], None, [one, other])
@@ -254,7 +256,7 @@ def test_far_away_two_characters_are_hit_as_if_each_were_alone() -> None:
         "characters": ["one", "other"],
         "other.placement": [0.0, 9.0, 0.0, 0.0],
     }
-    hit = Throw(2.0, 0.1, (1.0, 0.02, 1.1), (-8.0, 0.0, 0.0))
+    hit = ProjectileThrow(2.0, 0.1, (1.0, 0.02, 1.1), (-8.0, 0.0, 0.0))
     nothing = np.zeros(character("humanoid").layout.size)
 
     with joint_simulation(given) as run, simulation("humanoid") as alone:
@@ -275,7 +277,7 @@ def with_lifetime(plan: Plan, seconds: float) -> Plan:
 
 
 def test_after_its_lifetime_a_ball_lies_far_away() -> None:
-    lying = Throw(4.0, 0.1, (0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
+    lying = ProjectileThrow(4.0, 0.1, (0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
     with simulation(FREE_BOX, ball_lifetime=0.5, initial_position=[9.0, 9.0, 1.0, 0, 0, 0]) as run:
         nothing = np.zeros(run.actors[0].character.layout.size)
         places = []
@@ -294,7 +296,7 @@ def test_after_its_lifetime_a_ball_lies_far_away() -> None:
 
 def test_what_stood_against_a_ball_falls_when_it_is_taken_away(block: str) -> None:
     """A box on a ball that cannot roll away, as it is between the box and the ground."""
-    under = Throw(50.0, 0.1, (0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
+    under = ProjectileThrow(50.0, 0.1, (0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
     begin = [0.0, 0.0, 0.31, 0.0, 0.0, 0.0]
     with simulation(block, ball_lifetime=0.25, initial_position=begin) as run:
         heights = []
@@ -344,7 +346,7 @@ def test_another_simulation_takes_a_state_over_with_its_balls(walk: Plan, dirty:
         expected = in_bytes(walked(walk, run, 80)[0])
     with fresh(walk) as other:
         walked(walk, other, dirty, {2: [FAR], 5: [FAR, FAR]})
-        other.take_over(snapshot)
+        other.load_snapshot(snapshot)
 
         assert other.balls == (AT_CHEST, FAR)
         assert in_bytes(walked(walk, other, 80)[0]) == expected
@@ -354,7 +356,7 @@ def test_another_simulation_takes_a_state_over_with_its_balls(walk: Plan, dirty:
 
 
 def test_a_throw_waits_for_its_tick() -> None:
-    schedule = ThrowSchedule()
+    schedule = ThrowQueue()
     for throw, tick in ((FAR, 7), (AT_CHEST, 3), (AT_CHEST, 7)):
         schedule.add(throw, tick)
 
@@ -362,7 +364,7 @@ def test_a_throw_waits_for_its_tick() -> None:
 
 
 def test_an_episode_has_a_bounded_number_of_balls() -> None:
-    schedule = ThrowSchedule()
+    schedule = ThrowQueue()
     for number in range(MOST_BALLS):
         schedule.add(FAR, 1 + number)
         schedule.take(number)
@@ -382,7 +384,7 @@ def test_numbers_come_in_any_order_and_a_radius_may_be_left_out() -> None:
 
     throw = throw_of(names, range(1, 8))
 
-    assert throw == Throw(7.0, natural_radius(7.0), (6.0, 5.0, 4.0), (3.0, 2.0, 1.0))
+    assert throw == ProjectileThrow(7.0, natural_radius(7.0), (6.0, 5.0, 4.0), (3.0, 2.0, 1.0))
     assert 500.0 * 4.0 / 3.0 * pi * throw.radius**3 == pytest.approx(7.0)
     assert throw_of(NUMBERS, throw.numbers().tolist()) == throw
 

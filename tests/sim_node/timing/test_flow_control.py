@@ -1,6 +1,6 @@
 """When the simulator waits for slow subscribers. That it helps is in `test_recorder.py`."""
 
-from sim_node.timing.flow_control import BackPressure
+from sim_node.timing.flow_control import FlowControl
 
 
 class Subscribers:
@@ -15,8 +15,8 @@ class Subscribers:
         return self.have_all
 
 
-def pressure_of(subscribers: Subscribers) -> BackPressure:
-    return BackPressure(subscribers, every_ticks=100, longest=1.0, turn=0.5)
+def pressure_of(subscribers: Subscribers) -> FlowControl:
+    return FlowControl(subscribers, every_ticks=100, longest=1.0, turn=0.5)
 
 
 def test_subscribers_that_follow_are_asked_only_now_and_then() -> None:

@@ -8,7 +8,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import CommandError
-from sim_node.timing.lockstep import LockstepBarrier, Verdict
+from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
 
 PROPERTY = settings(max_examples=80, deadline=None)
 NAMES = ["root_x", "chest_x", "chest_y", "chest_z", "right_knee", "left_knee"]
@@ -25,7 +25,7 @@ def barrier() -> LockstepBarrier:
 
 def opened(stamp_ns: int) -> LockstepBarrier:
     barrier = LockstepBarrier(NAMES, REQUIRED)
-    barrier.open(stamp_ns)
+    barrier.begin_tick(stamp_ns)
     return barrier
 
 
@@ -33,8 +33,8 @@ def as_arrays(command: Command) -> tuple[IntArray, FloatArray]:
     return np.array(list(command), dtype=np.intp), np.array(list(command.values()), dtype=float)
 
 
-def offer(barrier: LockstepBarrier, command: Command, stamp_ns: int = STAMP_NS) -> Verdict:
-    return barrier.offer(stamp_ns, *as_arrays(command))
+def submit(barrier: LockstepBarrier, command: Command, stamp_ns: int = STAMP_NS) -> CommandStatus:
+    return barrier.submit(stamp_ns, *as_arrays(command))
 
 
 def state_of(barrier: LockstepBarrier) -> tuple[object, ...]:
@@ -53,11 +53,11 @@ def test_a_new_tick_misses_every_required_entry_and_has_no_effort(barrier: Locks
 
 
 def test_the_tick_is_complete_when_the_last_entry_has_its_command(barrier: LockstepBarrier) -> None:
-    assert offer(barrier, {3: 3.0, 1: 1.0, 2: 2.0}) is Verdict.ACCEPTED
+    assert submit(barrier, {3: 3.0, 1: 1.0, 2: 2.0}) is CommandStatus.ACCEPTED
     assert not barrier.complete
     assert barrier.missing == ["right_knee", "left_knee"]
 
-    assert offer(barrier, {5: 5.0, 4: 4.0}) is Verdict.ACCEPTED
+    assert submit(barrier, {5: 5.0, 4: 4.0}) is CommandStatus.ACCEPTED
 
     assert barrier.complete
     assert barrier.missing == []
@@ -67,7 +67,7 @@ def test_the_tick_is_complete_when_the_last_entry_has_its_command(barrier: Locks
 def test_where_nothing_is_required_nothing_is_waited_for() -> None:
     barrier = LockstepBarrier(NAMES, np.zeros(6, dtype=np.bool_))
 
-    barrier.open(STAMP_NS)
+    barrier.begin_tick(STAMP_NS)
 
     assert barrier.complete
     np.testing.assert_array_equal(barrier.effort, np.zeros(6))
@@ -93,18 +93,18 @@ def test_the_effort_does_not_depend_on_order_repetition_or_loss(
 ) -> None:
     in_order = opened(STAMP_NS)
     for command in commands:
-        offer(in_order, command)
+        submit(in_order, command)
     barrier = opened(STAMP_NS)
     # some come many times, some are lost at first; then all come again, as to a republished state
     arrivals = data.draw(st.lists(st.sampled_from(commands), max_size=8))
     arrivals += data.draw(st.permutations(commands))
 
-    verdicts = [offer(barrier, command) for command in arrivals]
+    verdicts = [submit(barrier, command) for command in arrivals]
 
     assert barrier.complete
     assert barrier.effort.tobytes() == in_order.effort.tobytes()
-    assert verdicts.count(Verdict.ACCEPTED) == len(commands)
-    assert verdicts.count(Verdict.DUPLICATE) == len(arrivals) - len(commands)
+    assert verdicts.count(CommandStatus.ACCEPTED) == len(commands)
+    assert verdicts.count(CommandStatus.DUPLICATE) == len(arrivals) - len(commands)
 
 
 @PROPERTY
@@ -116,7 +116,7 @@ def test_the_tick_is_complete_exactly_when_every_sender_was_heard(
     heard: set[int] = set()
 
     for number in data.draw(st.lists(st.integers(0, len(commands) - 1), max_size=10)):
-        offer(barrier, commands[number])
+        submit(barrier, commands[number])
         heard |= set(commands[number])
 
         assert barrier.complete == (heard == {1, 2, 3, 4, 5})
@@ -126,10 +126,10 @@ def test_the_tick_is_complete_exactly_when_every_sender_was_heard(
 def test_a_late_joiner_completes_the_tick_that_waited_for_it(barrier: LockstepBarrier) -> None:
     legs, chest = {4: 4.0, 5: 5.0}, {1: 1.0, 2: 2.0, 3: 3.0}
     for _ in range(5):  # the state is published again and again, the first answers from memory
-        offer(barrier, legs)
+        submit(barrier, legs)
     assert not barrier.complete
 
-    assert offer(barrier, chest) is Verdict.ACCEPTED
+    assert submit(barrier, chest) is CommandStatus.ACCEPTED
 
     assert barrier.complete
     np.testing.assert_array_equal(barrier.effort, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
@@ -139,19 +139,19 @@ def test_a_late_joiner_completes_the_tick_that_waited_for_it(barrier: LockstepBa
 
 
 def test_an_exact_repeat_is_a_duplicate_and_changes_nothing(barrier: LockstepBarrier) -> None:
-    offer(barrier, {4: 4.0, 5: 5.0})
+    submit(barrier, {4: 4.0, 5: 5.0})
     before = state_of(barrier)
 
-    assert offer(barrier, {4: 4.0, 5: 5.0}) is Verdict.DUPLICATE
-    assert offer(barrier, {5: 5.0}) is Verdict.DUPLICATE
+    assert submit(barrier, {4: 4.0, 5: 5.0}) is CommandStatus.DUPLICATE
+    assert submit(barrier, {5: 5.0}) is CommandStatus.DUPLICATE
     assert state_of(barrier) == before
     assert barrier.conflict is None
 
 
 def test_a_command_that_repeats_a_part_and_adds_another_is_taken(barrier: LockstepBarrier) -> None:
-    offer(barrier, {4: 4.0})
+    submit(barrier, {4: 4.0})
 
-    assert offer(barrier, {4: 4.0, 5: 5.0}) is Verdict.ACCEPTED
+    assert submit(barrier, {4: 4.0, 5: 5.0}) is CommandStatus.ACCEPTED
     np.testing.assert_array_equal(barrier.effort, [0.0, 0.0, 0.0, 0.0, 4.0, 5.0])
 
 
@@ -159,42 +159,42 @@ def test_a_command_that_repeats_a_part_and_adds_another_is_taken(barrier: Lockst
 def test_another_effort_for_the_same_entry_is_a_conflict_that_names_it(
     barrier: LockstepBarrier, other: float
 ) -> None:
-    offer(barrier, {4: 4.0})
+    submit(barrier, {4: 4.0})
     before = state_of(barrier)
 
-    verdict = offer(barrier, {1: 1.0, 2: 2.0, 3: 3.0, 4: other, 5: 5.0})
+    verdict = submit(barrier, {1: 1.0, 2: 2.0, 3: 3.0, 4: other, 5: 5.0})
 
-    assert verdict is Verdict.CONFLICT
+    assert verdict is CommandStatus.CONFLICT
     assert barrier.conflict == "right_knee"
     assert state_of(barrier) == before  # nothing of it was taken
 
 
 @pytest.mark.parametrize("first", [0.0, -0.0])
 def test_a_zero_of_the_other_sign_is_a_repeat(barrier: LockstepBarrier, first: float) -> None:
-    offer(barrier, {4: first})
+    submit(barrier, {4: first})
 
-    assert offer(barrier, {4: -first}) is Verdict.DUPLICATE
+    assert submit(barrier, {4: -first}) is CommandStatus.DUPLICATE
 
 
 def test_a_conflict_after_the_tick_is_complete_is_one_all_the_same(
     barrier: LockstepBarrier,
 ) -> None:
-    offer(barrier, {1: 1.0, 2: 2.0, 3: 3.0, 4: 4.0, 5: 5.0})
+    submit(barrier, {1: 1.0, 2: 2.0, 3: 3.0, 4: 4.0, 5: 5.0})
     before = state_of(barrier)
 
-    assert offer(barrier, {2: 2.5}) is Verdict.CONFLICT
+    assert submit(barrier, {2: 2.5}) is CommandStatus.CONFLICT
     assert barrier.conflict == "chest_y"
     assert state_of(barrier) == before
 
 
 def test_the_next_tick_knows_nothing_of_the_conflict(barrier: LockstepBarrier) -> None:
-    offer(barrier, {4: 4.0})
-    offer(barrier, {4: 5.0})
+    submit(barrier, {4: 4.0})
+    submit(barrier, {4: 5.0})
 
-    barrier.open(STAMP_NS + 1)
+    barrier.begin_tick(STAMP_NS + 1)
 
     assert barrier.conflict is None
-    assert offer(barrier, {4: 5.0}, STAMP_NS + 1) is Verdict.ACCEPTED
+    assert submit(barrier, {4: 5.0}, STAMP_NS + 1) is CommandStatus.ACCEPTED
 
 
 # Stamps
@@ -206,31 +206,31 @@ def test_only_an_answer_to_this_very_state_is_taken(stamp_ns: int) -> None:
     barrier = opened(STAMP_NS)
     before = state_of(barrier)
 
-    verdict = offer(barrier, {4: 4.0}, stamp_ns)
+    verdict = submit(barrier, {4: 4.0}, stamp_ns)
 
     if stamp_ns == STAMP_NS:
-        assert verdict is Verdict.ACCEPTED
+        assert verdict is CommandStatus.ACCEPTED
     else:
-        assert verdict is (Verdict.STALE if stamp_ns < STAMP_NS else Verdict.FUTURE)
+        assert verdict is (CommandStatus.STALE if stamp_ns < STAMP_NS else CommandStatus.FUTURE)
         assert state_of(barrier) == before
 
 
 def test_an_answer_that_was_future_is_taken_when_it_comes_again_in_its_tick(
     barrier: LockstepBarrier,
 ) -> None:
-    assert offer(barrier, {4: 4.0}, STAMP_NS + 1) is Verdict.FUTURE
+    assert submit(barrier, {4: 4.0}, STAMP_NS + 1) is CommandStatus.FUTURE
 
-    barrier.open(STAMP_NS + 1)
+    barrier.begin_tick(STAMP_NS + 1)
 
     assert "right_knee" in barrier.missing
-    assert offer(barrier, {4: 4.0}, STAMP_NS + 1) is Verdict.ACCEPTED
-    assert offer(barrier, {4: 3.0}, STAMP_NS) is Verdict.STALE
+    assert submit(barrier, {4: 4.0}, STAMP_NS + 1) is CommandStatus.ACCEPTED
+    assert submit(barrier, {4: 3.0}, STAMP_NS) is CommandStatus.STALE
 
 
 def test_a_stale_command_is_no_conflict(barrier: LockstepBarrier) -> None:
-    offer(barrier, {4: 4.0})
+    submit(barrier, {4: 4.0})
 
-    assert offer(barrier, {4: 9.0}, STAMP_NS - 1) is Verdict.STALE
+    assert submit(barrier, {4: 9.0}, STAMP_NS - 1) is CommandStatus.STALE
     assert barrier.conflict is None
 
 
@@ -245,7 +245,7 @@ def test_a_number_that_is_not_finite_rejects_the_whole_command_by_joint(
     before = state_of(barrier)
 
     with pytest.raises(CommandError, match=f"'left_knee' is {number}"):
-        offer(barrier, {4: 4.0, 5: number, 1: 1.0}, stamp_ns)
+        submit(barrier, {4: 4.0, 5: number, 1: 1.0}, stamp_ns)
 
     assert state_of(barrier) == before
 
@@ -256,7 +256,7 @@ def test_an_entry_that_may_not_be_commanded_rejects_the_whole_command_by_joint(
     before = state_of(barrier)
 
     with pytest.raises(CommandError, match="'root_x' is not among the commanded joints"):
-        offer(barrier, {4: 4.0, 0: 1000.0})
+        submit(barrier, {4: 4.0, 0: 1000.0})
 
     assert state_of(barrier) == before
     assert barrier.effort[0] == 0.0
@@ -267,14 +267,14 @@ def test_arrays_of_unequal_length_reject_the_command(barrier: LockstepBarrier, l
     before = state_of(barrier)
 
     with pytest.raises(CommandError, match=f"2 names but {length} efforts"):
-        barrier.offer(STAMP_NS, np.array([4, 5]), np.ones(length))
+        barrier.submit(STAMP_NS, np.array([4, 5]), np.ones(length))
 
     assert state_of(barrier) == before
 
 
 def test_an_empty_command_is_rejected(barrier: LockstepBarrier) -> None:
     with pytest.raises(CommandError, match="empty"):
-        offer(barrier, {})
+        submit(barrier, {})
 
 
 # Going on without a command
@@ -283,7 +283,7 @@ def test_an_empty_command_is_rejected(barrier: LockstepBarrier) -> None:
 def test_filling_completes_the_tick_where_commands_are_missing_and_only_there(
     barrier: LockstepBarrier,
 ) -> None:
-    offer(barrier, {4: 4.0})
+    submit(barrier, {4: 4.0})
 
     barrier.fill_missing(np.array([90.0, 10.0, 20.0, 30.0, 40.0, 50.0]))
 
@@ -294,7 +294,7 @@ def test_filling_completes_the_tick_where_commands_are_missing_and_only_there(
 
 
 def test_filling_a_complete_tick_changes_nothing(barrier: LockstepBarrier) -> None:
-    offer(barrier, {1: 1.0, 2: 2.0, 3: 3.0, 4: 4.0, 5: 5.0})
+    submit(barrier, {1: 1.0, 2: 2.0, 3: 3.0, 4: 4.0, 5: 5.0})
     before = state_of(barrier)
 
     barrier.fill_missing(np.full(6, 99.0))
@@ -305,7 +305,7 @@ def test_filling_a_complete_tick_changes_nothing(barrier: LockstepBarrier) -> No
 def test_what_was_filled_is_not_carried_into_the_next_tick(barrier: LockstepBarrier) -> None:
     barrier.fill_missing(np.full(6, 99.0))
 
-    barrier.open(STAMP_NS + 1)
+    barrier.begin_tick(STAMP_NS + 1)
 
     assert barrier.missing == NAMES[1:]
     np.testing.assert_array_equal(barrier.effort, np.zeros(6))
@@ -315,11 +315,11 @@ def test_what_was_filled_is_not_carried_into_the_next_tick(barrier: LockstepBarr
 
 
 def test_the_effort_of_a_tick_outlives_it(barrier: LockstepBarrier) -> None:
-    offer(barrier, {1: 1.0, 2: 2.0, 3: 3.0, 4: 4.0, 5: 5.0})
+    submit(barrier, {1: 1.0, 2: 2.0, 3: 3.0, 4: 4.0, 5: 5.0})
     kept = barrier.effort
 
-    barrier.open(STAMP_NS + 1)
-    offer(barrier, {4: -4.0}, STAMP_NS + 1)
+    barrier.begin_tick(STAMP_NS + 1)
+    submit(barrier, {4: -4.0}, STAMP_NS + 1)
     barrier.fill_missing(np.full(6, 99.0))
 
     np.testing.assert_array_equal(kept, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
@@ -327,7 +327,7 @@ def test_the_effort_of_a_tick_outlives_it(barrier: LockstepBarrier) -> None:
 
 def test_a_sender_cannot_change_its_command_afterwards(barrier: LockstepBarrier) -> None:
     indices, effort = as_arrays({4: 4.0, 5: 5.0})
-    barrier.offer(STAMP_NS, indices, effort)
+    barrier.submit(STAMP_NS, indices, effort)
 
     effort[:] = 99.0
     indices[:] = 1
@@ -337,37 +337,37 @@ def test_a_sender_cannot_change_its_command_afterwards(barrier: LockstepBarrier)
 
 def test_another_command_for_a_tick_that_is_over_is_a_conflict_and_a_repeat_is_only_late() -> None:
     barrier = LockstepBarrier(NAMES, REQUIRED)
-    barrier.open(STAMP_NS)
-    offer(barrier, {4: 4.0, 5: 5.0})
+    barrier.begin_tick(STAMP_NS)
+    submit(barrier, {4: 4.0, 5: 5.0})
     barrier.fill_missing(np.zeros(6))
-    barrier.open(2 * STAMP_NS)
+    barrier.begin_tick(2 * STAMP_NS)
 
     verdicts = [
-        offer(barrier, command, STAMP_NS)
+        submit(barrier, command, STAMP_NS)
         for command in ({4: 4.0}, {5: 5.0, 4: 4.0}, {1: 1.0, 2: 0.0, 3: 0.0}, {4: 4.0, 5: 6.0})
     ]
 
-    late = Verdict.STALE  # what nobody had commanded may be commanded by who is late
-    assert verdicts == [late, late, late, Verdict.CONFLICT]
+    late = CommandStatus.STALE  # what nobody had commanded may be commanded by who is late
+    assert verdicts == [late, late, late, CommandStatus.CONFLICT]
     assert barrier.conflict == NAMES[5]
     assert not barrier.effort.any()
 
 
 def test_a_new_episode_knows_nothing_of_the_ticks_before() -> None:
     barrier = LockstepBarrier(NAMES, REQUIRED)
-    barrier.open(STAMP_NS)
-    offer(barrier, {4: 4.0})
+    barrier.begin_tick(STAMP_NS)
+    submit(barrier, {4: 4.0})
     barrier.clear()
-    barrier.open(2 * STAMP_NS)
+    barrier.begin_tick(2 * STAMP_NS)
 
-    assert offer(barrier, {4: 5.0}, STAMP_NS) is Verdict.STALE
+    assert submit(barrier, {4: 5.0}, STAMP_NS) is CommandStatus.STALE
 
 
 def test_opening_and_offering_change_no_argument() -> None:
     required, fill = REQUIRED.copy(), np.full(6, 7.0)
     barrier = LockstepBarrier(NAMES, required)
-    barrier.open(STAMP_NS)
-    offer(barrier, {4: 4.0})
+    barrier.begin_tick(STAMP_NS)
+    submit(barrier, {4: 4.0})
 
     barrier.fill_missing(fill)
 
@@ -391,30 +391,30 @@ class AnyTraffic(RuleBasedStateMachine):
         self.tick = 1
         self.given: Command = {}
         self.commanded: dict[int, Command] = {1: {}}  # by tick, without what a timeout filled in
-        self.expected: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
-        self.barrier.open(self.tick)
+        self.expected: dict[CommandStatus, int] = dict.fromkeys(CommandStatus, 0)
+        self.barrier.begin_tick(self.tick)
 
     @rule()
     def next_tick(self) -> None:
         self.tick += 1
         self.given = {}
         self.commanded[self.tick] = {}
-        self.barrier.open(self.tick)
+        self.barrier.begin_tick(self.tick)
 
     @rule(command=commands)
     def command_of_this_tick(self, command: Command) -> None:
         known = {index for index in command if index in self.given}
         differing = {index for index in known if command[index] != self.given[index]}
 
-        verdict = offer(self.barrier, command, self.tick)
+        verdict = submit(self.barrier, command, self.tick)
 
         if differing:
-            assert verdict is Verdict.CONFLICT
+            assert verdict is CommandStatus.CONFLICT
             assert self.barrier.conflict in {NAMES[index] for index in differing}
         elif known == set(command):
-            assert verdict is Verdict.DUPLICATE
+            assert verdict is CommandStatus.DUPLICATE
         else:
-            assert verdict is Verdict.ACCEPTED
+            assert verdict is CommandStatus.ACCEPTED
             self.given |= command
             self.commanded[self.tick] |= command
         self.expected[verdict] += 1
@@ -424,22 +424,22 @@ class AnyTraffic(RuleBasedStateMachine):
         before = self.commanded.get(self.tick - offset, {})
         differs = any(before.get(index, value) != value for index, value in command.items())
 
-        verdict = offer(self.barrier, command, self.tick - offset)
+        verdict = submit(self.barrier, command, self.tick - offset)
 
-        assert verdict is (Verdict.CONFLICT if differs else Verdict.STALE)
+        assert verdict is (CommandStatus.CONFLICT if differs else CommandStatus.STALE)
         self.expected[verdict] += 1
 
     @rule(command=commands, offset=st.integers(1, 3))
     def command_of_a_later_tick(self, command: Command, offset: int) -> None:
-        assert offer(self.barrier, command, self.tick + offset) is Verdict.FUTURE
-        self.expected[Verdict.FUTURE] += 1
+        assert submit(self.barrier, command, self.tick + offset) is CommandStatus.FUTURE
+        self.expected[CommandStatus.FUTURE] += 1
 
     @rule(command=commands, bad=st.sampled_from([{0: 1.0}, {5: np.nan}, {1: np.inf}]))
     def command_with_a_fault(self, command: Command, bad: Command) -> None:
         with pytest.raises(CommandError):
-            offer(self.barrier, command | bad, self.tick)
+            submit(self.barrier, command | bad, self.tick)
         self.barrier.count_rejected()
-        self.expected[Verdict.REJECTED] += 1
+        self.expected[CommandStatus.REJECTED] += 1
 
     @precondition(lambda self: len(self.given) < 5)
     @rule(fill=st.sampled_from([0.0, 3.0]))
@@ -458,7 +458,7 @@ class AnyTraffic(RuleBasedStateMachine):
 
     @invariant()
     def the_counts_add_up(self) -> None:
-        assert {verdict: self.barrier.counts[verdict] for verdict in Verdict} == self.expected
+        assert {verdict: self.barrier.counts[verdict] for verdict in CommandStatus} == self.expected
 
 
 TestAnyTraffic = AnyTraffic.TestCase

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_node.timing.rate_limiter import Pace
+from sim_node.timing.rate_limiter import RateLimiter
 
 PERIOD = 0.25  # s; a power of two, so that multiples are exact
 START = 1000.0
 
 
-def started(period: float = PERIOD, now: float = START) -> Pace:
-    pace = Pace(period)
+def started(period: float = PERIOD, now: float = START) -> RateLimiter:
+    pace = RateLimiter(period)
     pace.restart(now)
     return pace
 
@@ -51,7 +51,7 @@ def test_a_period_of_zero_makes_every_tick_due_at_once_and_none_late() -> None:
 
 
 def test_what_never_began_has_nothing_to_say() -> None:
-    assert Pace(PERIOD).summary() == {}
+    assert RateLimiter(PERIOD).summary() == {}
     assert started().summary() == {}
 
 

@@ -26,7 +26,7 @@ def paused(fault: str | None = None, *, stuck: bool = False) -> RunControl:
 def test_at_first_it_runs_without_a_fault(control: RunControl) -> None:
     assert control.runs
     assert not control.paused
-    assert not control.is_stuck
+    assert not control.has_diverged
     assert control.fault is None
     assert control.steps_left == 0
 
@@ -147,7 +147,7 @@ def test_resuming_ends_the_steps_and_runs_on() -> None:
 
 def test_what_is_stuck_neither_goes_on_nor_takes_a_step_and_says_why() -> None:
     control = paused("diverged at tick 7", stuck=True)
-    assert control.is_stuck
+    assert control.has_diverged
 
     for go_on in (control.resume, lambda: control.begin_steps(1)):
         with pytest.raises(CommandError, match="only ~/reset: diverged at tick 7"):
@@ -162,7 +162,7 @@ def test_a_pause_by_hand_does_not_loosen_what_is_stuck() -> None:
 
     control.pause()
 
-    assert control.is_stuck
+    assert control.has_diverged
     with pytest.raises(CommandError, match="diverged at tick 7"):
         control.resume()
 
@@ -186,7 +186,7 @@ def test_a_reset_loosens_what_was_stuck_and_leaves_it_paused() -> None:
 
     control.reset()
 
-    assert not control.is_stuck
+    assert not control.has_diverged
     assert control.fault is None
     assert control.paused
     control.begin_steps(2)
@@ -265,7 +265,7 @@ class AnyCalls(RuleBasedStateMachine):
     def it_is_as_the_rules_say(self) -> None:
         assert self.control.runs == (self.condition in ("runs", "steps"))
         assert self.control.paused == (self.condition != "runs")
-        assert self.control.is_stuck == (self.condition == "stuck")
+        assert self.control.has_diverged == (self.condition == "stuck")
         assert self.control.steps_left == self.left
         if self.condition == "stuck":
             assert self.control.fault
