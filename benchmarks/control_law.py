@@ -61,7 +61,9 @@ def _ours(law: str, ticks: Sequence[Tick]) -> tuple[float, float]:
 
     def answers_us(reference: Reference) -> float:
         controller = make_controller(plan.character, reference, plan.controller)
-        return _duration_us(lambda: [controller.answer(t.state, first) for t in ticks], ticks)
+        return _duration_us(
+            lambda: [controller.compute_effort(t.state, first) for t in ticks], ticks
+        )
 
     return answers_us(_Known(plan.reference)), answers_us(plan.reference)
 

@@ -139,7 +139,7 @@ class _World:
             (actor,) = simulation.actors
             for tick in range(_HORIZON):
                 state = replace(actor.state, stamp_ns=clock.stamp_ns(1 + first + tick))
-                effort, _ = controller.answer(state, clock.stamp_ns(1))
+                effort, _ = controller.compute_effort(state, clock.stamp_ns(1))
                 simulation.step([np.where(actor.commanded, effort, 0.0)], [()])
                 self._dynamics.update(actor.state.position, actor.state.velocity)
                 yield self._dynamics.centre_of_mass()

@@ -163,7 +163,7 @@ class Controller:
         """Raise CharacterError if a simulator's probe is not what the model expects; says why."""
         check_agreement(self._model, self.layout, probe)
 
-    def follow(
+    def set_trajectory(
         self, points: TrajectoryPoints, *, start_ns: int, now_ns: int, episode_ns: int
     ) -> None:
         """Track a trajectory from a stamp on, instead of what is tracked, until the episode ends.
@@ -230,7 +230,7 @@ class Controller:
     def _episode_tick(self) -> int:
         return self.clock.first_tick_from(self._episode_ns or 0)
 
-    def answer(
+    def compute_effort(
         self, state: StampedState, episode_ns: int, contacts: FloatArray | None = None
     ) -> tuple[FloatArray, StampedReference]:
         """The effort (n,) that answers a state, and the reference at the state's stamp.

@@ -40,7 +40,7 @@ from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
 from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
 from msgs_config.runtime.durations import Durations
-from msgs_config.runtime.once_logger import UNLOGGED, Warnings
+from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
@@ -62,21 +62,21 @@ class ControllerNode(Node):
         given = given_parameters(self)
         loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)))
         self._character = placed(loaded, given)
-        for note in self._character.notes:
-            self.get_logger().warning(note)
+        for warning in self._character.warnings:
+            self.get_logger().warning(warning)
         self._layout = self._character.layout
         self._declared = PARAMETERS + character_parameters(self._character, given)
         self._values = resolve(self._declared, given)
         declare(self, self._declared, self._values)
         motion = make_motion(self._character, self._values)
-        for note in motion.notes:
-            self.get_logger().warning(note)
+        for warning in motion.warnings:
+            self.get_logger().warning(warning)
         self._controller = make_controller(self._character, motion.reference, self._values)
         self._answer: Answer | None = None
         self._is_answering = False
         self._upcoming: Values | None = None
         self._episode_ns: int | None = None
-        self._warnings = Warnings(self)
+        self._once_logger = OnceLogger(self)
         self._diagnostics = DiagnosticsPublisher(self)
         self._next_report = 0.0
         self._counts: Counter[str] = Counter(answered=0, repeated=0, ignored=0, overtaken=0)
@@ -94,10 +94,10 @@ class ControllerNode(Node):
             given_session(self._values),
             self._controller.clock,
             self._check_simulator,
-            self._warnings,
+            self._once_logger,
         )
         self._contacts = (
-            ContactSubscription(self, self._character, self._simulators, self._warnings)
+            ContactSubscription(self, self._character, self._simulators, self._once_logger)
             if self._controller.needs_contacts
             else None
         )
@@ -111,8 +111,8 @@ class ControllerNode(Node):
         )
         self._actuation = Actuation(len(commanded), self._layout.size)
         self._outputs = Publishers(self, self._layout, commanded, self._simulators.bound)
-        self._trajectories = Trajectories(self, self._controller, self._outputs, self._warnings)
-        self._strengths = StrengthTopic(self, self._controller, self._outputs, self._warnings)
+        self._trajectories = Trajectories(self, self._controller, self._outputs, self._once_logger)
+        self._strengths = StrengthTopic(self, self._controller, self._outputs, self._once_logger)
         self._publish_configuration()
 
     def _publish_configuration(self) -> None:
@@ -211,7 +211,7 @@ class ControllerNode(Node):
             episode_ns = self._episode_of(state)
         except (MessageError, LayoutError, ClockError) as error:
             self._counts["ignored"] += 1
-            self._warnings.say_once(f"state ignored: {error}")
+            self._once_logger.log_once(f"state ignored: {error}")
             return
         if episode_ns is None:
             return  # the simulator publishes the state again
@@ -227,7 +227,7 @@ class ControllerNode(Node):
         self._strengths.take(state.stamp_ns, episode_ns)
         started = time.perf_counter()
         self._is_answering = True
-        effort, reference = self._controller.answer(state, episode_ns, contacts)
+        effort, reference = self._controller.compute_effort(state, episode_ns, contacts)
         self._is_answering = False
         self._answer = self._outputs.answer(raw, state, effort, reference)
         self._answer_times.add(time.perf_counter() - started)
@@ -282,7 +282,7 @@ class ControllerNode(Node):
         apart = clock.tick(state.stamp_ns) - clock.tick(self._answer.state.stamp_ns)
         if apart > 1:
             rate = f"{clock.rate_hz} Hz"
-            self._warnings.say_once(
+            self._once_logger.log_once(
                 f"states come {apart} ticks of {rate} apart; set 'rate' to the simulator's"
             )
 
@@ -322,7 +322,7 @@ class ControllerNode(Node):
             refused = {
                 "refused_trajectories": self._trajectories.refused,
                 "refused_strengths": self._strengths.refused,
-                UNLOGGED: self._warnings.unlogged,
+                UNLOGGED: self._once_logger.unlogged,
             }
             counts = {**self._counts, **self._simulators.counts}
             self._diagnostics.publish({**counts, **refused, **times})

@@ -14,7 +14,7 @@ from msgs_config.messages.session import given_session, make_session
 from msgs_config.messages.topics import Outgoing
 from msgs_config.parameters import Values
 from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
-from msgs_config.runtime.once_logger import UNLOGGED, Warnings
+from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
@@ -78,10 +78,10 @@ class SimNode(Node):
         self._initial_states = InitialStates(self, cast, self._simulation)
         declare(self, self._initial_states.known, values)
         self._session = given_session(values) or make_session(self.get_fully_qualified_name())
-        self._warnings = Warnings(self)
-        self._ports = open_ports(self, cast, self._simulation, self._session, self._warnings)
-        self._rivals = RivalWatch(self, self._ports, self._session, self._warnings)
-        self._world_port = WorldInterface(self, self._simulation, self._session, self._warnings)
+        self._once_logger = OnceLogger(self)
+        self._ports = open_ports(self, cast, self._simulation, self._session, self._once_logger)
+        self._rivals = RivalWatch(self, self._ports, self._session, self._once_logger)
+        self._world_port = WorldInterface(self, self._simulation, self._session, self._once_logger)
         self._clock_topic = topics.create_publisher(self, topics.CLOCK)
         self._max_ticks = values.integer("max_ticks")
         self._patience = Watchdog(
@@ -175,7 +175,7 @@ class SimNode(Node):
         if self._back_pressure.holds(self._simulation.tick, time.monotonic()):
             return True
         if self._back_pressure.complaint is not None:
-            self._warnings.say_once(self._back_pressure.complaint)
+            self._once_logger.log_once(self._back_pressure.complaint)
         return False
 
     def _is_acknowledged(self, seconds: float) -> bool:
@@ -263,11 +263,11 @@ class SimNode(Node):
     def _tell_conflicts(self) -> None:
         """Say who competes for a joint in real time, once for each, when their names are known."""
         for joint, port in self._conflicts.items():
-            if not self._warnings.has_said(joint):
+            if not self._once_logger.has_said(joint):
                 senders = publisher_names(self, port.torques, wait_for_names=False)
                 if UNKNOWN_NODE not in senders:
                     sentence = describe_conflict(joint, port.torques, senders)
-                    self._warnings.say_once(f"{sentence}; the last one counts", kind=joint)
+                    self._once_logger.log_once(f"{sentence}; the last one counts", kind=joint)
 
     def _look_at_the_clock(self) -> None:
         now = time.monotonic()
@@ -353,7 +353,7 @@ class SimNode(Node):
             "session": self._session,
             "paused": self._control.paused,
             "timeouts": self._timeouts,
-            UNLOGGED: self._warnings.unlogged,
+            UNLOGGED: self._once_logger.unlogged,
         }
         values |= self._tick_times.summary() | self._pace.summary() | self._world_port.counts
         for port in self._ports:

@@ -144,8 +144,8 @@ def _run(options: argparse.Namespace) -> None:
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     prepare_directory(directory, overwrite=options.overwrite)
-    for note in run.notes:
-        print(note)
+    for warning in run.warnings:
+        print(warning)
     if run.pushes and not options.push:
         print(f"{options.clip} brings {len(run.pushes)} pushes (--push none: without them)")
     with progress_bar(f"{plan.character.name}: {motion}", plan.ticks, "ticks") as bar:
@@ -170,7 +170,7 @@ class PlannedRun:
     plan: "Plan"
     pushes: "Sequence[PlannedPush]"
     throws: "Sequence[PlannedThrow]"
-    notes: Sequence[str]  # what whoever runs it should know
+    warnings: Sequence[str]  # what whoever runs it should know
 
 
 def planned_run(options: argparse.Namespace) -> PlannedRun:
@@ -185,7 +185,7 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
     plan = _checked_plan(options, simulator, controller, found_in)
     pushes = _pushes(options.push, plan, found_in)
     throws, in_the_way = plan_throws(plan, options.throw)
-    return PlannedRun(plan, pushes, throws, [*plan.notes, *in_the_way])
+    return PlannedRun(plan, pushes, throws, [*plan.warnings, *in_the_way])
 
 
 def _checked_plan(

@@ -31,7 +31,7 @@ _MOST_EARLY = 20_000  # messages
 _MOST_EARLY_BYTES = 1 << 26  # of them together
 
 
-class RunListener:
+class MetricsCollector:
     """Takes messages as they come; has the figures at the end.
 
     What a topic says can be read only once the simulator's configuration is known, so whatever

@@ -183,7 +183,7 @@ def weight(recording: Recording) -> float:
     return recording.character.mass * float(recording.parameters.get("gravity", np.nan))
 
 
-def figures(recording: Recording) -> tuple[dict[str, object], FloatArray]:
+def measure_recording(recording: Recording) -> tuple[dict[str, object], FloatArray]:
     """The figures of a run and its series, as a recorder measures them: see `run_metrics`."""
     character = recording.character
     measurement = Measurement(

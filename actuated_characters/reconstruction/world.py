@@ -7,7 +7,7 @@ import numpy as np
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.runs.planned_wrenches import push_schedule
 from controller_node.parameters import make_controller
-from controller_node.planner.planner import PlannerMemory, PredictivePlanner
+from controller_node.planner.planner import PlannerSnapshot, PredictivePlanner
 from controller_node.references.base import ReferenceState
 from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
@@ -26,7 +26,7 @@ class Place:
 
     tick: int  # since the first state
     snapshot: Snapshot
-    memory: PlannerMemory
+    planner: PlannerSnapshot
 
 
 @dataclass(frozen=True)
@@ -89,14 +89,14 @@ class TrialWorld:
             self._simulation.load_snapshot(place.snapshot)
         self._controller.begin_episode(self._episode_ns)  # it forgets what it planned before
         tick = 0 if place is None else place.tick
-        memory = self._planner.memory() if place is None else place.memory
+        planner = self._planner.snapshot() if place is None else place.planner
         grown = None
         for seed in branch.seeds:
-            self._planner.recall(memory, seed)
+            self._planner.restore(planner, seed)
             grown = self._window(tick, min(tick + self._window_ticks, self.plan.ticks))
             if grown is None:
                 return None
-            tick, memory = grown.place.tick, grown.place.memory
+            tick, planner = grown.place.tick, grown.place.planner
         return grown
 
     def _window(self, first: int, last: int) -> Grown | None:
@@ -107,7 +107,7 @@ class TrialWorld:
         (actor,) = self._simulation.actors
         pushes = push_schedule(self.plan, self._pushes)
         for tick in range(first, last):
-            effort, _ = self._controller.answer(actor.state, self._episode_ns)
+            effort, _ = self._controller.compute_effort(actor.state, self._episode_ns)
             made = self._planner.plan
             if made is not None and made is not before:
                 plans.append((made.tick, made.offsets.during(made.tick, self._period)))
@@ -124,7 +124,7 @@ class TrialWorld:
             return None
         state = actor.state
         return Grown(
-            Place(last, self._simulation.snapshot(), self._planner.memory()),
+            Place(last, self._simulation.snapshot(), self._planner.snapshot()),
             tuple(plans),
             np.concatenate((state.position, state.velocity)),
             float(np.mean(costs)),

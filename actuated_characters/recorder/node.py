@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile
 
 from actuated_characters.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
 from actuated_characters.bags.writer import BagWriter
-from actuated_characters.metrics.collector import HEARD, RunListener
+from actuated_characters.metrics.collector import HEARD, MetricsCollector
 from actuated_characters.recorder.session_filter import Heard, SessionFilter, session_in
 from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import (
@@ -26,7 +26,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import REMEDY, SESSION, given_session, named
 from msgs_config.parameters import Parameter, Values, resolve
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare, given_parameters
@@ -76,8 +76,8 @@ class RecorderNode(Node):
         self._directory = Path(values.text("directory"))
         self._progress_period = values.number("progress_period")
         self._failure: str | None = None
-        self._warnings = Warnings(self)
-        self._filter = SessionFilter(given_session(values), self._warnings.say_once)
+        self._once_logger = OnceLogger(self)
+        self._filter = SessionFilter(given_session(values), self._once_logger.log_once)
         self._inboxes: list[TopicReader] = []
         characters = values.texts("characters") or ("",)
         wanted = contract_topics(
@@ -85,7 +85,9 @@ class RecorderNode(Node):
         )
         names = values.texts("topics")
         self._named = NamedTopics(self, names, {recorded.name for recorded in wanted})
-        self._listeners = {name: RunListener(simulator_name(self, name)) for name in characters}
+        self._collectors = {
+            name: MetricsCollector(simulator_name(self, name)) for name in characters
+        }
         self._bag = self._open_bag(values)
         for recorded in wanted:
             self._add(recorded, recorded.topic.qos)
@@ -166,7 +168,7 @@ class RecorderNode(Node):
     @property
     def _last_tick(self) -> int:
         """The last tick of which every character's state has come."""
-        return min(listener.last_tick for listener in self._listeners.values())
+        return min(collector.last_tick for collector in self._collectors.values())
 
     def _drain(self, *, gives_way: bool = True) -> int:
         """Take some of each topic's messages, all of them if it keeps up, in the order of time.
@@ -200,15 +202,15 @@ class RecorderNode(Node):
             self._lose_bag(error)
         if recorded.own_name not in HEARD:
             return
-        for name, listener in self._listeners.items():
+        for name, collector in self._collectors.items():
             if recorded.character not in (None, name):
                 continue
             try:
-                listener.take(recorded.own_name, raw, published_ns)
+                collector.take(recorded.own_name, raw, published_ns)
             except ActuatedCharactersError as error:
                 sentence = f"cannot measure '{recorded.name}': {error}"
                 if self._filter.bound and session_in(message) is None:  # it may be from any node
-                    self._warnings.say_once(sentence)
+                    self._once_logger.log_once(sentence)
                 else:
                     self._fail(sentence)
 
@@ -234,10 +236,10 @@ class RecorderNode(Node):
                 self.get_logger().warning(f"'{inbox.recorded.name}': {inbox.lost} messages lost")
         for name in sorted(self._named.missing):
             self.get_logger().warning(f"nobody published on '{name}'")
-        for name, listener in self._listeners.items():
+        for name, collector in self._collectors.items():
             of_it = f" of '{name}'" if name else ""
             try:
-                figures, series = listener.results()
+                figures, series = collector.results()
                 if dropped := figures["dropped_references"]:
                     self.get_logger().warning(f"{dropped} references{of_it} belong to no state")
                 lost = {
@@ -248,13 +250,13 @@ class RecorderNode(Node):
                 write_figures(directory, figures | lost, series)
             except RecordingError as error:
                 self._fail(f"{error}{of_it}")
-            if listener.last_tick <= FIRST_TICK and self._filter.dropped(self._states_of(name)):
+            if collector.last_tick <= FIRST_TICK and self._filter.dropped(self._states_of(name)):
                 self._fail(
                     f"session {named(self._filter.bound)}{of_it} was recorded and never answered, "
                     f"while others published states, too; {REMEDY}, or set '{SESSION.name}'"
                 )
-            if listener.missing_ticks:
-                self._fail(f"{listener.missing_ticks} ticks{of_it} were missed")
+            if collector.missing_ticks:
+                self._fail(f"{collector.missing_ticks} ticks{of_it} were missed")
         if self._failure is not None:
             raise RecordingError(self._failure)
 

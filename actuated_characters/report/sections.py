@@ -12,8 +12,8 @@ from actuated_characters.metrics.recording_metrics import (
     contact_series,
     distances,
     effort_sizes,
-    figures,
     limit_shares,
+    measure_recording,
     push_spans,
     reset_rows,
     saturated_shares,
@@ -104,7 +104,7 @@ class CharacterReport:
             ("mode", str(parameters.get("mode", "unknown"))),
             ("law", law(first) or "not recorded"),
         ]
-        measured, _ = figures(recording)
+        measured, _ = measure_recording(recording)
         rows = [(name, _shown(value)) for name, value in measured.items()]
         tables = [Table(facts), Table(rows, caption="figures")]
         if recording.controller:

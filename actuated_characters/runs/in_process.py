@@ -43,7 +43,7 @@ def ticks_in_process(
         for _ in range(plan.ticks):
             state = actor.state
             touched = None if actor.contacts is None else actor.contacts.wrenches
-            effort, reference = controller.answer(state, episode_ns, touched)
+            effort, reference = controller.compute_effort(state, episode_ns, touched)
             acting = schedule.take(simulation.tick)
             thrown = balls.take(simulation.tick)
             simulation.step([np.where(actor.commanded, effort, 0.0)], [acting], thrown)

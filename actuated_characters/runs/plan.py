@@ -42,7 +42,7 @@ class Plan:
     reference: Reference
     simulator: Values
     controller: Values
-    notes: tuple[str, ...]  # what the user should know
+    warnings: tuple[str, ...]  # what the user should know
 
     @property
     def ticks(self) -> int:
@@ -95,8 +95,8 @@ def make_plan(
     controller_parameters.check_world(controller, simulator)
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
-    notes = character.notes + motion.notes
-    return Plan(character, motion.reference, simulator, controller, notes)
+    warnings = character.warnings + motion.warnings
+    return Plan(character, motion.reference, simulator, controller, warnings)
 
 
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:

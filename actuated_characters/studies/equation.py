@@ -138,7 +138,7 @@ def _measure(walk: RunResult) -> TickTime:
         episode_ns = actor.state.stamp_ns
         for _ in range(plan.ticks):
             began = time.perf_counter()
-            effort, _ = controller.answer(actor.state, episode_ns)
+            effort, _ = controller.compute_effort(actor.state, episode_ns)
             answered = time.perf_counter()
             simulation.step([np.where(actor.commanded, effort, 0.0)])
             control.append(answered - began)

@@ -10,7 +10,7 @@ from msgs_config.errors import MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import frame_id_of
 from msgs_config.messages.wrenches import decode_wrenches
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
 _LARGEST = 1e9  # N and N m
@@ -22,12 +22,12 @@ class ContactSubscription:
     """Takes `contacts` of the bound simulator, and has those of each state ready."""
 
     def __init__(
-        self, node: Node, character: Character, simulators: Simulators, warnings: Warnings
+        self, node: Node, character: Character, simulators: Simulators, logger: OnceLogger
     ) -> None:
         self._simulators = simulators
         self._inbox = DirectSubscription(node, topics.CONTACTS)
         self._rows = {link.name: row for row, link in enumerate(character.links)}
-        self._warnings = warnings
+        self._once_logger = logger
         self._until_ns = -1  # of the last state of the episode that has had its contacts
         self._newest_ns = -1
         self._kept = dict[int, FloatArray]()  # by stamp
@@ -69,7 +69,7 @@ class ContactSubscription:
                 return
             message = decode_wrenches(raw)
         except MessageError as error:
-            self._warnings.say_once(f"contacts ignored: {error}")
+            self._once_logger.log_once(f"contacts ignored: {error}")
             return
         if message.stamp_ns < self._newest_ns:  # of a simulator that was started again
             self._kept.clear()
@@ -84,13 +84,13 @@ class ContactSubscription:
                 if link in self._rows:
                     wrenches[self._rows[link]] += wrench
         else:
-            self._warnings.say_once(
+            self._once_logger.log_once(
                 f"contacts ignored: not one wrench a link, of {_LARGEST:g} N and N m at most"
             )
         self._kept[message.stamp_ns] = wrenches
         if len(self._kept) > _MOST_KEPT:
             del self._kept[next(iter(self._kept))]  # the oldest: stamps that go back clear all
-            self._warnings.say_once(
+            self._once_logger.log_once(
                 f"contacts of more than {_MOST_KEPT} ticks wait for their states; the oldest are "
                 "dropped",
                 kind="contacts that wait",

@@ -18,7 +18,7 @@ from msgs_config.messages.session import (
     named,
     session_of,
 )
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
@@ -51,7 +51,7 @@ class Simulators:
         session: str,
         clock: TickClock,
         check: Callable[[RunConfiguration], None],
-        warnings: Warnings,
+        logger: OnceLogger,
     ) -> None:
         """`check` raises an error if a simulator is not what this controller was made for."""
         self._count_publishers = lambda: int(node.count_publishers(topics.JOINT_STATES.name))
@@ -59,7 +59,7 @@ class Simulators:
         self._foreign = ForeignSessions()
         self._clock = clock
         self._check = check
-        self._warnings = warnings
+        self._once_logger = logger
         self._known: dict[str, _Known] = {}  # by session, the oldest first
         self._rejected_episodes = 0
         self._now = 0.0
@@ -137,7 +137,7 @@ class Simulators:
         if self._lacks_episode_since is None:
             self._lacks_episode_since = self._now
         elif self._now > self._lacks_episode_since + _EXPLAIN_AFTER:
-            self._warnings.say_once(
+            self._once_logger.log_once(
                 f"waiting for a message on '{topics.EPISODE.name}' that says when the episode of "
                 f"the state of {stamp_ns} ns began; its session must be {named(session)}"
             )
@@ -153,14 +153,14 @@ class Simulators:
             return False
         if self._binding.bound is None and (error := self._error_of(session)) is not None:
             if self._unusable_since is None:  # else that is what this node ends with
-                self._warnings.say_once(f"state ignored: {error}")
+                self._once_logger.log_once(f"state ignored: {error}")
             return False
         return True
 
     def _reject(self, topic: str, session: str) -> None:
         line = self._foreign.reject(topic, session, self._binding.bound)
         if line is not None:
-            self._warnings.say_once(line)
+            self._once_logger.log_once(line)
 
     def _take_episode(self) -> None:
         raw = self._episodes.take()
@@ -177,7 +177,7 @@ class Simulators:
                 raise ClockError(f"its stamp, {stamp_ns} ns, is before the first tick")
         except (MessageError, ClockError) as error:
             self._rejected_episodes += 1
-            self._warnings.say_once(f"episode ignored: {error}")
+            self._once_logger.log_once(f"episode ignored: {error}")
             return
         self._known_of(session).episode_ns = stamp_ns
 
@@ -187,7 +187,7 @@ class Simulators:
             try:
                 self._hear_configuration(configuration.parse(decode(raw, String).data))
             except MessageError as error:
-                self._warnings.say_once(f"configuration ignored: {error}")
+                self._once_logger.log_once(f"configuration ignored: {error}")
         if self._binding.bound is None:
             self._refuse_the_only_one()
 

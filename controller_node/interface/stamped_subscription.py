@@ -10,7 +10,7 @@ from msgs_config.errors import LayoutError, MessageError, MotionError
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.joint_state import decode
 from msgs_config.messages.topics import Topic
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
 _LARGEST = 2**25  # bytes of a message
@@ -27,13 +27,13 @@ class StampedSubscription:
         topic: Topic,
         what: str,
         use: Callable[[Any, int], None],
-        warnings: Warnings,
+        logger: OnceLogger,
     ) -> None:
         """Hand each message and its start in ns to `use`, which may refuse it by an error."""
         self._type = topic.message_type
         self._what = what
         self._use = use
-        self._warnings = warnings
+        self._once_logger = logger
         self._inbox = DirectSubscription(node, topic)
         self.refused = 0
 
@@ -52,7 +52,7 @@ class StampedSubscription:
                 self._use(message, self._start_of(message.header.stamp, state_ns))
             except (MotionError, MessageError, LayoutError) as error:
                 self.refused += 1
-                self._warnings.say_once(f"refused {error}")
+                self._once_logger.log_once(f"refused {error}")
 
     def _start_of(self, stamp: Time, state_ns: int) -> int:
         start_ns = nanoseconds(stamp) or state_ns

@@ -8,18 +8,18 @@ from controller_node.interface.publishers import Publishers
 from controller_node.interface.stamped_subscription import StampedSubscription
 from controller_node.strength import strengths_of
 from msgs_config.messages import topics
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 
 
 class StrengthTopic:
     """Takes `~/strength`, each message before the answer to a state, and says which it took."""
 
     def __init__(
-        self, node: Node, controller: Controller, outputs: Publishers, warnings: Warnings
+        self, node: Node, controller: Controller, outputs: Publishers, logger: OnceLogger
     ) -> None:
         self._controller = controller
         self._outputs = outputs
-        self._inbox = StampedSubscription(node, topics.STRENGTH, "strength", self._use, warnings)
+        self._inbox = StampedSubscription(node, topics.STRENGTH, "strength", self._use, logger)
         self._episode_ns = 0
 
     @property

@@ -10,19 +10,19 @@ from controller_node.references.trajectory import TrajectoryPoints, points_of_li
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.joint_state import split_stamp
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 
 
 class Trajectories:
     """Takes `~/joint_trajectory`, each before the answer to a state, and says which it took."""
 
     def __init__(
-        self, node: Node, controller: Controller, outputs: Publishers, warnings: Warnings
+        self, node: Node, controller: Controller, outputs: Publishers, logger: OnceLogger
     ) -> None:
         self._controller = controller
         self._outputs = outputs
         self._inbox = StampedSubscription(
-            node, topics.JOINT_TRAJECTORY, "trajectory", self._follow, warnings
+            node, topics.JOINT_TRAJECTORY, "trajectory", self._follow, logger
         )
         self._now_ns = self._episode_ns = 0
 
@@ -41,7 +41,7 @@ class Trajectories:
         self._inbox.take(state_ns)
 
     def _follow(self, message: JointTrajectory, start_ns: int) -> None:
-        self._controller.follow(
+        self._controller.set_trajectory(
             _points(message),
             start_ns=start_ns,
             now_ns=self._now_ns,

@@ -40,7 +40,7 @@ class LateCommands:
         """The commands on their way, by the tick of the state that each answers."""
         return dict(self._sent)
 
-    def recall(self, sent: Mapping[int, FloatArray]) -> None:
+    def restore(self, sent: Mapping[int, FloatArray]) -> None:
         """Go on with commands on their way."""
         self._sent = dict(sent)
 

@@ -38,7 +38,7 @@ _PATIENCE = 0.005  # s between two looks at what else there is to do
 
 
 @dataclass(frozen=True)
-class PlannerMemory:
+class PlannerSnapshot:
     """All that a planner goes on from that is not seeking a plan."""
 
     plan: Plan | None
@@ -112,18 +112,18 @@ class PredictivePlanner:
         """The plan in force."""
         return self._plan
 
-    def memory(self) -> PlannerMemory:
+    def snapshot(self) -> PlannerSnapshot:
         """What it goes on from while no plan is sought, for this planner or an equal one."""
         assert self._coming is None
         late = self.late_commands
-        return PlannerMemory(self._plan, self._anchor, {} if late is None else late.sent())
+        return PlannerSnapshot(self._plan, self._anchor, {} if late is None else late.sent())
 
-    def recall(self, memory: PlannerMemory, seed: int) -> None:
-        """Go on from a memory, with samples of a seed."""
-        self._seed, self._plan, self._anchor = seed, memory.plan, memory.anchor
+    def restore(self, snapshot: PlannerSnapshot, seed: int) -> None:
+        """Go on from a snapshot, with samples of a seed."""
+        self._seed, self._plan, self._anchor = seed, snapshot.plan, snapshot.anchor
         self._coming = None
         if self.late_commands is not None:
-            self.late_commands.recall(memory.sent)
+            self.late_commands.restore(snapshot.sent)
 
     def change_reference(self) -> None:
         """Say that the reference is another one from now on; the plan in force stays."""

@@ -48,7 +48,7 @@ class Motion:
     """A reference, and what the user should know of it."""
 
     reference: Reference
-    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def first_state(self) -> StampedState:
         """The state in which a character is to begin, so that it is where the reference is."""
@@ -70,22 +70,22 @@ def make_motion(character: Character, values: Values) -> Motion:
         return Motion(ClipReference(character.layout, frames), kept)
     if kind == "keyframes":
         keyframes = read_keyframes(character, str(_keyframes_path(values.text("keyframes"))))
-        return Motion(KeyframesReference(character.layout, keyframes), keyframes.notes)
+        return Motion(KeyframesReference(character.layout, keyframes), keyframes.warnings)
     if kind == "step":
         size, time = values.number("step.size"), values.number("step.time")
-        dofs, notes = _signal_dofs(character, values, [size])
-        return Motion(StepReference(character, dofs, size, time), notes)
+        dofs, warnings = _signal_dofs(character, values, [size])
+        return Motion(StepReference(character, dofs, size, time), warnings)
     if kind == "sine":
         amplitude, frequency = values.number("sine.amplitude"), values.number("sine.frequency")
-        dofs, notes = _signal_dofs(character, values, [amplitude, -amplitude])
-        return Motion(SineReference(character, dofs, amplitude, frequency), notes)
+        dofs, warnings = _signal_dofs(character, values, [amplitude, -amplitude])
+        return Motion(SineReference(character, dofs, amplitude, frequency), warnings)
     return Motion(HoldReference(character))
 
 
 def _signal_dofs(
     character: Character, values: Values, offsets: Sequence[float]
 ) -> tuple[list[str], tuple[str, ...]]:
-    """The degrees of freedom that a signal moves, and a note of those that it cannot move.
+    """The degrees of freedom that a signal moves, and a warning of those that it cannot move.
 
     If none are named: all that have a motor, save those whose limits an offset would leave.
     """
@@ -99,8 +99,8 @@ def _signal_dofs(
     actuated = layout.mask(layout.actuated_joint_names)
     chosen = [layout.dof_names[index] for index in np.flatnonzero(actuated & free)]
     fixed = [layout.dof_names[index] for index in np.flatnonzero(actuated & ~free)]
-    notes = (f"kept still within their limits: {', '.join(fixed)}",) if fixed else ()
-    return chosen, notes
+    warnings = (f"kept still within their limits: {', '.join(fixed)}",) if fixed else ()
+    return chosen, warnings
 
 
 def _keyframes_path(name_or_path: str) -> Path:

@@ -23,7 +23,7 @@ class Keyframes:
     configurations: GeneralizedPosition  # (p, n), (p, k, 4)
     smooth: bool  # else linear
     period: float | None = None  # s, of a loop
-    notes: tuple[str, ...] = ()  # what their author may have overlooked
+    warnings: tuple[str, ...] = ()  # what their author may have overlooked
 
 
 class KeyframesReference:
@@ -104,16 +104,16 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
     at_keyframes = keyframes.configurations.position
     lower = np.minimum(limits.lower, at_keyframes.min(axis=0))  # a rest pose may lie beyond
     upper = np.maximum(limits.upper, at_keyframes.max(axis=0))
-    notes = []
+    warnings = []
     for index in np.flatnonzero(np.isfinite(lower) | np.isfinite(upper)).tolist():
         times, values = curve.coordinate(index, _SHARES)
         beyond = np.maximum(lower[index] - values, values - upper[index])
         worst = np.unravel_index(beyond.argmax(), beyond.shape)
         if beyond[worst] > _NOTICED:
-            notes.append(
+            warnings.append(
                 f"the path between keyframes leaves the limits of "
                 f"'{character.layout.dof_names[index]}', {limits.text(index)}, by "
                 f"{beyond[worst]:.2g} {limits.unit(index)} at {begin + times[worst]:.3g} s; one "
                 "more keyframe there, or 'interpolation: linear', keeps it within"
             )
-    return tuple(notes)
+    return tuple(warnings)

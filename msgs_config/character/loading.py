@@ -94,7 +94,7 @@ def make_character(file: CharacterFile) -> Character:
         clips=file.clips,
         feet=file.feet,
         planning=file.planning,
-        notes=_notes(file, layout, links, links_without_inertial(robot)),
+        warnings=_warnings(file, layout, links, links_without_inertial(robot)),
     )
 
 
@@ -248,18 +248,20 @@ def _check_ball_joint(file: CharacterFile, name: str, limit: SoftLimit) -> None:
             )
 
 
-def _notes(
+def _warnings(
     file: CharacterFile, layout: JointLayout, links: list[Link], without_mass: set[str]
 ) -> tuple[str, ...]:
     limp = [name for name in layout.actuated_joint_names if name not in file.gains]
     first = 1 if file.loading.fixed_base else 0
     unknown = sorted(without_mass & {link.name for link in links[first:]})
-    notes = []
+    warnings = []
     if limp:
-        notes.append(f"joints without gains in {file.path.name} are limp: {', '.join(limp)}")
+        warnings.append(f"joints without gains in {file.path.name} are limp: {', '.join(limp)}")
     if unknown:
-        notes.append(f"links without <inertial>, the engine assumes a mass: {', '.join(unknown)}")
-    return tuple(notes)
+        warnings.append(
+            f"links without <inertial>, the engine assumes a mass: {', '.join(unknown)}"
+        )
+    return tuple(warnings)
 
 
 def _gains(file: CharacterFile, layout: JointLayout) -> dict[str, Gains]:

@@ -190,7 +190,7 @@ class Character:
     clips: ClipFormat
     feet: tuple[str, ...] = ()  # the links that it stands on
     planning: Planning = Planning()
-    notes: tuple[str, ...] = ()  # what its author may have overlooked
+    warnings: tuple[str, ...] = ()  # what its author may have overlooked
     placement: Placement = Placement()
 
     @cached_property

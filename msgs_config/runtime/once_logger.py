@@ -7,7 +7,7 @@ UNLOGGED = "unlogged_warnings"  # the count's name in the diagnostics
 _LONGEST = 1000  # characters of a sentence, which may quote what was received
 
 
-class Warnings:
+class OnceLogger:
     """A node's warnings, each sentence once; those beyond `MOST_LOGGED` are only counted."""
 
     def __init__(self, node: Node) -> None:
@@ -17,7 +17,7 @@ class Warnings:
         self.unlogged = 0
         """How many were not logged because so many different ones were; repetitions count."""
 
-    def say_once(self, sentence: str, kind: str = "") -> None:
+    def log_once(self, sentence: str, kind: str = "") -> None:
         """Log a sentence, unless it, or another one of its kind, was logged before.
 
         A kind is the caller's own word, of which there are few: those are always logged.

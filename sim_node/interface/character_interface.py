@@ -11,7 +11,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.wrenches import decode_wrenches
 from msgs_config.parameters import Values
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 from sim_node.interface.inbox import FirstTick, OwnSession, StampedSubscription, forget
 from sim_node.interface.publishers import Publishers
@@ -37,7 +37,7 @@ class CharacterInterface:
         collector: Collector,
         outputs: Publishers,
         session: str,
-        warnings: Warnings,
+        logger: OnceLogger,
     ) -> None:
         """Subscribe to the character's topics; `collector` judges its commands."""
         namespace = actor.role.name
@@ -50,12 +50,12 @@ class CharacterInterface:
         self._pushes = WrenchQueue(actor.character)
         self._decoder = JointStateDecoder()
         self._commands = DirectSubscription(node, self.torques)
-        self._warnings = warnings
+        self._once_logger = logger
         self._of = f" for '{namespace}'" if namespace else ""
-        self._own = OwnSession(session, warnings)
+        self._own = OwnSession(session, logger)
         self._wrench = topics.EXTERNAL_WRENCH.under(namespace)
         self._wrenches = StampedSubscription(
-            node, self._wrench, "push", self._of, self._own, warnings
+            node, self._wrench, "push", self._of, self._own, logger
         )
 
     @property
@@ -102,12 +102,12 @@ class CharacterInterface:
             verdict = self.collector.submit(command.stamp_ns, indices, command.effort)
         except (MessageError, LayoutError, CommandError) as error:
             self.collector.count_rejected()
-            self._warnings.say_once(f"command{self._of} rejected: {error}")
+            self._once_logger.log_once(f"command{self._of} rejected: {error}")
             return CommandStatus.REJECTED
         if verdict is CommandStatus.FUTURE or (
             command.stamp_ns == 0 and verdict is CommandStatus.STALE
         ):
-            self._warnings.say_once(
+            self._once_logger.log_once(
                 f"command{self._of} dropped: it answers {command.stamp_ns} ns, the state is of "
                 f"{self.collector.stamp_ns} ns; the stamp must be that of the state",
                 kind=f"a {verdict.value} command{self._of}",
@@ -132,10 +132,10 @@ class CharacterInterface:
 
 
 def open_ports(
-    node: Node, cast: SimulatorParameters, simulation: Simulation, session: str, warnings: Warnings
+    node: Node, cast: SimulatorParameters, simulation: Simulation, session: str, logger: OnceLogger
 ) -> list[CharacterInterface]:
     """A port for each character; all say the same session."""
-    return [_open_port(node, actor, cast.values, session, warnings) for actor in simulation.actors]
+    return [_open_port(node, actor, cast.values, session, logger) for actor in simulation.actors]
 
 
 def publish_configurations(
@@ -164,13 +164,13 @@ def publish_configurations(
 
 
 def _open_port(
-    node: Node, actor: SimulatedCharacter, values: Values, session: str, warnings: Warnings
+    node: Node, actor: SimulatedCharacter, values: Values, session: str, logger: OnceLogger
 ) -> CharacterInterface:
     names, commanded = actor.layout.dof_names, actor.commanded
     collector: Collector = LockstepBarrier(names, commanded)
     if is_realtime(values):
         collector = ZeroOrderHold(names, commanded, command_timeout_ns(values))
-    for note in actor.notes:
-        node.get_logger().warning(f"{actor.role.prefix}{note}")
+    for warning in actor.warnings:
+        node.get_logger().warning(f"{actor.role.prefix}{warning}")
     outputs = Publishers(node, actor, display_ticks(values), session)
-    return CharacterInterface(node, actor, collector, outputs, session, warnings)
+    return CharacterInterface(node, actor, collector, outputs, session, logger)

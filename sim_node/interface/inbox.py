@@ -11,7 +11,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import frame_id_of
 from msgs_config.messages.session import ANONYMOUS, ForeignSessions, session_of
 from msgs_config.messages.topics import Topic
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
 _MOST_A_TICK = 100  # messages, lest a flood of them stop the world
@@ -24,9 +24,9 @@ FirstTick: TypeAlias = Callable[[int], int]
 class OwnSession:
     """Rejects what names the session of another simulator; what names none may be for any."""
 
-    def __init__(self, session: str, warnings: Warnings) -> None:
+    def __init__(self, session: str, logger: OnceLogger) -> None:
         self._session = session
-        self._warnings = warnings
+        self._once_logger = logger
         self._foreign = ForeignSessions()
 
     @property
@@ -41,7 +41,7 @@ class OwnSession:
             return False
         line = self._foreign.reject(topic.name, session, self._session)
         if line is not None:
-            self._warnings.say_once(line)
+            self._once_logger.log_once(line)
         return True
 
 
@@ -53,7 +53,7 @@ class StampedSubscription:
     """A topic whose messages act from the first tick not before their stamp; 0: from the next."""
 
     def __init__(
-        self, node: Node, topic: Topic, what: str, of: str, own: OwnSession, warnings: Warnings
+        self, node: Node, topic: Topic, what: str, of: str, own: OwnSession, logger: OnceLogger
     ) -> None:
         """Subscribe; warnings begin with `what` and whom it is `of`."""
         self.counts = Counter[str]()
@@ -61,7 +61,7 @@ class StampedSubscription:
         self._own = own
         self._what = what
         self._of = of
-        self._warnings = warnings
+        self._once_logger = logger
         self._messages = DirectSubscription(node, topic)
 
     def take(self, clock: TickClock, tick: int, use: Callable[[bytes, FirstTick], None]) -> None:
@@ -89,7 +89,7 @@ class StampedSubscription:
                 self.counts["rejected"] += 1
                 past = f"a {self._what}{self._of} of the past"
                 kind = past if isinstance(error, _PastError) else ""
-                self._warnings.say_once(f"{self._what}{self._of} refused: {error}", kind)
+                self._once_logger.log_once(f"{self._what}{self._of} refused: {error}", kind)
 
     def forget(self) -> None:
         """Leave unread what was sent in the episode before."""

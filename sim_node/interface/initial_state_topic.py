@@ -9,7 +9,7 @@ from msgs_config.errors import LayoutError, MessageError, SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.state import StampedState
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare
@@ -99,7 +99,7 @@ class _Question:
         self._node = node
         self._topic = topics.INITIAL_STATE.of(topics.CONTROLLER_NODE).under(part.name)
         self._of = f" of '{part.name}'" if part.name else ""
-        self._warnings = Warnings(node)
+        self._once_logger = OnceLogger(node)
         self._decoder = JointStateDecoder()
         self._messages = DirectSubscription(node, self._topic)
         self._contested = False
@@ -129,7 +129,7 @@ class _Question:
             check_state(self.part.character, state, self.part.values.number("speed_limit"))
         except (MessageError, LayoutError) as error:
             self._rejection = f"initial state{self._of} rejected: {error}"
-            self._warnings.say_once(self._rejection)
+            self._once_logger.log_once(self._rejection)
             return
         self._state = state
 

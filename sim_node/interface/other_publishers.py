@@ -6,7 +6,7 @@ from rclpy.node import Node
 
 from msgs_config.messages.session import REMEDY
 from msgs_config.messages.topics import Topic
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from sim_node.interface.character_interface import CharacterInterface
 from sim_node.interface.publisher_diagnosis import all_publisher_names
 
@@ -15,12 +15,12 @@ class RivalWatch:
     """Logs, once for each set of names, that a topic of states has more than one publisher."""
 
     def __init__(
-        self, node: Node, ports: Sequence[CharacterInterface], session: str, warnings: Warnings
+        self, node: Node, ports: Sequence[CharacterInterface], session: str, logger: OnceLogger
     ) -> None:
         self._node = node
         self._topics: list[Topic] = [port.states for port in ports]
         self._session = session
-        self._warnings = warnings
+        self._once_logger = logger
         self.seen = False  # at the last look
 
     def look(self) -> None:
@@ -38,7 +38,7 @@ class RivalWatch:
         names.remove(own)
         if names:
             others = ", ".join(names)
-            self._warnings.say_once(
+            self._once_logger.log_once(
                 f"'{topic.name}' of this node, {own} (session {self._session}), is published by "
                 f"{others} as well; unless that was killed just now, {REMEDY}"
             )

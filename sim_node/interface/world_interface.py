@@ -8,7 +8,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, ball_names, encode_balls
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.topics import Outgoing
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from sim_node.interface.inbox import FirstTick, OwnSession, StampedSubscription
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
@@ -18,16 +18,16 @@ class WorldInterface:
     """Takes throws, and says which ones began and where the balls are."""
 
     def __init__(
-        self, node: Node, simulation: Simulation, session: str, warnings: Warnings
+        self, node: Node, simulation: Simulation, session: str, logger: OnceLogger
     ) -> None:
         """Offer the topics, in the node's own namespace."""
         self._session = session
-        self._own = OwnSession(session, warnings)
+        self._own = OwnSession(session, logger)
         self._simulation = simulation
         self._schedule = ThrowQueue()
         self._codec = ThrowCodec(session)
         self._told_ns = -1  # of the last throws that were published
-        self._inbox = StampedSubscription(node, topics.THROW, "throw", "", self._own, warnings)
+        self._inbox = StampedSubscription(node, topics.THROW, "throw", "", self._own, logger)
         self._applied = topics.create_publisher(node, topics.APPLIED_THROW)
         self._thrown = topics.create_publisher(node, topics.THROWN)
 

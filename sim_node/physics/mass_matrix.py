@@ -34,24 +34,26 @@ def clear_of_limits(character: Character) -> FloatArray:
     return np.clip(character.rest_position, lower + margin, upper - margin)
 
 
-def measure_mobility(character: Character) -> FloatArray:
+def measure_inverse_mass_matrix(character: Character) -> FloatArray:
     """The inverse mass matrix (n, n) near the rest pose: what a unit of each effort accelerates."""
     size = character.layout.size
     rest, still = clear_of_limits(character), np.zeros(size)
-    mobility = np.zeros((size, size))
+    inverse_mass = np.zeros((size, size))
     with World(still_settings(gravity=0.0)) as world:
         body = world.add(passing_through_itself(character))
         for column, effort in enumerate(np.eye(size)):
             body.set_state(rest, still)
             body.apply(effort)
             world.step()
-            mobility[:, column] = body.read()[1] / INSTANT
-    return mobility
+            inverse_mass[:, column] = body.read()[1] / INSTANT
+    return inverse_mass
 
 
 def make_passive_forces(character: Character, step_s: float) -> PassiveForces:
     """The passive forces of a character's joints at engine steps of `step_s`."""
     is_passive = [joint.damping or joint.soft_limit for joint in character.moving_joints]
     size = character.layout.size
-    mobility = measure_mobility(character) if any(is_passive) else np.zeros((size, size))
-    return PassiveForces(character, step_s, mobility)
+    inverse_mass = (
+        measure_inverse_mass_matrix(character) if any(is_passive) else np.zeros((size, size))
+    )
+    return PassiveForces(character, step_s, inverse_mass)

@@ -35,11 +35,11 @@ _ROUNDING = 1e-12  # of a force, that may be wrong without consequence
 class PassiveForces:
     """The passive forces of one character, for an engine that adds them at each of its steps.
 
-    `active` says whether there are any, `notes` what the user should know of them.
+    `active` says whether there are any, `warnings` what the user should know of them.
     """
 
-    def __init__(self, character: Character, step_s: float, mobility: FloatArray) -> None:
-        """For engine steps of `step_s`; `mobility` (n, n) is the inverse mass matrix at rest."""
+    def __init__(self, character: Character, step_s: float, inverse_mass: FloatArray) -> None:
+        """For engine steps of `step_s`; `inverse_mass` (n, n) is that of the rest pose."""
         self._step_s = step_s
         self._limits = [
             (character.layout.joint(joint.name).entries, joint.soft_limit)
@@ -48,9 +48,9 @@ class PassiveForces:
         ]
         self._model = DynamicsModel(character) if self._limits else None
         wanted = character.passive_damping()
-        self._damping = bounded_damping(wanted, mobility, step_s)
+        self._damping = bounded_damping(wanted, inverse_mass, step_s)
         self.active = bool(self._limits or wanted.any())
-        self.notes = tuple(
+        self.warnings = tuple(
             f"the passive damping of '{name}' is kept at {kept:.3g} of {asked:.3g}: more would be "
             f"unstable at engine steps of {1e3 * step_s:.3g} ms, substeps make them shorter"
             for name, asked, kept in zip(
@@ -207,7 +207,7 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
     return product
 
 
-def bounded_damping(damping: FloatArray, mobility: FloatArray, step_s: float) -> FloatArray:
+def bounded_damping(damping: FloatArray, inverse_mass: FloatArray, step_s: float) -> FloatArray:
     """Damping (n,) no larger than an explicit damper may have.
 
     An explicit damper is unstable where it takes more than twice the velocity away in one step,
@@ -217,6 +217,6 @@ def bounded_damping(damping: FloatArray, mobility: FloatArray, step_s: float) ->
     poses in which the inertia is less.
     """
     roots = np.sqrt(damping)
-    taken: FloatArray = step_s * roots * fixed_order.apply(np.abs(mobility), roots)
+    taken: FloatArray = step_s * roots * fixed_order.apply(np.abs(inverse_mass), roots)
     bounded: FloatArray = damping / np.maximum(taken, 1.0)
     return bounded

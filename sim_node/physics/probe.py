@@ -9,7 +9,7 @@ from msgs_config.messages.probe import DynamicsSample
 from sim_node.physics.mass_matrix import (
     INSTANT,
     clear_of_limits,
-    measure_mobility,
+    measure_inverse_mass_matrix,
     passing_through_itself,
     still_settings,
 )
@@ -41,11 +41,11 @@ def measure_probe(character: Character, gravity: float) -> DynamicsSample:
     rng = np.random.default_rng(_SEED)
     position = _position(character, rng)
     velocity = rng.uniform(-_SPEED, _SPEED, layout.size)
-    mobility = measure_mobility(character)
-    yielding = np.diag(mobility)
+    inverse_mass = measure_inverse_mass_matrix(character)
+    yielding = np.diag(inverse_mass)
     _check_yielding(character, yielding)
     effort = rng.uniform(-_ACCELERATION, _ACCELERATION, layout.size) / yielding
-    passive = PassiveForces(character, INSTANT, mobility)
+    passive = PassiveForces(character, INSTANT, inverse_mass)
     with World(still_settings(gravity)) as world:
         body = world.add(passing_through_itself(character))
         body.set_state(position, velocity)

@@ -84,9 +84,9 @@ class SimulatedCharacter:
         self._position, self._velocity = position.copy(), velocity.copy()
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """What the simulation does otherwise than the character's file says."""
-        return self._passive.notes
+        return self._passive.warnings
 
     def enter(self, world: World, stamp_ns: int) -> None:
         """Enter a world in the initial state; an episode begins."""
@@ -136,8 +136,8 @@ class SimulatedCharacter:
         """Read the state that the tick has led to."""
         self._read(stamp_ns, self._applied)
 
-    def memory(self) -> CharacterSnapshot:
-        """What `recall` needs, to be taken between two ticks."""
+    def snapshot(self) -> CharacterSnapshot:
+        """What `restore` needs, to be taken between two ticks."""
         return CharacterSnapshot(
             self.state,
             self.contacts,
@@ -146,11 +146,11 @@ class SimulatedCharacter:
             self.saturated_ticks.copy(),
         )
 
-    def recall(self, memory: CharacterSnapshot) -> None:
+    def restore(self, snapshot: CharacterSnapshot) -> None:
         """Know again what was known then; the engine is restored by who owns it."""
-        self.state, self.contacts, self.pushes = memory.state, memory.contacts, memory.pushes
-        self._delayed = deque(memory.delayed)
-        self.saturated_ticks = memory.saturated_ticks.copy()
+        self.state, self.contacts, self.pushes = snapshot.state, snapshot.contacts, snapshot.pushes
+        self._delayed = deque(snapshot.delayed)
+        self.saturated_ticks = snapshot.saturated_ticks.copy()
 
     def link_frames(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""

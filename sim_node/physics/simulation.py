@@ -30,7 +30,7 @@ class SimulationSettings:
 
 
 @dataclass(frozen=True)
-class Memory:
+class CharactersSnapshot:
     """A state between two ticks, but for the engine's."""
 
     tick: int
@@ -44,7 +44,7 @@ class Memory:
 class InMemorySnapshot:
     """A state between two ticks, which the simulation that saved it can return to."""
 
-    memory: Memory
+    characters: CharactersSnapshot
     world: int  # its number in the engine
 
 
@@ -52,7 +52,7 @@ class InMemorySnapshot:
 class Snapshot:
     """A state between two ticks, for any simulation of equal roles and settings."""
 
-    memory: Memory
+    characters: CharactersSnapshot
     balls: tuple[ProjectileThrow, ...]
     world: bytes
 
@@ -188,7 +188,7 @@ class Simulation:
 
     def save(self) -> InMemorySnapshot:
         """Keep the present state in memory, until it is forgotten."""
-        return InMemorySnapshot(self._memory(), self._world.save())
+        return InMemorySnapshot(self._characters_snapshot(), self._world.save())
 
     def restore(self, saved: InMemorySnapshot) -> None:
         """Return to a saved state: what follows is what followed it, to the bit.
@@ -197,7 +197,7 @@ class Simulation:
         not found out what touches. After a reset no state saved before can be restored.
         """
         self._world.restore(saved.world)
-        self._recall(saved.memory)
+        self._restore(saved.characters)
 
     def forget(self, saved: InMemorySnapshot) -> None:
         """Give back the memory of a saved state."""
@@ -205,22 +205,22 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """The present state, to be taken over by a simulation in another process."""
-        return Snapshot(self._memory(), self.balls, self._world.to_bytes())
+        return Snapshot(self._characters_snapshot(), self.balls, self._world.to_bytes())
 
     def load_snapshot(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot, as its own simulation would, to the bit."""
         self._world.from_bytes(snapshot.world, snapshot.balls)
-        self._recall(snapshot.memory)
+        self._restore(snapshot.characters)
 
-    def _memory(self) -> Memory:
-        actors = tuple(actor.memory() for actor in self.actors)
-        return Memory(self.tick, self.episode, actors, self.throws, self._thrown_at)
+    def _characters_snapshot(self) -> CharactersSnapshot:
+        actors = tuple(actor.snapshot() for actor in self.actors)
+        return CharactersSnapshot(self.tick, self.episode, actors, self.throws, self._thrown_at)
 
-    def _recall(self, memory: Memory) -> None:
-        self.tick, self.episode = memory.tick, memory.episode
-        self.throws, self._thrown_at = memory.throws, memory.thrown_at
-        for actor, its in zip(self.actors, memory.actors, strict=True):
-            actor.recall(its)
+    def _restore(self, snapshot: CharactersSnapshot) -> None:
+        self.tick, self.episode = snapshot.tick, snapshot.episode
+        self.throws, self._thrown_at = snapshot.throws, snapshot.thrown_at
+        for actor, its in zip(self.actors, snapshot.actors, strict=True):
+            actor.restore(its)
 
     def _fresh_world(self) -> World:
         world = World(self.settings.world)

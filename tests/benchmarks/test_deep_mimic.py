@@ -31,7 +31,7 @@ def test_pybullets_own_stable_pd_gets_our_states_joint_by_joint() -> None:
             desired = [entry for part in parts for entry in part]
             velocity = theirs._desired_velocity(tick.reference.velocity)
             efforts = theirs._law.computePDForces(desired, velocity, _LARGEST_EFFORTS)
-            ours, _ = driver.answer(tick.state, walk[0].state.stamp_ns)
+            ours, _ = driver.compute_effort(tick.state, walk[0].state.stamp_ns)
 
             found, start = np.zeros(layout.size), 7
             for name in order:

@@ -292,7 +292,7 @@ def test_the_weight_is_borne_once_whatever_law_it_is_added_to(
     state = StampedState(TickClock(RATE_HZ).stamp_ns(1), position, 0.0 * position, None)
     limp = {"gain_scale.p": 0.0, "gain_scale.d": 0.0, "root_assistance": False, "balance": True}
 
-    effort, _ = controller("humanoid", law=law, **limp).answer(state, state.stamp_ns)
+    effort, _ = controller("humanoid", law=law, **limp).compute_effort(state, state.stamp_ns)
 
     weight = still(humanoid, position).bias_force()[elbow]
     assert abs(weight) > 0.1

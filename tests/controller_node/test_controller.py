@@ -68,11 +68,11 @@ def test_the_same_state_gets_the_same_answer_whatever_was_asked_before(law: str)
     # Arrange
     driver = walker(law=law)
     sequence = states(10)
-    first = [driver.answer(state, stamp(1)) for state in sequence]
+    first = [driver.compute_effort(state, stamp(1)) for state in sequence]
 
     # Act
-    backwards = [driver.answer(state, stamp(1)) for state in reversed(sequence)][::-1]
-    alone = [walker(law=law).answer(state, stamp(1)) for state in sequence]
+    backwards = [driver.compute_effort(state, stamp(1)) for state in reversed(sequence)][::-1]
+    alone = [walker(law=law).compute_effort(state, stamp(1)) for state in sequence]
 
     # Assert
     for answers in zip(first, backwards, alone, strict=True):
@@ -86,7 +86,7 @@ def test_an_answer_leaves_the_state_alone() -> None:
     state = states(1)[0]
     before = replace(state, position=state.position.copy(), velocity=state.velocity.copy())
 
-    walker().answer(state, stamp(1))
+    walker().compute_effort(state, stamp(1))
 
     np.testing.assert_array_equal(state.position, before.position)
     np.testing.assert_array_equal(state.velocity, before.velocity)
@@ -95,12 +95,12 @@ def test_an_answer_leaves_the_state_alone() -> None:
 def test_later_answers_leave_earlier_ones_alone() -> None:
     # Arrange
     driver = walker()
-    effort, reference = driver.answer(states(1)[0], stamp(1))
+    effort, reference = driver.compute_effort(states(1)[0], stamp(1))
     before = effort.copy(), reference.position.copy(), reference.velocity.copy()
 
     # Act
     for state in states(5):
-        driver.answer(state, stamp(1))
+        driver.compute_effort(state, stamp(1))
 
     # Assert
     after = effort, reference.position, reference.velocity
@@ -115,7 +115,7 @@ def test_the_reference_is_that_at_the_states_stamp_since_the_episode_began(law: 
     clip = ClipReference(HUMANOID, read_clip(character("humanoid"), "walk"))
     for state in states(30)[episode - 1 :]:
         # Act
-        _, reference = driver.answer(state, stamp(episode))
+        _, reference = driver.compute_effort(state, stamp(episode))
 
         # Assert
         expected = clip.sample((state.stamp_ns - stamp(episode)) / 1e9)
@@ -128,9 +128,9 @@ def test_the_reference_is_that_at_the_states_stamp_since_the_episode_began(law: 
 def test_without_assistance_nothing_is_asked_of_the_root(law: str) -> None:
     helped, alone = walker(law=law), walker(law=law, root_assistance=False)
     for state in states(5):
-        assert np.all(helped.answer(state, stamp(1))[0][:6] != 0.0)
-        assert np.all(alone.answer(state, stamp(1))[0][:6] == 0.0)
-        assert np.all(alone.answer(state, stamp(1))[0][6:] != 0.0)
+        assert np.all(helped.compute_effort(state, stamp(1))[0][:6] != 0.0)
+        assert np.all(alone.compute_effort(state, stamp(1))[0][:6] == 0.0)
+        assert np.all(alone.compute_effort(state, stamp(1))[0][6:] != 0.0)
 
 
 def test_efforts_are_clipped_to_the_controllers_limits() -> None:
@@ -141,7 +141,7 @@ def test_efforts_are_clipped_to_the_controllers_limits() -> None:
     state = states(1)[0]
 
     # Act
-    wanted, given = (driver.answer(state, stamp(1))[0] for driver in (free, bound))
+    wanted, given = (driver.compute_effort(state, stamp(1))[0] for driver in (free, bound))
 
     # Assert
     np.testing.assert_allclose(given[chest], wanted[chest] * 5.0 / np.linalg.norm(wanted[chest]))
@@ -156,9 +156,9 @@ def test_an_episode_is_answered_alike_whatever_tick_it_begins_at(first: int) -> 
         tick = round(state.stamp_ns * RATE / 1e9) - 1
         moved = replace(state, stamp_ns=stamp(first + tick))
 
-        effort, reference = later.answer(moved, stamp(first))
+        effort, reference = later.compute_effort(moved, stamp(first))
 
-        expected, desired = begun.answer(state, stamp(1))
+        expected, desired = begun.compute_effort(state, stamp(1))
         assert effort.tobytes() == expected.tobytes()
         assert reference.position.tobytes() == desired.position.tobytes()
 
@@ -167,19 +167,19 @@ def test_changed_gains_count_from_the_next_state_on() -> None:
     # Arrange
     driver, doubled = walker(law="pd"), walker(law="pd", **{"gain_scale.p": 2.0})
     first, second = states(2)
-    driver.answer(first, stamp(1))
+    driver.compute_effort(first, stamp(1))
 
     # Act
     driver.settings = doubled.settings
 
     # Assert
-    effort, _ = driver.answer(second, stamp(1))
-    np.testing.assert_array_equal(effort, doubled.answer(second, stamp(1))[0])
+    effort, _ = driver.compute_effort(second, stamp(1))
+    np.testing.assert_array_equal(effort, doubled.compute_effort(second, stamp(1))[0])
 
 
 def test_a_state_at_another_rate_is_a_clock_error() -> None:
     with pytest.raises(ClockError, match="4166666 ns is no tick at 1000 Hz"):
-        controller("humanoid", rate=1000).answer(states(1)[0], stamp(1))
+        controller("humanoid", rate=1000).compute_effort(states(1)[0], stamp(1))
 
 
 # --- driven characters ---------------------------------------------------------------------------
@@ -266,16 +266,16 @@ def test_the_pendulum_settles_where_its_spring_carries_its_weight(law: str) -> N
 def test_an_episode_of_the_same_stamp_that_is_begun_has_nothing_of_the_one_before() -> None:
     # Arrange
     driver, (first, second, third) = walker(law="pid"), states(3)
-    before = [driver.answer(state, stamp(1))[0].tobytes() for state in (first, second)]
+    before = [driver.compute_effort(state, stamp(1))[0].tobytes() for state in (first, second)]
     weak = strengths_of(HUMANOID, ("chest",), (0.5,), stamp(2))
     driver.set_strengths(weak, episode_ns=stamp(1))
     points = points_of_lists(["left_knee"], [0.5], [[-1.0]], [[]], [[]])
-    driver.follow(points, start_ns=stamp(3), now_ns=stamp(3), episode_ns=stamp(1))
-    driver.answer(third, stamp(1))
+    driver.set_trajectory(points, start_ns=stamp(3), now_ns=stamp(3), episode_ns=stamp(1))
+    driver.compute_effort(third, stamp(1))
 
     # Act
     driver.begin_episode(stamp(1))
 
     # Assert
-    again = [driver.answer(state, stamp(1))[0].tobytes() for state in (first, second)]
+    again = [driver.compute_effort(state, stamp(1))[0].tobytes() for state in (first, second)]
     assert again == before

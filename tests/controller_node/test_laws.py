@@ -190,11 +190,11 @@ def test_the_integral_begins_anew_with_an_episode() -> None:
     by = driver("pid", 0.0, 0.0, 10.0)
     stamps = [by.clock.stamp_ns(tick) for tick in range(1, 20)]
     for stamp in stamps[:10]:
-        effort, _ = by.answer(state_at(stamp, 0.0), stamps[0])
+        effort, _ = by.compute_effort(state_at(stamp, 0.0), stamps[0])
     assert effort[0] == pytest.approx(10.0 * 9 * PERIOD, rel=1e-6)
 
-    first, _ = by.answer(state_at(stamps[10], 0.0), stamps[10])
-    second, _ = by.answer(state_at(stamps[11], 0.0), stamps[10])
+    first, _ = by.compute_effort(state_at(stamps[10], 0.0), stamps[10])
+    second, _ = by.compute_effort(state_at(stamps[11], 0.0), stamps[10])
 
     assert first[0] == 0.0
     assert second[0] == pytest.approx(10.0 * PERIOD, rel=1e-6)
@@ -207,7 +207,7 @@ def test_the_integral_begins_anew_though_the_first_states_of_the_episode_were_no
 
     def answer(position: FloatArray, tick: int, episode: int) -> float:
         state = StampedState(clock.stamp_ns(tick), position, np.zeros(1), np.zeros(1))
-        return float(driver.answer(state, clock.stamp_ns(episode))[0][0])
+        return float(driver.compute_effort(state, clock.stamp_ns(episode))[0][0])
 
     for tick in range(1, 13):
         answer(rest - 0.5, tick, episode=1)
@@ -220,10 +220,10 @@ def test_the_integral_of_an_episode_that_lasts_longer_than_the_one_before_begins
     """An episode of one tick: the next one's first time is that of the last state answered."""
     by = driver("pid", 0.0, 0.0, 10.0)
     stamps = [by.clock.stamp_ns(tick) for tick in range(1, 6)]
-    by.answer(state_at(stamps[0], 0.0), stamps[0])
-    by.answer(state_at(stamps[1], 0.0), stamps[1])
+    by.compute_effort(state_at(stamps[0], 0.0), stamps[0])
+    by.compute_effort(state_at(stamps[1], 0.0), stamps[1])
 
-    effort, _ = by.answer(state_at(stamps[2], 0.0), stamps[1])
+    effort, _ = by.compute_effort(state_at(stamps[2], 0.0), stamps[1])
 
     assert effort[0] == pytest.approx(10.0 * PERIOD, rel=1e-6)
 
@@ -232,7 +232,7 @@ def test_the_same_state_twice_does_not_advance_the_integral() -> None:
     by = driver("pid", 0.0, 0.0, 10.0)
     stamps = [by.clock.stamp_ns(tick) for tick in range(1, 4)]
     efforts = [
-        by.answer(state_at(stamp, 0.0), stamps[0])[0][0]
+        by.compute_effort(state_at(stamp, 0.0), stamps[0])[0][0]
         for stamp in (stamps[0], stamps[1], stamps[1], stamps[1], stamps[2])
     ]
 

@@ -57,7 +57,9 @@ def as_message(name: str, state: StampedState) -> JointState:
 
 def answers(driver: Any, *ticks: int) -> FloatArray:
     """The humanoid's efforts (ticks, n) in some ticks."""
-    return np.array([driver.answer(some_state("humanoid", tick), FIRST)[0] for tick in ticks])
+    return np.array(
+        [driver.compute_effort(some_state("humanoid", tick), FIRST)[0] for tick in ticks]
+    )
 
 
 # Without ROS
@@ -218,7 +220,7 @@ def test_what_runs_the_humanoid_is_changed_step_by_step(
         reference = simulator.reference(as_message("humanoid", state))
 
         # Assert
-        effort, wanted = controller("humanoid", **in_force).answer(state, FIRST)
+        effort, wanted = controller("humanoid", **in_force).compute_effort(state, FIRST)
         assert list(torques.effort) == effort.tolist(), in_force
         assert list(reference.position) == wanted.position.tolist()
         assert list(reference.velocity) == wanted.velocity.tolist()

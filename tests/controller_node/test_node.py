@@ -46,7 +46,7 @@ def expected_answer(
 ) -> tuple[FloatArray, StampedReference]:
     """What the same controller answers without ROS."""
     start_ns = state.stamp_ns if episode_ns is None else episode_ns
-    return controller(name, **parameters).answer(state, start_ns)
+    return controller(name, **parameters).compute_effort(state, start_ns)
 
 
 # What it answers

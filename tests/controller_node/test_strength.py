@@ -29,7 +29,7 @@ def effort(given: Mapping[str, object], strengths: Strengths | None = None) -> F
     driver = controller("humanoid", **given)
     if strengths is not None:
         driver.set_strengths(strengths, episode_ns=FIRST_NS)
-    return driver.answer(state(), FIRST_NS)[0]
+    return driver.compute_effort(state(), FIRST_NS)[0]
 
 
 def of(start_ns: int = FIRST_NS, **by_joint: float) -> Strengths:
@@ -86,7 +86,7 @@ def test_parameter_and_message_multiply() -> None:
 
 
 def chest_effort(driver: Controller, tick: int, episode_ns: int = FIRST_NS) -> list[float]:
-    driven: list[float] = driver.answer(state(tick), episode_ns)[0][CHEST].tolist()
+    driven: list[float] = driver.compute_effort(state(tick), episode_ns)[0][CHEST].tolist()
     return driven
 
 

@@ -225,7 +225,9 @@ def ends_of(file: str, parts: Sequence[CharacterParameters]) -> dict[str, Ending
             if tick < TICKS:
                 simulation.step(
                     [
-                        np.where(actor.commanded, driver.answer(actor.state, begin_ns)[0], 0.0)
+                        np.where(
+                            actor.commanded, driver.compute_effort(actor.state, begin_ns)[0], 0.0
+                        )
                         for driver, actor in zip(drivers, simulation.actors, strict=True)
                     ]
                 )

@@ -91,7 +91,7 @@ def eventful_run(
                 simulation.reset()
                 episode_ns = simulation.stamp_ns
             else:
-                effort, desired = controller.answer(actor.state, episode_ns)
+                effort, desired = controller.compute_effort(actor.state, episode_ns)
                 run.references.append(desired)
                 acting = [
                     ExternalWrench(

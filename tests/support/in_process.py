@@ -78,7 +78,7 @@ class _Run:
             self._states.append(actor.state)
             for _ in range(plan.ticks):
                 touched = None if actor.contacts is None else actor.contacts.wrenches
-                effort, reference = controller.answer(actor.state, episode_ns, touched)
+                effort, reference = controller.compute_effort(actor.state, episode_ns, touched)
                 self._references.append(reference)
                 if controller.mode is not None and controller.mode not in self._modes[-1:]:
                     self._modes.append(controller.mode)

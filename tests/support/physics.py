@@ -277,6 +277,6 @@ def run_together(
     episode_ns = run.state.stamp_ns
     for _ in range(ticks):
         state = run.state
-        effort, reference = driver.answer(state, episode_ns)
+        effort, reference = driver.compute_effort(state, episode_ns)
         yield state, effort, reference
         run.advance(effort)

@@ -119,7 +119,7 @@ def run(
                     _throw(simulation, throw)
             assert actor.contacts is not None
             contacts.append(actor.contacts.wrenches)
-            effort, reference = control.answer(
+            effort, reference = control.compute_effort(
                 actor.state, episode_ns, actor.contacts.wrenches if control.needs_contacts else None
             )
             if control.mode is not None and control.mode is not (modes or [None])[-1]:

@@ -12,7 +12,7 @@ from actuated_characters.bags.metadata import METADATA
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recovery.rewriting import Contents, Progress, rewrite, storage_files
 from actuated_characters.bags.storage import reason
-from actuated_characters.metrics.collector import CONFIGURATION, HEARD, RunListener
+from actuated_characters.metrics.collector import CONFIGURATION, HEARD, MetricsCollector
 from actuated_characters.runs.run_directory import BAG, SUMMARY, figures_directory, write_figures
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
@@ -140,11 +140,11 @@ def _measure(directory: Path, recovered: Recovered, report: Progress) -> None:
         made = {each: place for each, place in places.items() if not (place / SUMMARY).exists()}
         if recovered.damaged is not None:
             recovered.kept = [place for each, place in places.items() if each not in made]
-        listeners = {each: RunListener(f"{each}/{topics.SIM_NODE}"[1:]) for each in made}
-        if listeners:
-            _listen(recovered, listeners, report)
-        for namespace, listener in listeners.items():
-            write_figures(made[namespace], *listener.results())
+        collectors = {each: MetricsCollector(f"{each}/{topics.SIM_NODE}"[1:]) for each in made}
+        if collectors:
+            _collect(recovered, collectors, report)
+        for namespace, collector in collectors.items():
+            write_figures(made[namespace], *collector.results())
             recovered.measured.append(made[namespace])
         if not namespaces and not (directory / SUMMARY).exists():
             recovered.unmeasured = f"it has no '{CONFIGURATION}'"
@@ -164,13 +164,15 @@ def _places(directory: Path, bag: Path, namespaces: Sequence[str]) -> dict[str, 
     }
 
 
-def _listen(recovered: Recovered, listeners: dict[str, RunListener], report: Progress) -> None:
+def _collect(
+    recovered: Recovered, collectors: dict[str, MetricsCollector], report: Progress
+) -> None:
     total = recovered.contents.counts.total()
     for count, message in enumerate(read_messages(recovered.bag)):
         if count % _REPORT_PERIOD == 0:
             report("measuring", count / total)
-        for namespace, listener in listeners.items():
+        for namespace, collector in collectors.items():
             shared = message.topic == topics.DIAGNOSTICS.name
             name = message.topic if shared else message.topic.removeprefix(f"{namespace}/")
             if name in HEARD:
-                listener.take(name, message.raw, message.log_time_ns)
+                collector.take(name, message.raw, message.log_time_ns)

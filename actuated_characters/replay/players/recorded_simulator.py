@@ -30,7 +30,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, encode_clock
 from msgs_config.messages.session import ANONYMOUS, SESSION, given_session, make_session, session_of
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.once_logger import Warnings
+from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare, given_parameters
@@ -83,7 +83,7 @@ class StatePlayer(Node):
         fixed = values.texts("fixed")
         self._changes = parameter_changes(self._recording, fixed) if self._steers else {}
         self._runs_on = self._recording.parameters.get("mode") == "realtime"
-        self._decoder, self._warnings = JointStateDecoder(), Warnings(self)
+        self._decoder, self._once_logger = JointStateDecoder(), OnceLogger(self)
         self._open_topics()
 
     def _open_topics(self) -> None:
@@ -200,7 +200,7 @@ class StatePlayer(Node):
             try:
                 command = self._decoder.decode(raw)
             except MessageError as error:
-                self._warnings.say_once(f"command ignored: {error}")
+                self._once_logger.log_once(f"command ignored: {error}")
                 continue
             is_own = session_of(command.frame_id) in (self._session, ANONYMOUS)
             if is_own and command.stamp_ns == stamp_ns:

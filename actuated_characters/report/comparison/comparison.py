@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.recording_metrics import distances, figures, vectors_of
+from actuated_characters.metrics.recording_metrics import distances, measure_recording, vectors_of
 from actuated_characters.report.changes import differences
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import RecordingError
@@ -96,7 +96,7 @@ def compare(first: Recording, second: Recording, tolerance: float | None = None)
         spans = [f"{r.stamps_ns[0]} to {r.stamps_ns[-1]} ns" for r in (first, second)]
         raise RecordingError(f"the recordings have no stamp in common: {' and '.join(spans)}")
     rows = _Rows(ours.astype(np.intp), theirs.astype(np.intp))
-    own_figures, other_figures = figures(first)[0], figures(second)[0]
+    own_figures, other_figures = measure_recording(first)[0], measure_recording(second)[0]
     return Comparison(
         name=first.name,
         states=(len(first.stamps_ns), len(second.stamps_ns)),

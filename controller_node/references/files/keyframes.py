@@ -57,7 +57,7 @@ def read_keyframes(character: Character, path: str) -> Keyframes:
         smooth=interpolation == "smooth",
         period=_period(file, content, times[-1]),
     )
-    return replace(keyframes, notes=overshoots(character, keyframes))
+    return replace(keyframes, warnings=overshoots(character, keyframes))
 
 
 def _times(places: list[str], items: list[dict[str, Any]]) -> list[float]:

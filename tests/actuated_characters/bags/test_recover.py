@@ -17,7 +17,7 @@ from actuated_characters.bags.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recovery.recover import recover
 from actuated_characters.bags.writer import BagWriter
-from actuated_characters.metrics.collector import RunListener
+from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.runs.run_directory import SUMMARY, read_figures, write_figures
 from msgs_config.errors import RecordingError
 from tests.support.bags import add_to, make_run
@@ -340,7 +340,7 @@ def run_directory(tmp_path: Path) -> Path:
 
 
 def expected_figures(bag: Path, directory: Path) -> tuple[dict[str, object], np.ndarray]:
-    listener = RunListener()
+    listener = MetricsCollector()
     for message in read_messages(bag):
         listener.take(message.topic.removeprefix("/"), message.raw, message.log_time_ns)
     write_figures(directory, *listener.results())

@@ -277,7 +277,7 @@ def test_what_spinning_friction_does_is_left_over_as_a_torque_about_the_normal(
     watched = watch("laikago", initial_velocity=velocity.tolist())
     driver, largest = controller("laikago", root_assistance=False), 0.0
     for _ in range(60):
-        effort, _ = driver.answer(watched.run.state, watched.run.clock.stamp_ns(1))
+        effort, _ = driver.compute_effort(watched.run.state, watched.run.clock.stamp_ns(1))
 
         # Act
         balance = watched.advance(np.where(watched.run.actor.commanded, effort, 0.0))

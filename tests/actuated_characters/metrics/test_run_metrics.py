@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-from actuated_characters.metrics.collector import RunListener
+from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.metrics.run_metrics import COLUMNS, Measurement, StateHash, Tick
 from actuated_characters.metrics.tick_assembler import MOST_AHEAD, TickAssembler
 from controller_node import parameters as for_controller
@@ -520,8 +520,8 @@ def pendulum_messages(ticks: int = 20) -> list[Message]:
     return [*messages, (STATE, raw, (ticks + 1) * MILLISECOND)]
 
 
-def heard(messages: Iterable[Message]) -> RunListener:
-    listener = RunListener()
+def heard(messages: Iterable[Message]) -> MetricsCollector:
+    listener = MetricsCollector()
     for message in messages:
         listener.take(*message)
     return listener
@@ -612,7 +612,7 @@ def test_bytes_that_are_no_message_are_an_error_of_the_projects_own(topic: str, 
 
 def test_bytes_that_are_no_configuration_are_an_error_of_the_projects_own() -> None:
     with pytest.raises(ActuatedCharactersError):
-        RunListener().take(topics.CONFIGURATION.of(SIMULATOR).name, b"\x00\x01", 0)
+        MetricsCollector().take(topics.CONFIGURATION.of(SIMULATOR).name, b"\x00\x01", 0)
 
 
 # What a listener must know

@@ -15,7 +15,7 @@ from std_msgs.msg import String
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
-from actuated_characters.metrics.recording_metrics import contact_series, figures
+from actuated_characters.metrics.recording_metrics import contact_series, measure_recording
 from actuated_characters.report.decimation import decimated, span_maxima, span_means
 from actuated_characters.report.page import Chapter, Section, Table, render_page
 from actuated_characters.report.writing import default_directory, write_report
@@ -184,7 +184,7 @@ def test_the_figures_are_those_of_the_run(tmp_path: Path) -> None:
     made = make_run("humanoid", 0.1, WALK)
     recording = read_recording(write_bag(tmp_path / "bag", made.messages()))
 
-    summary, series = figures(recording)
+    summary, series = measure_recording(recording)
 
     knees = [
         abs(t.state.position[10] - t.reference.position[10]) for t in made.ticks if t.reference
@@ -192,7 +192,7 @@ def test_the_figures_are_those_of_the_run(tmp_path: Path) -> None:
     assert summary["ticks"] == len(made.ticks) == len(knees) == len(series)
     assert summary["sim_time_s"] == pytest.approx(0.1)
     assert summary["wall_time_s"] == pytest.approx(24e-9)  # as tests/support/bags.py stamps them
-    again = figures(recording)[0]
+    again = measure_recording(recording)[0]
     assert summary["state_hash"] == again["state_hash"]
 
 

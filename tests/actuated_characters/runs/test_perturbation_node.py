@@ -78,7 +78,7 @@ def states_without_ros(plan: Plan, pushes: Sequence[ExternalWrench]) -> list[Sta
         (actor,) = run.actors
         states = [actor.state]
         for _ in range(plan.ticks):
-            effort, _ = controller.answer(states[-1], states[0].stamp_ns)
+            effort, _ = controller.compute_effort(states[-1], states[0].stamp_ns)
             run.step([effort], [[push for push in pushes if push.acts_at(run.tick)]])
             states.append(actor.state)
     return states

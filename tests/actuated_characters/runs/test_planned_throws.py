@@ -70,7 +70,7 @@ def first_hit(plan: Plan, planned: PlannedThrow) -> Hit:
         start, let_go = run.stamp_ns, run.clock.first_tick_from(planned.stamp_ns)
         motion = np.zeros(13)
         for _ in range(plan.ticks):
-            effort, _ = controller.answer(actor.state, start)
+            effort, _ = controller.compute_effort(actor.state, start)
             run.step([effort], None, [planned.throw] if run.tick == let_go else ())
             touched = run._world.touched_links()
             balls = run._world.balls._numbers

@@ -348,18 +348,18 @@ def test_a_trajectory_leads_from_where_it_got_up_to_where_it_says() -> None:
     # Arrange: as after it got up elsewhere, and faces another way
     control, episode_ns = driver({"behaviour": "reactive"}), CLOCK.stamp_ns(1)
     nothing = np.zeros((len(LINKS), 6))
-    control.answer(states_at(control, 1, first=True), episode_ns, nothing)
+    control.compute_effort(states_at(control, 1, first=True), episode_ns, nothing)
     control._behaviour.carry = PlanarTransform(1.0, 3.0, -2.0)
-    _, carried = control.answer(states_at(control, 2), episode_ns, nothing)
+    _, carried = control.compute_effort(states_at(control, 2), episode_ns, nothing)
     goal = np.array(HUMANOID.rest_position)
     goal[:2] = 7.0, 0.0
     points = points_of_lists(LAYOUT.dof_names, [0.5], [goal.tolist()], [[]], [[]])
 
     # Act
     start = CLOCK.stamp_ns(3)
-    control.follow(points, start_ns=start, now_ns=start, episode_ns=episode_ns)
+    control.set_trajectory(points, start_ns=start, now_ns=start, episode_ns=episode_ns)
     tracked = [
-        control.answer(states_at(control, tick), episode_ns, nothing)[1].position
+        control.compute_effort(states_at(control, tick), episode_ns, nothing)[1].position
         for tick in range(3, 140)
     ]
 
@@ -391,8 +391,8 @@ def test_strengths_and_gains_of_zero_count_while_it_gives_way() -> None:
 
     # Act
     control.set_strengths(taken, episode_ns=episode_ns)
-    control.answer(states_at(control, 1, first=True), episode_ns, 0.0 * hit)
-    control.answer(states_at(control, 2), episode_ns, hit)
+    control.compute_effort(states_at(control, 1, first=True), episode_ns, 0.0 * hit)
+    control.compute_effort(states_at(control, 2), episode_ns, hit)
 
     # Assert
     assert control.mode is not None and control.mode.phase.mode is Mode.REACT
@@ -476,4 +476,4 @@ def test_without_contacts_a_behaviour_that_needs_them_gives_no_answer() -> None:
     first = next(iter(ticks_in_process(plan))).state
 
     with pytest.raises(ConfigurationError, match="contacts"):
-        reactive.answer(first, first.stamp_ns)
+        reactive.compute_effort(first, first.stamp_ns)

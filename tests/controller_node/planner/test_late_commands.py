@@ -79,8 +79,8 @@ def test_a_state_that_comes_again_is_answered_alike() -> None:
     states = [tick.state for tick in ticks_in_process(plan)][:8]
 
     for state in states:
-        once, reference = controller.answer(state, states[0].stamp_ns)
-        again, _ = controller.answer(state, states[0].stamp_ns)
+        once, reference = controller.compute_effort(state, states[0].stamp_ns)
+        again, _ = controller.compute_effort(state, states[0].stamp_ns)
         assert again.tobytes() == once.tobytes()
         assert reference.stamp_ns == state.stamp_ns
 
@@ -90,7 +90,7 @@ def test_a_plan_counts_from_the_state_that_was_told() -> None:
     controller = make_controller(HUMANOID, plan.reference, plan.controller)
     (first, *_) = (tick.state for tick in ticks_in_process(plan))
 
-    controller.answer(first, first.stamp_ns)
+    controller.compute_effort(first, first.stamp_ns)
 
     assert controller.outlook is not None
     np.testing.assert_allclose(controller.outlook.times, 0.05 * np.arange(1, 7) + 2 / 240)

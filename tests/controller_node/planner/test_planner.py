@@ -173,7 +173,7 @@ def test_a_costly_plan_is_sought_for_longer() -> None:
         controller = a_controller(**{"plan.rounds": rounds, "plan.tolerance": tolerance})
         sent = states(controller, 13)
         for state in (sent[0], sent[12]):
-            controller.answer(state, sent[0].stamp_ns)
+            controller.compute_effort(state, sent[0].stamp_ns)
         assert controller.outlook is not None
         return controller.outlook
 
@@ -211,7 +211,7 @@ def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all(del
         efforts = []
         for state in sent:
             for _ in range(repeats):
-                effort, _ = controller.answer(state, first)
+                effort, _ = controller.compute_effort(state, first)
             efforts.append(effort)
         return np.array(efforts).tobytes()
 
@@ -226,11 +226,11 @@ def test_a_state_of_before_is_planned_from_as_if_none_had_followed(delay: int) -
     sent = states(controller, 40)
     first = sent[0].stamp_ns
     for state in sent[::6]:
-        controller.answer(state, first)
+        controller.compute_effort(state, first)
 
-    effort, _ = controller.answer(sent[2], first)
+    effort, _ = controller.compute_effort(sent[2], first)
 
-    expected, _ = fresh.answer(sent[2], first)
+    expected, _ = fresh.compute_effort(sent[2], first)
     assert effort.tobytes() == expected.tobytes()
 
 
@@ -244,7 +244,7 @@ def test_a_plan_is_of_the_state_that_its_delay_is_before() -> None:
         for tick, state in enumerate(sent):
             there = state.position + 0.05 * (tick >= moved)
             before = controller.outlook
-            controller.answer(replace(state, position=there), sent[0].stamp_ns)
+            controller.compute_effort(replace(state, position=there), sent[0].stamp_ns)
             assert (controller.outlook is not before) == (tick in (0, acts))
         assert controller.outlook is not None
         return controller.outlook
@@ -262,7 +262,7 @@ def test_a_plan_that_is_taken_late_says_when_from_there() -> None:
     sent = states(controller, 15)
 
     for tick in (0, 7, 14):
-        controller.answer(sent[tick], sent[0].stamp_ns)
+        controller.compute_effort(sent[tick], sent[0].stamp_ns)
 
     assert controller.outlook is not None
     np.testing.assert_allclose(controller.outlook.times, 0.05 * np.arange(1, 7) - 2 / 240)
@@ -274,11 +274,11 @@ def test_what_is_done_while_a_plan_is_waited_for_changes_nothing(
     controller, other, done = a_controller(), a_controller(), threading.Event()
     controller.while_planning(done.set)
     (state,) = states(controller, 1)
-    same, _ = other.answer(state, state.stamp_ns)
+    same, _ = other.compute_effort(state, state.stamp_ns)
 
     with monkeypatch.context() as patch:
         patch.setattr(PlanSearch, "find", _after(lambda: done.wait(60.0)))
-        effort, _ = controller.answer(state, state.stamp_ns)
+        effort, _ = controller.compute_effort(state, state.stamp_ns)
 
     assert done.is_set()
     assert effort.tobytes() == same.tobytes()
@@ -292,7 +292,7 @@ def test_it_does_not_matter_who_is_faster(monkeypatch: pytest.MonkeyPatch) -> No
             patch.setattr(PlanSearch, "find", _after(lambda: time.sleep(before_a_search)))
             for state in sent:
                 time.sleep(before_an_answer)
-                found.append(controller.answer(state, sent[0].stamp_ns)[0])
+                found.append(controller.compute_effort(state, sent[0].stamp_ns)[0])
         return np.array(found).tobytes()
 
     assert efforts(0.4, 0.0) == efforts(0.0, 0.05)
@@ -317,7 +317,7 @@ def test_a_state_that_comes_while_a_plan_is_sought_is_no_news(again: int) -> Non
     pushed = [replace(each, position=each.position + 0.4 * (ENTRIES == 0)) for each in sent]
 
     def answers(of: Controller, ticks: list[int]) -> list[bytes]:
-        return [of.answer(pushed[tick], sent[0].stamp_ns)[0].tobytes() for tick in ticks]
+        return [of.compute_effort(pushed[tick], sent[0].stamp_ns)[0].tobytes() for tick in ticks]
 
     expected = answers(fresh, list(range(26)))
     found = answers(controller, [*range(10), *range(again, 26)])
@@ -376,7 +376,7 @@ def test_it_says_where_each_plan_leads_and_what_that_costs() -> None:
     sent = states(controller, 13)
     outlooks = []
     for state in sent:
-        controller.answer(state, sent[0].stamp_ns)
+        controller.compute_effort(state, sent[0].stamp_ns)
         outlooks.append(controller.outlook)
     first, last = outlooks[0], outlooks[-1]
     assert first is not None
@@ -541,7 +541,7 @@ BROKEN: dict[str, Callable[[PointCloud2], None]] = {
 def test_what_is_no_plan_is_not_read_as_one(case: str) -> None:
     controller = a_controller()
     (state,) = states(controller, 1)
-    controller.answer(state, state.stamp_ns)
+    controller.compute_effort(state, state.stamp_ns)
     assert controller.outlook is not None
     message = plan_message(controller.outlook, state.stamp_ns)
     whole = decode_plan(serialize_message(message))

@@ -89,7 +89,7 @@ def test_the_rest_pose_is_what_is_tracked_if_nothing_is_said() -> None:
     made = motion_of(HUMANOID)
 
     assert type(made.reference) is HoldReference
-    assert made.notes == ()
+    assert made.warnings == ()
     state = made.reference.sample(3.0)
     assert state.configuration.position.tolist() == list(HUMANOID.rest_position)
     assert not state.velocity.any()
@@ -113,9 +113,9 @@ def test_a_clip_that_is_kept_within_limits_is_noted() -> None:
     frames = read_clip(HUMANOID, "spinkick")
     assert frames.clamped
 
-    (note,) = motion_of(HUMANOID, reference="clip", clip="spinkick").notes
+    (warning,) = motion_of(HUMANOID, reference="clip", clip="spinkick").warnings
 
-    assert all(name in note for name in frames.clamped)
+    assert all(name in warning for name in frames.clamped)
 
 
 @pytest.mark.parametrize("suffix", [".yaml", ".yml"])
@@ -147,7 +147,7 @@ def test_all_keyframes_that_ship_are_named_for_a_character_that_can_follow_them(
 
     file = KEYFRAMES_DIRECTORY / f"{name}.yaml"
     assert_same(made.reference, KeyframesReference(whole.layout, read_keyframes(whole, str(file))))
-    assert made.notes == ()
+    assert made.warnings == ()
 
 
 def test_what_the_author_of_keyframes_may_have_overlooked_is_noted(tmp_path: Path) -> None:
@@ -160,8 +160,8 @@ def test_what_the_author_of_keyframes_may_have_overlooked_is_noted(tmp_path: Pat
 
     made = motion_of(PANDA, reference="keyframes", keyframes=str(file))
 
-    assert made.notes == read_keyframes(PANDA, str(file)).notes
-    assert any("panda_joint1" in note for note in made.notes)
+    assert made.warnings == read_keyframes(PANDA, str(file)).warnings
+    assert any("panda_joint1" in warning for warning in made.warnings)
 
 
 def test_a_step_has_the_size_the_time_and_the_degrees_of_freedom_given() -> None:
@@ -172,7 +172,7 @@ def test_a_step_has_the_size_the_time_and_the_degrees_of_freedom_given() -> None
     np.testing.assert_allclose(moved(PANDA, before), 0.0, atol=1e-15)
     expected = of(PANDA, panda_joint1=-0.2, panda_joint4=-0.2)
     np.testing.assert_allclose(moved(PANDA, after), expected, atol=1e-15)
-    assert made.notes == ()
+    assert made.warnings == ()
 
 
 def test_a_sine_has_the_amplitude_the_frequency_and_the_degrees_of_freedom_given() -> None:
@@ -266,8 +266,8 @@ def test_a_signal_beyond_limits_is_refused_with_what_would_be_right() -> None:
 def test_a_signal_on_all_joints_leaves_those_that_it_would_break_and_says_so(signal: str) -> None:
     motion = motion_of(HUMANOID, reference=signal)
 
-    (note,) = motion.notes
-    assert "right_knee" in note and "right_hip" not in note
+    (warning,) = motion.warnings
+    assert "right_knee" in warning and "right_hip" not in warning
     names = HUMANOID.layout.dof_names
     moved = motion.reference.sample(1.3).configuration.position - HUMANOID.rest_position
     assert moved[names.index("right_knee")] == 0.0
@@ -347,5 +347,5 @@ def assert_begins(plan: Plan, position: FloatArray, velocity: FloatArray) -> Non
 def test_a_run_says_what_its_user_should_know_of_its_motion() -> None:
     plan = make_plan("humanoid", 0.1, {"reference": "clip", "clip": "spinkick"}, {}, {})
 
-    notes = motion_of(HUMANOID, reference="clip", clip="spinkick").notes
-    assert notes and set(notes) <= set(plan.notes)
+    notes = motion_of(HUMANOID, reference="clip", clip="spinkick").warnings
+    assert notes and set(notes) <= set(plan.warnings)

@@ -220,7 +220,7 @@ def test_what_a_pose_leaves_out_keeps_its_value(tmp_path: Path) -> None:
     for row in keyframes.configurations.position:
         np.testing.assert_array_equal(row[others], rest[others])
     np.testing.assert_array_equal(keyframes.times, [0.0, 0.5, 0.7, 1.0])
-    assert keyframes.smooth and keyframes.period is None and not keyframes.notes
+    assert keyframes.smooth and keyframes.period is None and not keyframes.warnings
 
 
 def test_linear_and_loop_are_taken_from_the_file(tmp_path: Path) -> None:
@@ -283,12 +283,12 @@ def test_a_path_that_swings_beyond_a_limit_is_noted_with_joint_time_and_size(
     path = [reference.sample(time).configuration.position[0] for time in times.tolist()]
     worst = int(np.argmax(path))
     assert path[worst] > upper + 0.1, "this path must overshoot for the test to mean anything"
-    (note,) = smooth.notes
-    assert "'panda_joint1'" in note and f"{path[worst] - upper:.2g} rad" in note
-    assert f"{times[worst]:.3g} s" in note and "\n" not in note
-    assert not read(tmp_path, *frames, interpolation="linear").notes
+    (warning,) = smooth.warnings
+    assert "'panda_joint1'" in warning and f"{path[worst] - upper:.2g} rad" in warning
+    assert f"{times[worst]:.3g} s" in warning and "\n" not in warning
+    assert not read(tmp_path, *frames, interpolation="linear").warnings
     within = [at(float(time), panda_joint1=0.5 * value) for time, value in enumerate(values)]
-    assert not read(tmp_path, *within).notes
+    assert not read(tmp_path, *within).warnings
 
 
 def test_a_note_of_a_loop_tells_the_time_as_the_file_does(tmp_path: Path) -> None:
@@ -296,11 +296,11 @@ def test_a_note_of_a_loop_tells_the_time_as_the_file_does(tmp_path: Path) -> Non
     frames = [at(1.0, panda_joint1=upper), at(1.5, panda_joint1=0.0)]
     keyframes = read(tmp_path, *frames, at(5.5, panda_joint1=upper), loop=True, period=6.0)
 
-    (note,) = keyframes.notes
+    (warning,) = keyframes.warnings
     reference = KeyframesReference(PANDA.layout, keyframes)
     times = np.linspace(1.0, 7.0, 6001)  # one period from the first keyframe on
     path = [reference.sample(time).configuration.position[0] for time in times.tolist()]
-    told = float(note.split(" s;")[0].split(" at ")[1])
+    told = float(warning.split(" s;")[0].split(" at ")[1])
     assert max(path) > upper + 0.01
     assert told == pytest.approx(times[int(np.argmax(path))], abs=0.05)
 
@@ -388,7 +388,7 @@ def test_a_rest_pose_beyond_limits_is_not_the_files_fault(tmp_path: Path) -> Non
 
         keyframes = read(tmp_path, at(0.0), at(1.0, panda_joint1=0.5), whole=beyond)
 
-        assert not keyframes.notes
+        assert not keyframes.warnings
 
 
 SCALARS = st.one_of(

@@ -40,7 +40,7 @@ def write(directory: Path, yaml: str, urdf: str = ARM) -> str:
 def test_joints_without_gains_are_named(tmp_path: Path) -> None:
     character = load_character(write(tmp_path, FIXED + "joints: {shoulder: {stiffness: 1}}\n"))
 
-    assert "joints without gains in arm.yaml are limp: elbow" in character.notes
+    assert "joints without gains in arm.yaml are limp: elbow" in character.warnings
 
 
 @pytest.mark.parametrize(("base", "named"), [(FIXED, "lower"), ("urdf: arm.urdf\n", "base, lower")])
@@ -49,12 +49,12 @@ def test_links_whose_mass_the_engine_makes_up_are_named(
 ) -> None:
     character = load_character(write(tmp_path, base))
 
-    assert f"links without <inertial>, the engine assumes a mass: {named}" in character.notes
+    assert f"links without <inertial>, the engine assumes a mass: {named}" in character.warnings
 
 
 @pytest.mark.parametrize("name", shipped_characters())
 def test_nothing_is_overlooked_in_the_characters_that_ship(name: str) -> None:
-    assert load_character(name).notes == ()
+    assert load_character(name).warnings == ()
 
 
 @pytest.mark.parametrize("angle", [2.1, -30.0])

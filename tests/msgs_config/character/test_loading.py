@@ -49,7 +49,7 @@ def test_it_is_named_after_its_file_and_its_joints_are_limp(tmp_path: Path) -> N
     assert character.layout.has_floating_base
     assert character.gains["hinge"] == Gains()
     assert not np.any(character.rest_position)
-    assert character.notes == ("joints without gains in arm.urdf are limp: hinge",)
+    assert character.warnings == ("joints without gains in arm.urdf are limp: hinge",)
 
 
 @pytest.mark.parametrize(

@@ -243,7 +243,7 @@ def assert_answers(simulator: ControllerClient, tick: int) -> None:
     """It answers the first state of an episode as the controller without ROS does."""
     torques = simulator.ask(some_state(tick, first=True))
     state = StampedState(CLOCK.stamp_ns(tick), np.array([0.4]), np.array([0.1]), None)
-    expected, _ = controller("pendulum").answer(state, state.stamp_ns)
+    expected, _ = controller("pendulum").compute_effort(state, state.stamp_ns)
     assert list(torques.effort) == expected.tolist()
 
 

@@ -51,8 +51,10 @@ def random_scenes(name: str) -> Iterator[tuple[LoneWorld, DynamicsModel, np.rand
 def damping(whole: Character, world: LoneWorld) -> FloatArray:
     """What passive damping adds in the simulator; the model knows no soft limits."""
     links = tuple(replace(link, joint=replace(link.joint, soft_limit=None)) for link in whole.links)
-    mobility = np.zeros((whole.layout.size, whole.layout.size))  # no damping is too much for it
-    return PassiveForces(replace(whole, links=links), INSTANT, mobility).effort(*world.body.read())
+    inverse_mass = np.zeros((whole.layout.size, whole.layout.size))  # no damping is too much for it
+    return PassiveForces(replace(whole, links=links), INSTANT, inverse_mass).effort(
+        *world.body.read()
+    )
 
 
 @every_character

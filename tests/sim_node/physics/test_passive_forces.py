@@ -16,7 +16,7 @@ from msgs_config.character.model import Character, Joint, SoftLimit
 from msgs_config.geometry import rotations
 from sim_node.physics.mass_matrix import (
     make_passive_forces,
-    measure_mobility,
+    measure_inverse_mass_matrix,
     passing_through_itself,
 )
 from sim_node.physics.passive_forces import (
@@ -322,7 +322,7 @@ def test_damping_is_minus_d_v_in_every_joint_and_not_at_the_base() -> None:
         damping = expected.get(joint.name, 5.0)  # as the URDF says of hinges and sliders
         np.testing.assert_allclose(effort[joint.entries], -damping * velocity[joint.entries])
     assert passive.active
-    assert not passive.notes
+    assert not passive.warnings
 
 
 def test_what_has_neither_damping_nor_limits_has_no_passive_forces() -> None:
@@ -339,17 +339,17 @@ def test_no_mode_of_bounded_damping_takes_more_than_the_whole_velocity_in_a_step
     # Arrange
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(size, size))
-    mobility = root @ root.T + 0.01 * np.eye(size)
+    inverse_mass = root @ root.T + 0.01 * np.eye(size)
     damping = 10.0 ** rng.uniform(-4.0, 4.0, size)
 
     # Act
-    bounded = bounded_damping(damping, mobility, step)
+    bounded = bounded_damping(damping, inverse_mass, step)
 
     # Assert
-    rates = np.linalg.eigvals(step * mobility @ np.diag(bounded)).real
+    rates = np.linalg.eigvals(step * inverse_mass @ np.diag(bounded)).real
     assert rates.max() <= 1.0 + 1e-9
     assert (bounded <= damping).all()
-    if np.linalg.eigvals(step * np.abs(mobility) @ np.diag(damping)).real.max() < 1.0 / size:
+    if np.linalg.eigvals(step * np.abs(inverse_mass) @ np.diag(damping)).real.max() < 1.0 / size:
         np.testing.assert_array_equal(bounded, damping)
 
 
@@ -369,12 +369,14 @@ def test_a_damper_far_too_strong_for_the_step_stops_a_joint_and_says_so() -> Non
 
     # Assert
     assert max(map(abs, speeds)) < 1e-6
-    (note,) = passive.notes
-    assert "'hinge'" in note and "substeps" in note
+    (warning,) = passive.warnings
+    assert "'hinge'" in warning and "substeps" in warning
 
 
 def test_the_mobility_is_the_inverse_mass_matrix_of_a_rod_and_of_a_mass() -> None:
     inertia = 1.0 / 3.0  # m l^2 / 3 about its end
 
-    assert measure_mobility(character("pendulum"))[0, 0] == pytest.approx(1.0 / inertia, rel=1e-6)
-    assert measure_mobility(character("lift"))[0, 0] == pytest.approx(1.0, rel=1e-6)
+    assert measure_inverse_mass_matrix(character("pendulum"))[0, 0] == pytest.approx(
+        1.0 / inertia, rel=1e-6
+    )
+    assert measure_inverse_mass_matrix(character("lift"))[0, 0] == pytest.approx(1.0, rel=1e-6)

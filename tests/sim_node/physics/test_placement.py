@@ -109,8 +109,8 @@ def test_a_fixed_arm_keeps_its_answer_wherever_it_stands() -> None:
     run = simulation("franka_panda")
     state = run.state
 
-    here, _ = controller("franka_panda").answer(state, state.stamp_ns)
-    there, _ = controller("franka_panda", placement=ELSEWHERE).answer(state, state.stamp_ns)
+    here, _ = controller("franka_panda").compute_effort(state, state.stamp_ns)
+    there, _ = controller("franka_panda", placement=ELSEWHERE).compute_effort(state, state.stamp_ns)
     run.close()
 
     np.testing.assert_allclose(there, here, atol=1e-9)

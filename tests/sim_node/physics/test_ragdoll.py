@@ -154,7 +154,7 @@ def test_as_a_behaviour_it_has_no_effort_and_falls() -> None:
     assert all(not np.any(tick.following.effort) for tick in ticks)
     assert ticks[-1].following.position[2] < 0.5
     driver = controller("humanoid", behaviour="ragdoll")
-    driver.answer(ticks[0].state, ticks[0].state.stamp_ns)
+    driver.compute_effort(ticks[0].state, ticks[0].state.stamp_ns)
     assert driver.mode is not None and driver.mode.phase.mode is Mode.LIMP
 
 

@@ -50,7 +50,7 @@ def advance(plan: Plan, simulation: Simulation, ticks: int, noise: float = 0.0) 
     (actor,), rng = simulation.actors, np.random.default_rng(3)
     episode_ns, rows = simulation.clock.stamp_ns(1), []
     for _ in range(ticks):
-        effort, _ = controller.answer(actor.state, episode_ns)
+        effort, _ = controller.compute_effort(actor.state, episode_ns)
         effort = effort + noise * rng.normal(size=len(effort))
         simulation.step([np.where(actor.commanded, effort, 0.0)])
         assert actor.state.effort is not None

@@ -90,7 +90,7 @@ def walked(
     (actor,) = simulation.actors
     rows, hits = [], []
     for _ in range(ticks):
-        effort, _ = controller.answer(actor.state, simulation.clock.stamp_ns(1))
+        effort, _ = controller.compute_effort(actor.state, simulation.clock.stamp_ns(1))
         simulation.step([effort], None, (throws or {}).get(simulation.tick, ()))
         rows.append(
             np.concatenate(
