@@ -296,7 +296,7 @@ class Controller:
         return StampedState(stamp_ns, position, velocity, state.effort)
 
     def _drive_at(self, stamp_ns: int) -> _EffectiveGains:
-        """What drives it at a stamp: worked out anew where the settings or the strengths change."""
+        """What drives it at a stamp; worked out where the settings or the strengths change."""
         said = self._strengths.at(stamp_ns)
         if self._drive is None or self._drive.said is not said:
             gains, own = self._settings.gains, self._settings.strengths

@@ -43,7 +43,7 @@ def read_effort_series(layout: JointLayout, path: str) -> EffortSeries:
     """Read a CSV file whose header is `time_s` and the names of degrees of freedom.
 
     Those that have no column get no effort. The last row acts as long as the one before it, a
-    single one for ever.
+    single one forever.
 
     Raises:
         EffortSeriesError: names the file, the line and what would be right.

@@ -165,7 +165,7 @@ class ControllerNode(Node):
         return raw
 
     def _overtake(self, raw: bytes) -> None:
-        """Leave a state without an answer, save that it may be the first of an episode."""
+        """Leave a state without an answer, except that it may be the first of an episode."""
         self._counts["overtaken"] += 1
         if self._is_answered(raw):
             return

@@ -55,7 +55,7 @@ from sim_node.timing.zero_order_hold import ZeroOrderHold
 _EXPLAIN_AFTER = 2.0  # s without a complete command before the node says what is missing
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
 _STOP_FLUSH_TIME = 0.5  # s, after a signal or an error
-_MOST_COMMANDS = 1000  # that are taken in a row in real time, lest a flood stop the world
+_MOST_COMMANDS = 1000  # that are taken in a row in real time; a flood must not stop the world
 
 
 class SimNode(Node):

@@ -84,7 +84,7 @@ WORLD_PARAMETERS = [
         unit="s",
     ),
     Parameter("republish_period", 0.5, "an unanswered state is sent again", unit="s", minimum=0.01),
-    Parameter("lockstep_timeout", 0.0, "longest wait for a command; 0: for ever", unit="s"),
+    Parameter("lockstep_timeout", 0.0, "longest wait for a command; 0: forever", unit="s"),
     Parameter(
         "on_timeout",
         "abort",

@@ -27,7 +27,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put first those that share what takes long to make.
 
     A worker begins with the first tests of its part, and another one that is idle takes over the
-    last ones: it would have to make anew what they share.
+    last ones: it would have to make again what they share.
     """
     items.sort(key=lambda item: item.get_closest_marker("sharing") is None)
 

@@ -37,7 +37,7 @@ class RecordedWorld:
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """What a simulator's `~/configuration` says, made anew."""
+    """What a simulator's `~/configuration` says, rebuilt."""
 
     character: Character
     known: RunConfiguration
@@ -60,7 +60,7 @@ def rebuild(text: str, namespace: str) -> Rebuilt:
         character = placed(_character(known, copy), known.parameters)
         terrain = None if copy.terrain is None else _terrain(known, copy.terrain)
     except ActuatedCharactersError as error:
-        raise RecordingError(f"cannot build character {known.character} anew: {error}") from error
+        raise RecordingError(f"cannot rebuild character {known.character}: {error}") from error
     same_joints = character.layout.joints == known.layout.joints
     if not same_joints or not np.isclose(character.mass, known.mass, rtol=1e-9):
         raise RecordingError(

@@ -155,7 +155,7 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
 
     Raises:
         RecordingError: there is no complete bag; it holds no states, those of several simulators
-            in one namespace, or not every tick; or its character cannot be built anew.
+            in one namespace, or not every tick; or its character cannot be rebuilt.
         ActuatedCharactersError: a message is not what its topic should carry.
     """
     bag = find_bag(path)

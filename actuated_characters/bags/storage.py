@@ -68,7 +68,7 @@ class BagFiles:
     def _open(self) -> None:
         try:
             self._writer.open()
-            self._claim = DirectoryLock(self.path)  # lest it is recovered while it is being written
+            self._claim = DirectoryLock(self.path)  # so that nobody recovers it meanwhile
         except _REFUSED:
             with suppress(*_REFUSED):
                 self._writer.abort()

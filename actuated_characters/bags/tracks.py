@@ -159,7 +159,7 @@ class CharacterTimeline:
         text = decode(raw, String).data
         if self.rebuilt is not None:
             if text != self._configuration_text:
-                raise RecordingError("several simulators, or one started anew")
+                raise RecordingError("several simulators, or one restarted")
             return
         if self._early_lost:
             raise RecordingError(f"'{CONFIGURATION}' comes only after {_MOST_EARLY} other messages")
@@ -206,7 +206,7 @@ class CharacterTimeline:
         entries = slice(row * size, (row + 1) * size)
         known = self.states.position[entries].tobytes() + self.states.velocity[entries].tobytes()
         if content != known:
-            raise RecordingError(f"two states of tick {tick}; was its simulator started anew?")
+            raise RecordingError(f"two states of tick {tick}; was its simulator restarted?")
 
     def _take_reference(self, raw: bytes, published_ns: int) -> None:
         state, kept = state_in_layout(self._layout, self._references.decode(raw)), self.references

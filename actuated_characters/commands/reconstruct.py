@@ -146,7 +146,7 @@ def _check_output(options: argparse.Namespace) -> None:
         return
     for file in (output, checkpoint_path(output)):
         if file.exists():
-            raise ConfigurationError(f"{file} exists; --resume goes on, --overwrite begins anew")
+            raise ConfigurationError(f"{file} exists; --resume goes on, --overwrite starts over")
 
 
 def _report(job: "Job", found: "Reconstruction") -> None:

@@ -102,7 +102,7 @@ class MetricsCollector:
     def _configure(self, text: str) -> None:
         if self._configuration is not None:
             if text != self._configuration_text:
-                raise RecordingError("another simulator, or the same one started anew, was heard")
+                raise RecordingError("another simulator, or the same one restarted, was heard")
             return
         found = configuration.parse(text)
         self._configuration, self._configuration_text = found, text

@@ -59,7 +59,7 @@ class Workers:
         for _ in range(_MOST_DEATHS):
             self._pool = self._pool or self._fresh_pool()
             try:
-                with _interrupts_blocked():  # here, where processes begin, and in these for ever
+                with _interrupts_blocked():  # here, where processes begin, and in these forever
                     results = self._pool.map(_grow, branches[done:])
                 for grown in results:
                     done += 1

@@ -37,7 +37,7 @@ class LossCount:
         if len(last) < max(self._count_publishers(), 1):
             return  # a publisher that is new
         before = max((known for known in last if known < number), default=None)
-        if before is None:  # one that began anew
+        if before is None:  # one that started over
             last.pop(0)
             return
         last.remove(before)

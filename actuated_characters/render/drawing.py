@@ -67,7 +67,7 @@ def draw(
         return
     with ExitStack() as ending:
         pipes = [ending.enter_context(_process()) for _ in range(min(workers, len(shots)))]
-        # a layout remembers what it has looked up, and cannot be sent; it is made anew when needed
+        # a layout remembers what it has looked up, and cannot be sent; it is rebuilt when needed
         sent = replace(stage, characters=tuple(replace(each) for each in stage.characters))
         for pipe in pipes:
             _send(pipe, sent)

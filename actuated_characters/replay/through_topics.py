@@ -61,7 +61,7 @@ def replay_commands(
         world: Which of the bag's worlds, where there are several; counted from 0.
 
     Raises:
-        RecordingError: the bag cannot be read, or its world not be built anew.
+        RecordingError: the bag cannot be read, or its world not be rebuilt.
         RunError: a process failed, and not because of what differed.
     """
     together, notes = read_world(path, world)

@@ -40,7 +40,7 @@ def live_changes(recording: Recording) -> list[Change]:
     changes: list[Change] = []
     for earlier, later in zip(recording.controller, recording.controller[1:], strict=False):
         after = later.after_stamp_ns
-        if after is None:  # another controller, or the same one started anew
+        if after is None:  # another controller, or the same one restarted
             after = int(recording.stamps_ns[0])
         time = (after - int(recording.stamps_ns[0])) / NANOSECONDS_PER_SECOND
         for name, values in differences(earlier.parameters, later.parameters).items():

@@ -11,7 +11,7 @@ _PAUSE_FACTOR = 10.0  # of the usual time between two states ...
 _LEAST_PAUSE = 0.1  # s ... and at least so long
 _OFTEN = 8  # times that a state takes long, and ...
 _SHARE = 0.01  # ... this share of all: that is usual then, as with a planner every few states
-_LONGEST_BACKLOG = 0.1  # s that the simulator catches up with; beyond it its schedule begins anew
+_LONGEST_BACKLOG = 0.1  # s that the simulator catches up with; beyond it its schedule starts over
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ def lateness(published_ns: IntArray, period: float) -> FloatArray:
     """How late (m,) each state was by the schedule of a paced run, s; early ones are negative.
 
     The schedule is the simulator's own: a period in s of wall time from state to state, made up
-    for after a delay, and begun anew after a long one and at the first state. After a pause it is
-    begun anew, too, and nothing is late.
+    for after a delay, and restarted after a long one and at the first state. After a pause it is
+    restarted, too, and nothing is late.
     """
     after_pauses = set((pauses(published_ns) + 1).tolist())
     times = ((published_ns - published_ns[:1]) / NANOSECONDS_PER_SECOND).tolist()

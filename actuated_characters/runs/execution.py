@@ -69,7 +69,7 @@ def run_over_topics(
             "progress_period": 0.1,
         }
         recorder = start("recorder", "actuated_characters.recorder.main", listening)
-        # both must be there before the first answer, lest a tick go unrecorded
+        # both must be there before the first answer, or a tick would go unrecorded
         both = ("-p", "wait_for_subscribers:=2")
         all_three = ("-p", f"wait_for_subscribers:={3 if pushes or throws else 2}")
         others = [recorder]

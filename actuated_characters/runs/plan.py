@@ -100,7 +100,7 @@ def make_plan(
 
 
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:
-    # nobody is there to resume what has paused, or to wait for ever
+    # nobody is there to resume what has paused, or to wait forever
     defaults = {"on_fault": "abort", "lockstep_timeout": _LOCKSTEP_TIMEOUT}
     parameters = simulator_parameters.PARAMETERS
     own = simulator_parameters.character_parameters(character)
@@ -139,7 +139,7 @@ def _keep_assistance_in_step(
 
 
 def _check_commanded(simulator: Values, commanded: list[str]) -> None:
-    """Both sides must mean the same joints, or the simulator would wait for ever."""
+    """Both sides must mean the same joints, or the simulator would wait forever."""
     required = set(simulator.texts("commanded_joints"))
     if required != set(commanded):
         raise ConfigurationError(

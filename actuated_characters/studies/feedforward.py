@@ -90,7 +90,7 @@ class FeedforwardStudy:
     """What feedback is for."""
 
     name = "feedforward"
-    title = "torques of a run, played again (open loop) and computed anew (closed loop)"
+    title = "torques of a run, played again (open loop) and computed again (closed loop)"
     runs = 4 * len(_SUBJECTS)
 
     def run(self, laboratory: StudyRunner) -> StudyResult:

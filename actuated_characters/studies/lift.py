@@ -161,7 +161,7 @@ def _notes(bounds: Sequence[Bound]) -> list[str]:
         for bound in bounds
     ]
     return [
-        "P swings for ever; PD comes to rest m g / kp below the target, however it is damped.",
+        "P swings forever; PD comes to rest m g / kp below the target, however it is damped.",
         "Stable PD has that error too: it knows gravity only to foresee the motion. Gravity "
         "compensation and the integral of PID remove it; too much integral is unstable.",
         "Damped critically, by the stiffness alone: " + " ".join(found),

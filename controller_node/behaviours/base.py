@@ -61,7 +61,7 @@ class BehaviourOutput:
 
 
 class Behaviour(Protocol):
-    """A state machine, made anew for each episode."""
+    """A state machine, one for each episode."""
 
     carry: PlanarTransform  # of the own reference, to where the character goes on with it
 

@@ -19,7 +19,7 @@ _LYING = 0.5  # the part of a get-up clip in which it may begin
 
 @dataclass(frozen=True)
 class BehaviourChoice:
-    """A behaviour, made anew for each episode."""
+    """A behaviour, one for each episode."""
 
     make: BehaviourMaker = Tracking
     needs_contacts: bool = False

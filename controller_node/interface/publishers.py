@@ -27,7 +27,7 @@ from msgs_config.messages.wrenches import WORLD
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer, kept: a state that comes again gets it again, and nothing is computed anew."""
+    """An answer, kept: a state that comes again gets it again, and nothing is computed again."""
 
     raw_state: bytes
     state: StampedState

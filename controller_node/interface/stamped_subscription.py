@@ -15,7 +15,7 @@ from msgs_config.runtime.polling import DirectSubscription
 
 _LARGEST = 2**25  # bytes of a message
 _LATEST_NS = 10**15  # after now
-_MOST_AT_ONCE = 100  # messages, lest a flood of them keep the states waiting
+_MOST_AT_ONCE = 100  # messages; a flood of them must not keep the states waiting
 
 
 class StampedSubscription:

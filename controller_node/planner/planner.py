@@ -197,7 +197,7 @@ class PredictivePlanner:
         self._course.forget()
 
     def _forget_what_is_over(self, tick: int) -> None:
-        """Plan anew from a state of before, which comes once more, or beyond the plan's end."""
+        """Plan again from a state of before, which comes once more, or beyond the plan's end."""
         plan, settings = self._plan, self.settings
         if plan is None:
             return

@@ -29,7 +29,7 @@ class RecordedPlanner:
         """It waits for no plan."""
 
     def begin_episode(self, episode: int) -> None:
-        """Begin anew."""
+        """Start over."""
         del episode
         if self.late_commands is not None:
             self.late_commands.forget()

@@ -7,7 +7,7 @@ from msgs_config.character.model import Character
 
 
 class HoldReference:
-    """The character's rest pose, for ever."""
+    """The character's rest pose, forever."""
 
     def __init__(self, character: Character) -> None:
         rest = character.layout.configuration(np.array(character.rest_position))

@@ -62,7 +62,7 @@ def _hash_of(path: Path) -> str:
 
 @cache
 def _hash_of_version(path: Path, modified_ns: int, size: int) -> str:
-    """Once for each version of a file: a node says it anew when its parameters change."""
+    """Once for each version of a file: a node says it again when its parameters change."""
     del modified_ns, size
     return hashlib.sha256(path.read_bytes()).hexdigest()
 

@@ -29,7 +29,7 @@ class _Times(ctypes.Structure):  # struct itimerspec, timer_settime(2)
 def exit_after(seconds: int, code: int) -> None:
     """End the process in some seconds with an exit code, whatever it is doing then.
 
-    Fast DDS 2.14 can wait for ever when a node leaves in the very moment in which another one
+    Fast DDS 2.14 can wait forever when a node leaves in the very moment in which another one
     comes or goes (its issue 6513), in compiled code that lets no Python run. So it is the C
     library that calls its own `_exit`, in a thread of its own.
     """

@@ -39,7 +39,7 @@ class DirectSubscription:
         self, node: Node, topic: Topic, events: SubscriptionEventCallbacks | None = None
     ) -> None:
         """Subscribe; with `events` also to what the middleware says of the subscription."""
-        # as many as the middleware keeps, and like it the newest, lest a flood fill the memory
+        # as many as the middleware keeps, and like it the newest; a flood must not fill the memory
         self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
         self.dropped = 0  # messages, as more came than were taken
         self._node = node

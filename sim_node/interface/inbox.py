@@ -14,7 +14,7 @@ from msgs_config.messages.topics import Topic
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
-_MOST_A_TICK = 100  # messages, lest a flood of them stop the world
+_MOST_A_TICK = 100  # messages; a flood of them must not stop the world
 _MOST_FORGOTTEN = 20_000  # messages, more than can wait
 
 FirstTick: TypeAlias = Callable[[int], int]

@@ -113,7 +113,7 @@ class SimulatedCharacter:
         self._motion = self.state.position, self.state.velocity
 
     def begin_substep(self, first: bool) -> None:
-        """Apply all forces anew for one engine step."""
+        """Apply all forces again for one engine step."""
         total = self._applied
         if self._passive.active:
             motion = self._motion if first else self._body.read()

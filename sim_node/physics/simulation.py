@@ -60,7 +60,7 @@ class Snapshot:
 class Simulation:
     """Forward dynamics in ticks: `(q, v, effort) -> next (q, v)` of every actor.
 
-    The effort is held over the tick and applied anew at each engine step: a force in the world
+    The effort is held over the tick and applied again at each engine step: a force in the world
     stays so, a torque in a body's frame turns with the body.
     """
 

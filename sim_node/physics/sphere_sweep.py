@@ -74,7 +74,7 @@ def find_impact(
         for _ in range(_LAST_STEPS + round(distance / radius)):
             if gaps[row] < _CLOSE:
                 break
-            left -= min(gaps[row], radius)  # lest it jump over what is in the way
+            left -= min(gaps[row], radius)  # or it would jump over what is in the way
             world.balls.place(target + left * origin)
             gaps = world.balls.gaps(body.links)
             before |= {names[each] for each in np.flatnonzero(gaps < 0.0).tolist() if each != row}

@@ -6,7 +6,7 @@ from msgs_config.errors import CommandError
 from msgs_config.messages.throw import ProjectileThrow
 
 MOST_BALLS = 100
-"""In an episode, lest a hostile sender fill the world."""
+"""In an episode; a hostile sender must not fill the world."""
 
 
 @dataclass

@@ -25,7 +25,7 @@ class WorldSettings:
     link_friction: float = 0.5  # of every link
     solver_iterations: int = 10
     ground: bool = True  # the plane z = 0
-    terrain: UrdfOptions | None = None  # what else lies there for ever
+    terrain: UrdfOptions | None = None  # what else stays there
 
 
 class World:
@@ -79,7 +79,7 @@ class World:
         return Body(self._client, character, self._link_friction)
 
     def step(self) -> None:
-        """Advance by one engine step; efforts last one step and are to be applied anew."""
+        """Advance by one engine step; efforts last one step and are to be applied again."""
         pybullet.stepSimulation(physicsClientId=self._client)
 
     def touched_links(self) -> TouchedLinks:

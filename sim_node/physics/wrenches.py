@@ -9,7 +9,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, one_of
 
-_MOST_WAITING = 10_000  # pushes, lest a hostile sender fill the memory
+_MOST_WAITING = 10_000  # pushes; a hostile sender must not fill the memory
 
 
 @dataclass(frozen=True)

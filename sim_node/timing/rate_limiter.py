@@ -4,7 +4,7 @@ import math
 
 from msgs_config.runtime.durations import Durations
 
-_LONGEST_BACKLOG = 0.1  # s that is caught up with; beyond it the schedule begins anew
+_LONGEST_BACKLOG = 0.1  # s that is caught up with; beyond it the schedule starts over
 
 
 class RateLimiter:

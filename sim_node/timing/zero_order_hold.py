@@ -14,7 +14,7 @@ _NEVER = -1
 class ZeroOrderHold:
     """The last command of each degree of freedom, held until it is too old; then zero.
 
-    Offers the same as `LockstepBarrier`, save that a tick never waits: it is always complete. Of
+    Offers the same as `LockstepBarrier`, except that a tick never waits: it is always complete. Of
     two commands in conflict the later one is taken.
     """
 

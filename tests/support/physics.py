@@ -1,6 +1,6 @@
 """What the tests of the physics share: characters, random states, and the engine's own numbers.
 
-What a test compares with is computed here anew, from what the engine says of each link's inertial
+What a test compares with is computed here again, from what the engine says of each link's inertial
 frame: none of the conversions under test is used, save for quaternion products.
 """
 
@@ -239,7 +239,7 @@ def still_world(whole: Character, step_s: float = INSTANT) -> LoneWorld:
 
 
 def advance(world: LoneWorld, effort: FloatArray, steps: int = 1) -> None:
-    """Apply an effort anew at each of some steps."""
+    """Apply an effort again at each of some steps."""
     for _ in range(steps):
         world.body.apply(effort)
         world.step()

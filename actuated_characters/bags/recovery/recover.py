@@ -30,7 +30,7 @@ class Recovered:
     bag: Path
     contents: Contents
     damaged: Path | None  # the original; None where the bag was complete and nothing was done
-    measured: list[Path] = field(default_factory=list)  # directories with figures made anew
+    measured: list[Path] = field(default_factory=list)  # directories with figures rebuilt
     kept: list[Path] = field(default_factory=list)  # with the recorder's own, of the whole run
     unmeasured: str = ""  # why there are none, in a run's directory
 

@@ -85,7 +85,7 @@ class RenderScene:
                 self._colors += [_opaque(shape.color_rgba) for shape in own]
 
     def add_terrain(self, terrain: UrdfOptions) -> None:
-        """Add what lies there for ever. Raises CharacterError if the engine refuses its URDF."""
+        """Add what stays there. Raises CharacterError if the engine refuses its URDF."""
         body = load_urdf(self._client, terrain)
         for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):
             pybullet.changeVisualShape(

@@ -67,7 +67,7 @@ class Renderer:
         Args:
             character: The character, or several.
             ground: Draw the plane z = 0 as a chequerboard; not if a fixed base hangs below it.
-            terrain: What else lies there for ever.
+            terrain: What else stays there.
             samples: Drawn along each edge of a pixel, for smooth edges; one where a picture is so
                 large that more would take gigabytes.
 

@@ -19,7 +19,7 @@ class Watch:
     """Looks how long something has been waited for: says it now and then, and gives up at last."""
 
     def __init__(self, patience: float = PATIENCE) -> None:
-        """`patience` in s; infinite for who waits for ever."""
+        """`patience` in s; infinite for who waits forever."""
         self._patience = patience
         self.restart()
 

@@ -48,7 +48,7 @@ PARAMETERS = [
         "fixed", [], "parameters of controller_node that are not changed as they were", texts=True
     ),
     SESSION,
-    Parameter("start_patience", PATIENCE, "wait this long for a controller; 0: for ever", unit="s"),
+    Parameter("start_patience", PATIENCE, "wait this long for a controller; 0: forever", unit="s"),
 ]
 
 _REPUBLISH_PERIOD = 0.5  # s, as the simulator's

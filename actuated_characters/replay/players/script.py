@@ -118,7 +118,7 @@ def _all_sent(recording: Recording) -> list[Commands | None]:
 def _sent(recording: Recording, tick: int) -> Commands | None:
     """The commands that completed a tick, in order; None if they do not.
 
-    What came after a conflict was asked for anew, when the simulator was resumed.
+    What came after a conflict was asked for again, when the simulator was resumed.
     """
     layout = recording.layout
     required = layout.mask(recording.parameters["commanded_joints"])

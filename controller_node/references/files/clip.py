@@ -29,7 +29,7 @@ class ClipFrames:
     """The frames of a clip in a character's layout, z-up, where it stands, in its joint limits."""
 
     times: FloatArray  # (f,) s, rising from 0
-    positions: FloatArray  # (f, n) message form, save that rotations are in `orientations_xyzw`
+    positions: FloatArray  # (f, n) message form, except that rotations are in `orientations_xyzw`
     orientations_xyzw: FloatArray  # (f, k, 4)
     wraps: bool  # whether it goes on from its end
     bounds: tuple[FloatArray, FloatArray]  # (n,) each, the joint limits

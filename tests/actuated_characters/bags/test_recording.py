@@ -447,7 +447,7 @@ def test_an_older_bag_has_its_character_in_its_texts_too(tmp_path: Path) -> None
 
     assert read_recording(bag).character == made.plan.character
     file.unlink()
-    assert "cannot build character thing anew" in refusal(bag) and str(file) in refusal(bag)
+    assert "cannot rebuild character thing" in refusal(bag) and str(file) in refusal(bag)
 
 
 def test_meshes_of_an_older_bag_are_those_of_the_same_text(tmp_path: Path) -> None:

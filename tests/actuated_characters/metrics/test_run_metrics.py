@@ -586,10 +586,10 @@ def test_commands_are_counted_as_the_simulator_reports_them_last() -> None:
     assert (figures["rejected_commands"], figures["duplicate_commands"]) == (4, 5)
 
 
-def test_a_simulator_that_is_started_anew_is_an_error() -> None:
+def test_a_simulator_that_is_restarted_is_an_error() -> None:
     listener = heard([configuration_message(), *pendulum_messages()])
 
-    with pytest.raises(RecordingError, match="anew"):
+    with pytest.raises(RecordingError, match="restarted"):
         listener.take(*configuration_message(gravity=1.62))
 
 

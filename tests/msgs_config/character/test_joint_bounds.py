@@ -46,7 +46,7 @@ CASES = {  # kind, the URDF's limit, the file's, the bounds that count
     "the upper alone": ("revolute", LIMIT, "upper: 0.3", (-0.5, 0.3)),
     "wider ones": ("revolute", LIMIT, "lower: -1, upper: 1", (-1.0, 1.0)),
     "of a slider": ("prismatic", LIMIT, "lower: -0.2, upper: 0.3", (-0.2, 0.3)),
-    "of a joint that turns for ever": ("continuous", "", "lower: -0.2, upper: 0.3", (-0.2, 0.3)),
+    "of a joint that turns forever": ("continuous", "", "lower: -0.2, upper: 0.3", (-0.2, 0.3)),
     "of a hinge without": ("revolute", NO_BOUNDS, "lower: -0.2, upper: 0.3", (-0.2, 0.3)),
 }
 

@@ -1,4 +1,4 @@
-"""Stamps are exact integers of the tick count, at every rate and for ever."""
+"""Stamps are exact integers of the tick count, at every rate and forever."""
 
 from fractions import Fraction
 

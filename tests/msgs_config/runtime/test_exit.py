@@ -106,7 +106,7 @@ def left_behind(files: set[Path]) -> set[Path]:
 
     Without ports whose lock is gone. Their reader has closed them in good order; Fast DDS removes
     the file only where at the last close the port is well and its mutex free, which a busy machine
-    can spoil, and whoever opens the port next makes it anew.
+    can spoil, and whoever opens the port next recreates it.
     """
     there = {file for file in files if file.exists()}.difference(*map(belongings, living()))
     return {

@@ -41,7 +41,7 @@ every_ball = pytest.mark.parametrize("ball", BALLS, ids=lambda ball: ball.name)
 
 @pytest.fixture(scope="module")
 def passive() -> PassiveForces:
-    """The law itself: what the forces are for ever shorter steps."""
+    """The law itself: what the forces become as steps get shorter."""
     return make_passive_forces(HUMANOID, 1e-12)
 
 

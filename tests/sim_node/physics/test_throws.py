@@ -312,7 +312,7 @@ def test_what_stood_against_a_ball_falls_when_it_is_taken_away(block: str) -> No
 
 
 @pytest.mark.parametrize("ticks", [20, 60, 110], ids=["before", "in flight", "after the impact"])
-@pytest.mark.parametrize("lifetime", [0.0, 0.3], ids=["for ever", "for a time"])
+@pytest.mark.parametrize("lifetime", [0.0, 0.3], ids=["forever", "for a time"])
 def test_a_saved_state_is_restored_whatever_was_thrown_since(
     walk: Plan, ticks: int, lifetime: float
 ) -> None:
