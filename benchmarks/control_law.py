@@ -12,7 +12,7 @@ from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from benchmarks.support.deep_mimic import DeepMimicStablePd
 from benchmarks.support.ratios import Ratio
-from controller_node.laws import LAWS
+from controller_node.control_laws import LAWS
 from controller_node.parameters import make_controller
 from controller_node.references.base import Reference, ReferenceState
 

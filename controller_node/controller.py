@@ -9,8 +9,15 @@ from controller_node.balance import Balance, BalanceGains
 from controller_node.behaviours.base import ModeReport, Observation, Phase
 from controller_node.behaviours.factory import BehaviourChoice
 from controller_node.behaviours.targets import AS_IT_IS, Target
+from controller_node.control_laws import (
+    COMPENSATES_GRAVITY,
+    GainArrays,
+    Law,
+    LawContext,
+    TrackingInput,
+    make_law,
+)
 from controller_node.effort_series import EffortSeries
-from controller_node.laws import HAS_BIAS, GainArrays, Law, LawContext, TrackingInput, make_law
 from controller_node.model_check import check_agreement
 from controller_node.planner.base import Planner
 from controller_node.planner.outlook import Outlook
@@ -326,7 +333,7 @@ class Controller:
         effort = self._law(instant, gains)
         if self._settings.balance is not None and self._balance is not None:
             self._model.update(instant.position, instant.velocity)
-            bias = self._settings.law not in HAS_BIAS
+            bias = self._settings.law not in COMPENSATES_GRAVITY
             effort = effort + self._balance.effort(
                 self._model, self._settings.balance, with_bias=bias
             )

@@ -8,9 +8,9 @@ import numpy as np
 from controller_node.balance import BalanceGains
 from controller_node.behaviours import settings as behaviour_settings
 from controller_node.behaviours.factory import choose_behaviour
+from controller_node.control_laws import LAWS, GainArrays
 from controller_node.controller import Controller, Settings
 from controller_node.effort_series import read_effort_series
-from controller_node.laws import LAWS, GainArrays
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.factory import make_planner
 from controller_node.planner.settings import NO_PLANNER

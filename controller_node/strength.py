@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import MotionError, one_of

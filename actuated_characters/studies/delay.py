@@ -14,7 +14,7 @@ from actuated_characters.studies.framework.tracking import (
     fall_time,
 )
 from controller_node import parameters as controller_parameters
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character

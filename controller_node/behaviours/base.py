@@ -6,7 +6,7 @@ from enum import Enum
 from typing import Protocol, TypeAlias
 
 from controller_node.behaviours.targets import AS_IT_IS, Target
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray

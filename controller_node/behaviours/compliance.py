@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from controller_node.strength import limits_of
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType

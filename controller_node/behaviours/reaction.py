@@ -24,7 +24,7 @@ from controller_node.behaviours.targets import (
     ReferenceTarget,
     Target,
 )
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertialisedReference, InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference

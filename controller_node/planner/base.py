@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from controller_node.planner.outlook import Outlook
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray

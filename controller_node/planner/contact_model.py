@@ -11,7 +11,7 @@ from itertools import product
 import mujoco
 import numpy as np
 
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.features import Watched
 from controller_node.planner.compiled.law import Joints, Law
 from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.rollout import let_act
 from controller_node.planner.contact_model import ContactModel
 from msgs_config.arrays import FloatArray

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from controller_node.planner.anchor import Anchor, Balance, balance_of
 from controller_node.planner.base import DesiredAt
 from controller_node.planner.compiled.rollout import Body

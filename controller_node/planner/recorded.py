@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays
 from controller_node.planner.base import DesiredAt
 from controller_node.planner.outlook import Outlook
 from controller_node.references.offsets import RecordedPlan

@@ -12,8 +12,8 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
+from controller_node.control_laws import LAWS
 from controller_node.effort_series import write_effort_series
-from controller_node.laws import LAWS
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
 from msgs_config.messages.clock import TickClock

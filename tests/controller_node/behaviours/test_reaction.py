@@ -10,8 +10,8 @@ from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.behaviours.base import Mode, ModeReport
 from controller_node.behaviours.compliance import ComplianceProfile, softened
+from controller_node.control_laws import GainArrays, TrackingInput
 from controller_node.controller import Controller
-from controller_node.laws import GainArrays, TrackingInput
 from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import read_clip
 from controller_node.references.trajectory import points_of_lists

@@ -6,8 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from controller_node.control_laws import stable_pd_effort
-from controller_node.laws import GainArrays
+from controller_node.control_laws import GainArrays, stable_pd_effort
 from controller_node.parameters import PARAMETERS as CONTROLLER
 from controller_node.parameters import character_parameters, make_settings
 from controller_node.planner.compiled import linear, mass_matrix, soft_limits
