@@ -57,7 +57,7 @@ def _study(options: argparse.Namespace) -> None:
 
 
 def _conduct(study: "Study", directory: Path, *, keep_runs: bool) -> None:
-    from actuated_characters.studies.framework.runner import TopicLaboratory, write_findings
+    from actuated_characters.studies.framework.runner import TopicRunner, write_result
 
     console = Console()
     done: dict[str, float] = {}
@@ -74,21 +74,21 @@ def _conduct(study: "Study", directory: Path, *, keep_runs: bool) -> None:
                 total=total,
             )
 
-        laboratory = TopicLaboratory(directory, keep_runs=keep_runs, report=report)
-        findings = study.run(laboratory)
+        runner = TopicRunner(directory, keep_runs=keep_runs, report=report)
+        result = study.run(runner)
         bar.update(task, description=study.name, completed=bar.tasks[task].total)
-    files = write_findings(directory, study.name, findings)
-    console.print(_table(study.title, findings))
-    for note in findings.notes:
+    files = write_result(directory, study.name, result)
+    console.print(_table(study.title, result))
+    for note in result.notes:
         console.print(note)
     console.print(f"in {directory}: {', '.join(file.name for file in files)}")
 
 
-def _table(title: str, findings: "StudyResult") -> Table:
+def _table(title: str, result: "StudyResult") -> Table:
     table = Table(title=title, title_justify="left")
-    for column in findings.columns:
+    for column in result.columns:
         table.add_column(column, overflow="fold")
-    for row in findings.rows:
+    for row in result.rows:
         table.add_row(*(_shown(cell) for cell in row))
     return table
 

@@ -47,14 +47,14 @@ class AssistanceStudy:
     title = "the walk by strength of root force and torque"
     runs = len(_STRENGTHS) + 1
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Walk with each strength, and with a root that nobody may command."""
         character = load_character(_CHARACTER)
         walks = [
-            _walk(laboratory, f"x {strength:g}", strength, weakened(character, strength))
+            _walk(runner, f"x {strength:g}", strength, weakened(character, strength))
             for strength in _STRENGTHS
         ]
-        walks.append(_walk(laboratory, "none", 0.0, {"root_assistance": False}))
+        walks.append(_walk(runner, "none", 0.0, {"root_assistance": False}))
         return StudyResult(
             columns=(
                 "root stiffness",
@@ -89,13 +89,11 @@ def weakened(character: Character, strength: float) -> dict[str, object]:
     return given
 
 
-def _walk(
-    laboratory: StudyRunner, name: str, strength: float, controller: dict[str, object]
-) -> _Walk:
+def _walk(runner: StudyRunner, name: str, strength: float, controller: dict[str, object]) -> _Walk:
     reference = {"reference": "clip", "clip": "walk"}
     label = name.replace(" ", "")
     case = RunSpec(label, _CHARACTER, _DURATION, reference, controller=controller)
-    run = laboratory.run(case).recording
+    run = runner.run(case).recording
     position, desired = run.position[:-1], run.reference_position[:-1]
     fall = fall_time(run.times[:-1], position[:, 2], desired[:, 2])
     until = len(position) if fall is None else int(np.searchsorted(run.times, fall))

@@ -53,11 +53,11 @@ class BalanceStudy:
     title = "balance without assistance: pushes at the chest, 0.1 s"
     runs = 2 + 7 * len(_DIRECTIONS)
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Stand with and without the virtual force, then be pushed harder and harder."""
-        stood = laboratory.run(_case("stand", _STANDING))
-        limp = laboratory.run(_case("without", _PUSHED, {"balance": False}))
-        limits = {name: _largest_impulse(laboratory, name) for name in _DIRECTIONS}
+        stood = runner.run(_case("stand", _STANDING))
+        limp = runner.run(_case("without", _PUSHED, {"balance": False}))
+        limits = {name: _largest_impulse(runner, name) for name in _DIRECTIONS}
         mass = stood.recording.character.mass
         rows = [
             (name, limit.survived, limit.fell, limit.survived / mass)
@@ -126,13 +126,13 @@ def _case(
     )
 
 
-def _largest_impulse(laboratory: StudyRunner, direction: str) -> _Limit:
+def _largest_impulse(runner: StudyRunner, direction: str) -> _Limit:
     """Bisect between no push and one that throws anybody over."""
     x, y = _DIRECTIONS[direction]
 
     def pushed(impulse: float) -> RunResult:
         label = f"{direction}_{impulse:g}Ns"
-        return laboratory.run(_case(label, _PUSHED, impulse=(impulse * x, impulse * y)))
+        return runner.run(_case(label, _PUSHED, impulse=(impulse * x, impulse * y)))
 
     low, high, strongest = 0.0, _LARGEST, None
     while high - low > _RESOLUTION:

@@ -62,10 +62,10 @@ class ClipsStudy:
     title = "every clip with root assistance, 10 s each"
     runs = 15
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Track each clip and compare its error with the bound."""
         character = load_character(_CHARACTER)
-        runs = [_track(laboratory, character, clip) for clip in available_clips(character)]
+        runs = [_track(runner, character, clip) for clip in available_clips(character)]
         worst = max(runs, key=lambda run: float(run.errors.mean()) / run.bound)
         return StudyResult(
             columns=(
@@ -119,9 +119,9 @@ def clearances(character: Character, positions: FloatArray) -> Mapping[str, Floa
     return lowest
 
 
-def _track(laboratory: StudyRunner, character: Character, clip: str) -> _Tracked:
+def _track(runner: StudyRunner, character: Character, clip: str) -> _Tracked:
     case = RunSpec(clip, _CHARACTER, _DURATION, {"reference": "clip", "clip": clip})
-    outcome = laboratory.run(case)
+    outcome = runner.run(case)
     run, feet = outcome.recording, set(character.feet)
     parents = {link.name: character.links[link.parent].name for link in character.links[1:]}
     # a shin reaches down to its ankle, and to the ground where the foot turns over

@@ -70,12 +70,10 @@ class DelayStudy:
     title = "tracking of the walk by control rate and delay, with root assistance"
     runs = len(_RATES) * len(_DELAYS)
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Walk at each rate with each delay."""
         character = load_character(_CHARACTER)
-        cells = [
-            _measure(laboratory, character, rate, delay) for rate in _RATES for delay in _DELAYS
-        ]
+        cells = [_measure(runner, character, rate, delay) for rate in _RATES for delay in _DELAYS]
         return StudyResult(
             columns=(
                 "rate (Hz)",
@@ -137,9 +135,9 @@ def small_deviations(
     )
 
 
-def _measure(laboratory: StudyRunner, character: Character, rate: int, delay: int) -> _Cell:
+def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -> _Cell:
     substeps = _ENGINE_RATE // rate
-    outcome = laboratory.run(
+    outcome = runner.run(
         RunSpec(
             f"{rate}Hz_{delay}ticks",
             _CHARACTER,

@@ -69,9 +69,9 @@ class EquationStudy:
     title = "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part"
     runs = len(_CASES)
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Walk, stand and fall; and time a walk part by part."""
-        outcomes = {case.label: laboratory.run(case) for case in _CASES}
+        outcomes = {case.label: runner.run(case) for case in _CASES}
         closures = {name: close(outcome.recording) for name, outcome in outcomes.items()}
         tick = _measure(outcomes["walk"])
         rows = [_row(name, closure) for name, closure in closures.items()]

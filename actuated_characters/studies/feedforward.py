@@ -93,9 +93,9 @@ class FeedforwardStudy:
     title = "torques of a run, played again (open loop) and computed again (closed loop)"
     runs = 4 * len(_SUBJECTS)
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Four runs of an arm and of a walk."""
-        quartets = [_run(laboratory, subject) for subject in _SUBJECTS]
+        quartets = [_run(runner, subject) for subject in _SUBJECTS]
         arm, walk = quartets
         return StudyResult(
             columns=_COLUMNS,
@@ -116,7 +116,7 @@ class FeedforwardStudy:
         )
 
 
-def _run(laboratory: StudyRunner, subject: _Subject) -> Quartet:
+def _run(runner: StudyRunner, subject: _Subject) -> Quartet:
     closed = RunSpec(
         label=f"{subject.character}-closed",
         character=subject.character,
@@ -125,10 +125,10 @@ def _run(laboratory: StudyRunner, subject: _Subject) -> Quartet:
         simulator={"rate": _RATE, "wrench_duration": _PUSH_DURATION},
         controller=subject.controller,
     )
-    first = laboratory.run(closed)
+    first = runner.run(closed)
     run = first.recording
     table = effort_table(run.layout, run.times[:-1], run.effort)
-    file = laboratory.write(f"{subject.character}_efforts.csv", table)
+    file = runner.write(f"{subject.character}_efforts.csv", table)
     opened = replace(
         closed,
         label=f"{subject.character}-open",
@@ -138,9 +138,9 @@ def _run(laboratory: StudyRunner, subject: _Subject) -> Quartet:
     push = PlannedPush(stamp_ns, subject.link, (*subject.force, 0.0, 0.0, 0.0))
 
     def pushed(case: RunSpec) -> RunResult:
-        return laboratory.run(replace(case, label=f"{case.label}-pushed", pushes=[push]))
+        return runner.run(replace(case, label=f"{case.label}-pushed", pushes=[push]))
 
-    return Quartet(first, laboratory.run(opened), pushed(closed), pushed(opened))
+    return Quartet(first, runner.run(opened), pushed(closed), pushed(opened))
 
 
 def _named(quartet: Quartet) -> list[tuple[str, bool, RunResult]]:

@@ -106,17 +106,15 @@ class ForwardInverseStudy:
     title = "inverse dynamics of a motion, fed forward without feedback"
     runs = len(_ARM_RATES) + len(_WALK_RATES) + 1
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """An arm and a walk in the air at several rates; the walk on the ground by its joints."""
-        arm = _Motion(_ARM, _arm_keyframes(laboratory), _ARM_LENGTH)
-        keyframes, cycle = _walk_keyframes(laboratory)
+        arm = _Motion(_ARM, _arm_keyframes(runner), _ARM_LENGTH)
+        keyframes, cycle = _walk_keyframes(runner)
         walk = _Motion(_HUMANOID, keyframes, _WALK_LENGTH)
-        arms = [_give_back(laboratory, _invert(laboratory, arm, rate)) for rate in _ARM_RATES]
-        inverses = [_invert(laboratory, walk, rate) for rate in _WALK_RATES]
-        whole = [
-            _give_back(laboratory, each, root="fed forward", ground=False) for each in inverses
-        ]
-        joints = _give_back(laboratory, inverses[0], root="left out")
+        arms = [_give_back(runner, _invert(runner, arm, rate)) for rate in _ARM_RATES]
+        inverses = [_invert(runner, walk, rate) for rate in _WALK_RATES]
+        whole = [_give_back(runner, each, root="fed forward", ground=False) for each in inverses]
+        joints = _give_back(runner, inverses[0], root="left out")
         return StudyResult(
             columns=_COLUMNS,
             rows=[*_rows(arms), *_rows(whole), *_rows([joints])],
@@ -129,9 +127,9 @@ class ForwardInverseStudy:
         )
 
 
-def _arm_keyframes(laboratory: StudyRunner) -> str:
+def _arm_keyframes(runner: StudyRunner) -> str:
     return _write_keyframes(
-        laboratory,
+        runner,
         _ARM,
         [
             (time, {f"lbr_iiwa_{name}": angle for name, angle in pose.items()})
@@ -140,7 +138,7 @@ def _arm_keyframes(laboratory: StudyRunner) -> str:
     )
 
 
-def _walk_keyframes(laboratory: StudyRunner) -> tuple[str, float]:
+def _walk_keyframes(runner: StudyRunner) -> tuple[str, float]:
     """The clip as a smooth motion, from rest; the file, and the time in s of a cycle.
 
     The clip itself is linear between its frames: its velocity jumps, for which no effort is
@@ -153,36 +151,36 @@ def _walk_keyframes(laboratory: StudyRunner) -> tuple[str, float]:
         time = number * cycle / _A_CYCLE
         position = plan.reference.sample(time).configuration.position
         keyframes.append((time, dict(zip(names, position.tolist(), strict=True))))
-    return _write_keyframes(laboratory, _HUMANOID, keyframes), cycle
+    return _write_keyframes(runner, _HUMANOID, keyframes), cycle
 
 
 def _write_keyframes(
-    laboratory: StudyRunner, character: str, keyframes: Sequence[tuple[float, Mapping[str, float]]]
+    runner: StudyRunner, character: str, keyframes: Sequence[tuple[float, Mapping[str, float]]]
 ) -> str:
     content = {
         "interpolation": "smooth",
         "keyframes": [{"time": time, "pose": dict(pose)} for time, pose in keyframes],
     }
-    return laboratory.write(f"{character}_keyframes.yaml", yaml.safe_dump(content))
+    return runner.write(f"{character}_keyframes.yaml", yaml.safe_dump(content))
 
 
-def _invert(laboratory: StudyRunner, motion: _Motion, rate: int) -> _Inverse:
+def _invert(runner: StudyRunner, motion: _Motion, rate: int) -> _Inverse:
     """Inverse dynamics at each tick of a run."""
     plan = make_plan(motion.character, motion.duration, motion.reference, {"rate": rate}, {})
     model = DynamicsModel(plan.character)
     times = np.arange(plan.ticks) / rate
     efforts = efforts_along(model, plan.reference, times, 1.0 / rate)
     table = effort_table(plan.character.layout, times, efforts)
-    file = laboratory.write(f"{motion.character}_{rate}_efforts.csv", table)
+    file = runner.write(f"{motion.character}_{rate}_efforts.csv", table)
     return _Inverse(motion, rate, times, efforts, model.weight, file)
 
 
 def _give_back(
-    laboratory: StudyRunner, inverse: _Inverse, *, root: str = "none", ground: bool = True
+    runner: StudyRunner, inverse: _Inverse, *, root: str = "none", ground: bool = True
 ) -> _Return:
     """Feed efforts forward; the root's only if that is what is said of them."""
     motion = inverse.motion
-    outcome = laboratory.run(
+    outcome = runner.run(
         RunSpec(
             label=f"{motion.character}-{inverse.rate}{'' if ground else '-air'}",
             character=motion.character,

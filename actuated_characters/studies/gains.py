@@ -77,10 +77,10 @@ class GainsStudy:
     title = "stiffness and damping x 0.1, 1, 10: the walk, with root assistance"
     runs = 10
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Walk by each pair of factors, with and without the reference's velocity."""
         runs = {
-            (factors, velocity): laboratory.run(_case(factors, velocity))
+            (factors, velocity): runner.run(_case(factors, velocity))
             for factors in dict.fromkeys(_FACTORS.values())
             for velocity in _VELOCITIES
         }

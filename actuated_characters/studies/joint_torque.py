@@ -58,17 +58,17 @@ class JointTorqueStudy:
     title = "joint torque: forces between two bodies that sum to zero"
     runs = 5
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Run the torque at two rates, then the forces, a root force, and nothing at all."""
         boxes = write_hinged_boxes(
-            laboratory, "hinged", _PARENT, _CHILD, joint_in_parent=(0.0, 0.0, 0.0)
+            runner, "hinged", _PARENT, _CHILD, joint_in_parent=(0.0, 0.0, 0.0)
         )
-        by_torque = _run(laboratory, boxes, "torque")
-        at_fine_rate = _run(laboratory, boxes, "torque_fine", rate=_FINE_RATE)
+        by_torque = _run(runner, boxes, "torque")
+        at_fine_rate = _run(runner, boxes, "torque_fine", rate=_FINE_RATE)
         pushes = balanced_pushes(by_torque.recording, _profile(_times(_RATE)))
-        by_forces = _run(laboratory, boxes, "forces", torque=0.0, pushes=pushes)
-        by_root = _run(laboratory, boxes, "root_force", force=_FORCE, rate=_FINE_RATE)
-        passive = _run(laboratory, boxes, "nothing", torque=0.0)
+        by_forces = _run(runner, boxes, "forces", torque=0.0, pushes=pushes)
+        by_root = _run(runner, boxes, "root_force", force=_FORCE, rate=_FINE_RATE)
+        passive = _run(runner, boxes, "nothing", torque=0.0)
         runs = {
             f"joint torque, {_RATE} Hz": by_torque,
             f"joint torque, {_FINE_RATE} Hz": at_fine_rate,
@@ -122,7 +122,7 @@ def _profile(times: FloatArray) -> FloatArray:
 
 
 def _run(
-    laboratory: StudyRunner,
+    runner: StudyRunner,
     boxes: str,
     name: str,
     *,
@@ -132,7 +132,7 @@ def _run(
     pushes: Sequence[PlannedPush] = (),
 ) -> _Run:
     times = _times(rate)
-    series = _write_series(laboratory, boxes, name, torque * _profile(times), times, force)
+    series = _write_series(runner, boxes, name, torque * _profile(times), times, force)
     case = RunSpec(
         label=name,
         character=boxes,
@@ -151,12 +151,12 @@ def _run(
         },
         pushes=pushes,
     )
-    recording = laboratory.run(case).recording
+    recording = runner.run(case).recording
     return _Run(recording, momenta(recording.character, recording.position, recording.velocity))
 
 
 def _write_series(
-    laboratory: StudyRunner,
+    runner: StudyRunner,
     boxes: str,
     name: str,
     torques: FloatArray,
@@ -168,7 +168,7 @@ def _write_series(
     efforts = np.zeros((len(times), layout.size))
     efforts[:, layout.dof_names.index(HINGE)] = torques
     efforts[:, 0] = force
-    path = laboratory.write(f"{name}.csv", "")
+    path = runner.write(f"{name}.csv", "")
     write_effort_series(Path(path), layout, times, efforts)
     return path
 

@@ -52,11 +52,11 @@ class LiftStudy:
     title = "1 kg on a slider, from rest at 0 m to 1 m, 240 Hz"
     runs = 26
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Run each law with gains that show what it is like, then look for the bounds."""
 
         def respond(gains: Gains, duration: float = _LENGTH) -> Response:
-            return _respond(laboratory, gains, duration)
+            return _respond(runner, gains, duration)
 
         limit = second_order.largest_integral_gain(STIFFNESS, CRITICAL, MASS)
         p = respond(Gains("p", STIFFNESS, 0.0))
@@ -93,9 +93,9 @@ class LiftStudy:
         )
 
 
-def _respond(laboratory: StudyRunner, gains: Gains, duration: float) -> Response:
+def _respond(runner: StudyRunner, gains: Gains, duration: float) -> Response:
     numbers = f"{gains.stiffness:.0f}-{gains.damping:.0f}-{gains.integral:.0f}"
-    outcome = laboratory.run(
+    outcome = runner.run(
         RunSpec(
             label=f"{gains.law}-{numbers}",
             character="lift",

@@ -60,11 +60,11 @@ class ReactionStudy:
     title = "a walk that is hit by a ball against the chest, behaviour reactive"
     runs = len(IMPULSES) + 3
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Let it be hit harder and harder; and others: one that is limp, and one that gets up."""
 
         def run(label: str, behaviour: str, impulse: float = 0.0, **more: float) -> Recording:
-            return laboratory.run(_case(label, behaviour, impulse, **more)).recording
+            return runner.run(_case(label, behaviour, impulse, **more)).recording
 
         strongest = IMPULSES[-1]
         alone = run("alone", "reactive", length=_LONG)

@@ -114,9 +114,9 @@ class RigidBodyStudy:
     title = "a free rigid body: m dv/dt = f, I dw/dt + w x I w = tau + r x f"
     runs = len(TRIALS)
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Run each trial, and integrate the same equations beside it."""
-        seen = {trial.label: _observe(laboratory, trial) for trial in TRIALS}
+        seen = {trial.label: _observe(runner, trial) for trial in TRIALS}
         free, finer = seen["middle_axis"], seen["middle_axis_2000"]
         drifts = [float(_off_start(one.momenta.spin).max()) for one in (free, finer)]
         shrink = seen["torque"].trial.box.inertia[2] / seen["torque_long"].trial.box.inertia[2]
@@ -141,12 +141,12 @@ class RigidBodyStudy:
         )
 
 
-def _observe(laboratory: StudyRunner, trial: Trial) -> Observed:
+def _observe(runner: StudyRunner, trial: Trial) -> Observed:
     """Run a trial; the wrenches last as long as it does."""
     stamp = TickClock(trial.rate).stamp_ns(1)
     case = RunSpec(
         label=trial.label,
-        character=write_box(laboratory, trial.box),
+        character=write_box(runner, trial.box),
         duration=trial.duration,
         reference={"reference": "hold"},
         simulator={
@@ -162,7 +162,7 @@ def _observe(laboratory: StudyRunner, trial: Trial) -> Observed:
             for load in trial.loads
         ],
     )
-    run = laboratory.run(case).recording
+    run = runner.run(case).recording
     position, velocity = run.position, run.velocity
     simulated = Motion(
         position[:, :3], rotations.exp(position[:, 3:6]), velocity[:, :3], velocity[:, 3:6]

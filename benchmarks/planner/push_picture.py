@@ -24,7 +24,9 @@ def draw(impulses: Sequence[tuple[float, float]], borne: Sequence[bool], file: P
     axes.scatter(sides[held], sizes[held], color="tab:green", label="on its feet")
     axes.scatter(sides[~held], sizes[~held], color="tab:red", marker="x", label="fell")
     around = np.linspace(-math.pi, math.pi, 181)
-    axes.plot(around, half_borne(sides, sizes, held, around), "k-", label="half of them")
+    half = half_borne(sides, sizes, held, around)
+    half[half > sizes.max()] = math.nan  # nothing was tried there
+    axes.plot(around, half, "k-", label="half of them")
     axes.set_theta_zero_location("N")
     axes.set_title("pushes of 0.2 s on a walk, N s; forwards is up")
     figure.legend(loc="outside lower center", ncols=3)

@@ -1,4 +1,4 @@
-"""A laboratory whose runs are made in this process, without ROS; bit-identical to the nodes'."""
+"""A runner whose runs are made in this process, without ROS; bit-identical to the nodes'."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from sim_node.physics.throws import ThrowQueue
 from sim_node.physics.wrenches import WrenchQueue
 
 
-class InProcessLaboratory:
+class InProcessRunner:
     """Runs a study's cases one by one; files that they need go to a directory."""
 
     def __init__(self, directory: Path) -> None:

@@ -53,13 +53,13 @@ class Box:
 """
 
 
-def write_box(laboratory: StudyRunner, box: Box) -> str:
+def write_box(runner: StudyRunner, box: Box) -> str:
     """Write a box that floats; returns the character's path."""
-    return _write(laboratory, box.name, box.link())
+    return _write(runner, box.name, box.link())
 
 
 def write_hinged_boxes(
-    laboratory: StudyRunner, name: str, parent: Box, child: Box, *, joint_in_parent: Vector
+    runner: StudyRunner, name: str, parent: Box, child: Box, *, joint_in_parent: Vector
 ) -> str:
     """Write two boxes that float, joined by a hinge about y; returns the character's path.
 
@@ -70,13 +70,13 @@ def write_hinged_boxes(
     <origin xyz="{_listed(joint_in_parent)}"/><axis xyz="0 1 0"/>
   </joint>
 """
-    return _write(laboratory, name, parent.link() + child.link() + joint)
+    return _write(runner, name, parent.link() + child.link() + joint)
 
 
-def _write(laboratory: StudyRunner, name: str, elements: str) -> str:
+def _write(runner: StudyRunner, name: str, elements: str) -> str:
     text = f'<?xml version="1.0"?>\n<robot name="{name}">\n{elements}</robot>\n'
-    laboratory.write(f"{name}.urdf", text)
-    return laboratory.write(f"{name}.yaml", f"urdf: {name}.urdf\ninertia: file\n")
+    runner.write(f"{name}.urdf", text)
+    return runner.write(f"{name}.yaml", f"urdf: {name}.urdf\ninertia: file\n")
 
 
 def _listed(numbers: Sequence[float]) -> str:

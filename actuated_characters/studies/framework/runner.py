@@ -25,7 +25,7 @@ _UNREAD = ["odom", "visualization", "controller_node/net_wrench"]  # topics, at 
 _DPI = 110
 
 
-class TopicLaboratory:
+class TopicRunner:
     """Runs cases as processes that speak over topics."""
 
     def __init__(self, directory: Path, *, keep_runs: bool, report: Report) -> None:
@@ -86,21 +86,21 @@ def _check_pushes(pushes: Sequence[PlannedPush], run: Recording) -> None:
             raise RunError(f"the push on '{push.link}' at {push.stamp_ns} ns did not act")
 
 
-def write_findings(directory: Path, name: str, findings: StudyResult) -> list[Path]:
+def write_result(directory: Path, name: str, result: StudyResult) -> list[Path]:
     """Write table (CSV), curves (CSV) and pictures (PNG and SVG); returns the files."""
     directory.mkdir(parents=True, exist_ok=True)
-    assert name not in findings.curves, "the table has that file's name"
+    assert name not in result.curves, "the table has that file's name"
     table = directory / f"{name}.csv"
     with table.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(findings.columns)
-        writer.writerows(findings.rows)
+        writer.writerow(result.columns)
+        writer.writerows(result.rows)
     files = [table]
-    for stem, (columns, values) in findings.curves.items():
+    for stem, (columns, values) in result.curves.items():
         path = directory / f"{stem}.csv"
         np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
         files.append(path)
-    for stem, figure in findings.figures.items():
+    for stem, figure in result.figures.items():
         for suffix in ("png", "svg"):
             path = directory / f"{stem}.{suffix}"
             figure.savefig(path, dpi=_DPI)

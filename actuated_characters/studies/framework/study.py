@@ -74,6 +74,6 @@ class Study(Protocol):
     title: str  # one line
     runs: int  # how many it asks for, about; for the progress bar
 
-    def run(self, laboratory: StudyRunner) -> StudyResult:
+    def run(self, runner: StudyRunner) -> StudyResult:
         """Run its cases and say what was found."""
         ...

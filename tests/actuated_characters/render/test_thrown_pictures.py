@@ -18,7 +18,7 @@ from actuated_characters.report.reactions import (
 from actuated_characters.studies.framework.study import RunSpec
 from msgs_config.messages.projectiles import BallStates, ball_names, decode_balls, encode_balls
 from msgs_config.messages.throw import ProjectileThrow
-from tests.support.in_process import InProcessLaboratory
+from tests.support.in_process import InProcessRunner
 from tests.support.physics import character
 
 HUMANOID = character("humanoid")
@@ -36,9 +36,9 @@ def balls_at(stamp_ns: int, *centres: tuple[float, float, float]) -> BallStates:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """A recording of five ticks with a reset, in which three balls are thrown."""
-    laboratory = InProcessLaboratory(tmp_path_factory.mktemp("laboratory"))
+    runner = InProcessRunner(tmp_path_factory.mktemp("runner"))
     case = RunSpec("one", "humanoid", 5.0 / 240.0, {"reference": "hold"}, {}, {})
-    plain = laboratory.run(case).recording
+    plain = runner.run(case).recording
     effort = plain.effort.copy()
     effort[2] = np.nan  # that tick is a reset
     stamps = plain.stamps_ns.tolist()

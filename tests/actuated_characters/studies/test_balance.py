@@ -9,13 +9,13 @@ import pytest
 from actuated_characters.studies import balance
 from actuated_characters.studies.framework.study import RunResult, RunSpec
 from msgs_config.geometry import rotations
-from tests.support.in_process import InProcessLaboratory
+from tests.support.in_process import InProcessRunner
 
 pytestmark = pytest.mark.slow
 
 
 class Weakling:
-    """A laboratory in which all who are pushed harder than by an impulse lie down."""
+    """A runner in which all who are pushed harder than by an impulse lie down."""
 
     def __init__(self, outcome: RunResult, impulse: float) -> None:
         self._outcome = outcome
@@ -38,8 +38,8 @@ class Weakling:
 
 @pytest.fixture(scope="module")
 def stood(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
-    laboratory = InProcessLaboratory(tmp_path_factory.mktemp("balance"))
-    return laboratory.run(balance._case("stand", 2.0))
+    runner = InProcessRunner(tmp_path_factory.mktemp("balance"))
+    return runner.run(balance._case("stand", 2.0))
 
 
 def test_it_stands_by_joint_efforts_alone(stood: RunResult) -> None:
@@ -49,7 +49,7 @@ def test_it_stands_by_joint_efforts_alone(stood: RunResult) -> None:
 
 
 def test_without_the_virtual_force_it_falls(tmp_path: Path) -> None:
-    outcome = InProcessLaboratory(tmp_path).run(balance._case("without", 2.0, {"balance": False}))
+    outcome = InProcessRunner(tmp_path).run(balance._case("without", 2.0, {"balance": False}))
 
     assert not balance.survives(outcome)
     assert 0.5 < balance.standing_time(outcome.recording) < 2.0
@@ -58,9 +58,9 @@ def test_without_the_virtual_force_it_falls(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("x", "y"), balance._DIRECTIONS.values(), ids=balance._DIRECTIONS)
 def test_a_push_has_its_impulse_and_its_direction(tmp_path: Path, x: float, y: float) -> None:
     """Momentum: over the push's tenth of a second the centre of mass gains about J / m."""
-    laboratory = InProcessLaboratory(tmp_path)
+    runner = InProcessRunner(tmp_path)
 
-    run = laboratory.run(balance._case("pushed", 1.2, impulse=(6.0 * x, 6.0 * y))).recording
+    run = runner.run(balance._case("pushed", 1.2, impulse=(6.0 * x, 6.0 * y))).recording
 
     wrenches = [w.wrenches[0, :2] for w in run.applied_wrench if w is not None and len(w.links)]
     assert np.sum(wrenches, axis=0) / 240.0 == pytest.approx([6.0 * x, 6.0 * y], rel=1e-9)
@@ -68,13 +68,13 @@ def test_a_push_has_its_impulse_and_its_direction(tmp_path: Path, x: float, y: f
 
 @pytest.mark.parametrize("bearable", [0.3, 7.0, 12.6, 31.9])
 def test_bisection_finds_the_largest_impulse(stood: RunResult, bearable: float) -> None:
-    laboratory = Weakling(stood, bearable)
+    runner = Weakling(stood, bearable)
 
-    limit = balance._largest_impulse(laboratory, "left")
+    limit = balance._largest_impulse(runner, "left")
 
     assert limit.survived <= bearable < limit.fell
     assert limit.fell - limit.survived <= 0.5
-    assert len(laboratory.impulses) <= balance.STUDY.runs / 4
+    assert len(runner.impulses) <= balance.STUDY.runs / 4
 
 
 def test_who_lies_on_the_back_in_the_end_has_not_survived(stood: RunResult) -> None:

@@ -10,7 +10,7 @@ from actuated_characters.studies.catalogue import load_study
 from actuated_characters.studies.equation import TickTime, close
 from actuated_characters.studies.framework.study import RunSpec, StudyResult
 from msgs_config.messages.wrenches import WrenchArrays
-from tests.support.in_process import InProcessLaboratory
+from tests.support.in_process import InProcessRunner
 
 pytestmark = pytest.mark.slow
 
@@ -19,25 +19,25 @@ NOTICED = 1e-3
 
 
 @pytest.fixture(scope="module")
-def laboratory(tmp_path_factory: pytest.TempPathFactory) -> InProcessLaboratory:
-    return InProcessLaboratory(tmp_path_factory.mktemp("equation"))
+def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
+    return InProcessRunner(tmp_path_factory.mktemp("equation"))
 
 
 @pytest.fixture(scope="module")
-def findings(laboratory: InProcessLaboratory) -> StudyResult:
-    return load_study("equation").run(laboratory)
+def result(runner: InProcessRunner) -> StudyResult:
+    return load_study("equation").run(runner)
 
 
 @pytest.fixture(scope="module")
-def stood(laboratory: InProcessLaboratory) -> Recording:
+def stood(runner: InProcessRunner) -> Recording:
     """Half a second of standing with assistance, its contacts recorded."""
-    return laboratory.run(RunSpec("short", "humanoid", 0.5, contacts=True)).recording
+    return runner.run(RunSpec("short", "humanoid", 0.5, contacts=True)).recording
 
 
 def test_the_equation_closes_in_every_tick_and_not_without_the_contacts(
-    findings: StudyResult,
+    result: StudyResult,
 ) -> None:
-    rows = {str(row[0]): dict(zip(findings.columns, row, strict=True)) for row in findings.rows}
+    rows = {str(row[0]): dict(zip(result.columns, row, strict=True)) for row in result.rows}
 
     assert set(rows) == {"walk", "stand", "fall"}
     for row in rows.values():

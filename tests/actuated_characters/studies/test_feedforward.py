@@ -11,13 +11,13 @@ from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies.catalogue import load_study
 from actuated_characters.studies.framework import motion_replay
-from actuated_characters.studies.framework.runner import TopicLaboratory
+from actuated_characters.studies.framework.runner import TopicRunner
 from actuated_characters.studies.framework.study import RunSpec, StudyResult
 from controller_node.effort_series import read_effort_series
 from controller_node.references.signals import SineReference
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.messages.clock import TickClock
-from tests.support.in_process import InProcessLaboratory
+from tests.support.in_process import InProcessRunner
 from tests.support.physics import character
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
@@ -26,25 +26,25 @@ GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module")
-def laboratory(tmp_path_factory: pytest.TempPathFactory) -> InProcessLaboratory:
-    return InProcessLaboratory(Path(tmp_path_factory.mktemp("studies")))
+def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
+    return InProcessRunner(Path(tmp_path_factory.mktemp("studies")))
 
 
 @pytest.fixture(scope="module")
-def feedforward(laboratory: InProcessLaboratory) -> StudyResult:
-    return load_study("feedforward").run(laboratory)
+def feedforward(runner: InProcessRunner) -> StudyResult:
+    return load_study("feedforward").run(runner)
 
 
 @pytest.fixture(scope="module")
 def forward_inverse(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
-    laboratory = InProcessLaboratory(Path(tmp_path_factory.mktemp("studies")))
-    return load_study("forward_inverse").run(laboratory)
+    runner = InProcessRunner(Path(tmp_path_factory.mktemp("studies")))
+    return load_study("forward_inverse").run(runner)
 
 
-def rows(findings: StudyResult, **wanted: object) -> list[dict[str, object]]:
+def rows(result: StudyResult, **wanted: object) -> list[dict[str, object]]:
     """The rows of a table that have these cells; a column by the first word of its name."""
-    whole = [dict(zip(findings.columns, row, strict=True)) for row in findings.rows]
-    first = {column.split(" ")[0]: column for column in reversed(findings.columns)}
+    whole = [dict(zip(result.columns, row, strict=True)) for row in result.rows]
+    first = {column.split(" ")[0]: column for column in reversed(result.columns)}
     return [row for row in whole if all(row[first[k]] == v for k, v in wanted.items())]
 
 
@@ -159,11 +159,11 @@ def test_the_four_curves_are_one_until_the_push(feedforward: StudyResult) -> Non
 
 
 def test_the_study_draws_errors_and_poses(
-    feedforward: StudyResult, laboratory: InProcessLaboratory
+    feedforward: StudyResult, runner: InProcessRunner
 ) -> None:
     assert set(feedforward.figures) == {"feedforward_error", "feedforward_walk"}
     assert all(isinstance(figure, Figure) for figure in feedforward.figures.values())
-    assert len({case.label for case in laboratory.cases}) == load_study("feedforward").runs
+    assert len({case.label for case in runner.cases}) == load_study("feedforward").runs
 
 
 # When inverse dynamics is the inverse
@@ -235,10 +235,10 @@ def test_a_run_in_this_process_is_that_of_the_nodes_to_the_bit(domain: int, tmp_
     )
 
     # Act
-    over_topics = TopicLaboratory(tmp_path, keep_runs=False, report=lambda label, share: None)
+    over_topics = TopicRunner(tmp_path, keep_runs=False, report=lambda label, share: None)
     by_nodes, here = (
         over_topics.run(case).recording,
-        InProcessLaboratory(tmp_path).run(case).recording,
+        InProcessRunner(tmp_path).run(case).recording,
     )
 
     # Assert

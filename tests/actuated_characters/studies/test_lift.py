@@ -14,7 +14,7 @@ from actuated_characters.studies.framework.study import StudyResult
 from actuated_characters.studies.theory import second_order
 from actuated_characters.studies.theory.lift_responses import Gains, Response, find_bound
 from msgs_config.arrays import FloatArray
-from tests.support.in_process import InProcessLaboratory
+from tests.support.in_process import InProcessRunner
 
 pytestmark = pytest.mark.slow
 
@@ -23,17 +23,17 @@ TIMES = np.arange(0.0, 3.0, STEP)
 
 
 @pytest.fixture(scope="module")
-def laboratory(tmp_path_factory: pytest.TempPathFactory) -> InProcessLaboratory:
-    return InProcessLaboratory(Path(tmp_path_factory.mktemp("lift")))
+def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
+    return InProcessRunner(Path(tmp_path_factory.mktemp("lift")))
 
 
 @pytest.fixture(scope="module")
-def findings(laboratory: InProcessLaboratory) -> StudyResult:
-    return load_study("lift").run(laboratory)
+def result(runner: InProcessRunner) -> StudyResult:
+    return load_study("lift").run(runner)
 
 
-def rows(findings: StudyResult) -> list[dict[str, object]]:
-    return [dict(zip(findings.columns, row, strict=True)) for row in findings.rows]
+def rows(result: StudyResult) -> list[dict[str, object]]:
+    return [dict(zip(result.columns, row, strict=True)) for row in result.rows]
 
 
 # The maths
@@ -157,8 +157,8 @@ def test_a_bound_is_found_between_the_stable_and_the_unstable() -> None:
 # The runs
 
 
-def test_every_row_is_what_theory_says(findings: StudyResult) -> None:
-    for row in rows(findings):
+def test_every_row_is_what_theory_says(result: StudyResult) -> None:
+    for row in rows(result):
         stable, _, by_theory = str(row["stable / by theory"]).partition(" / ")
         assert stable == by_theory, row
         if stable == "yes" and row["law"] != "pid":
@@ -172,9 +172,9 @@ def test_every_row_is_what_theory_says(findings: StudyResult) -> None:
             )
 
 
-def test_the_table_has_what_the_lecture_shows(findings: StudyResult) -> None:
+def test_the_table_has_what_the_lecture_shows(result: StudyResult) -> None:
     by_gains = {
-        (r["law"], r["kp (N/m)"], r["kd (N s/m)"], r["ki (N/(m s))"]): r for r in rows(findings)
+        (r["law"], r["kp (N/m)"], r["kd (N s/m)"], r["ki (N/(m s))"]): r for r in rows(result)
     }
 
     def overshoot(*gains: object) -> float:
@@ -194,10 +194,10 @@ def test_the_table_has_what_the_lecture_shows(findings: StudyResult) -> None:
     ("law", "bound"), [("pd", (2 * math.sqrt(2) - 2) ** 2), ("stable_pd", 4.0)]
 )
 def test_the_bounds_are_found_within_five_percent(
-    findings: StudyResult, law: str, bound: float
+    result: StudyResult, law: str, bound: float
 ) -> None:
     """For critical damping, in units of m / h^2; just below it is stable, just above it is not."""
-    stiff = [r for r in rows(findings) if r["law"] == law and r["overshoot (%)"] is None]
+    stiff = [r for r in rows(result) if r["law"] == law and r["overshoot (%)"] is None]
     below, above = (float(str(r["kp (N/m)"])) * PERIOD**2 for r in stiff)
 
     assert below < bound < above
@@ -206,17 +206,17 @@ def test_the_bounds_are_found_within_five_percent(
 
 
 def test_the_study_asks_for_as_many_runs_as_it_says_each_with_its_own_label(
-    findings: StudyResult, laboratory: InProcessLaboratory
+    result: StudyResult, runner: InProcessRunner
 ) -> None:
-    labels = [case.label for case in laboratory.cases]
+    labels = [case.label for case in runner.cases]
 
     assert len(labels) == len(set(labels)) == load_study("lift").runs
-    assert all(case.simulator["initial_position"] == [0.0] for case in laboratory.cases)
-    assert set(findings.figures) == {"lift_laws", "lift_error", "lift_stability"}
+    assert all(case.simulator["initial_position"] == [0.0] for case in runner.cases)
+    assert set(result.figures) == {"lift_laws", "lift_error", "lift_stability"}
 
 
-def test_the_figures_draw_what_was_simulated(findings: StudyResult) -> None:
-    figure = findings.figures["lift_error"]
+def test_the_figures_draw_what_was_simulated(result: StudyResult) -> None:
+    figure = result.figures["lift_error"]
     assert isinstance(figure, Figure)
     (axes,) = figure.axes
     lines = {str(line.get_label()): np.asarray(line.get_xydata()) for line in axes.lines}
@@ -224,6 +224,6 @@ def test_the_figures_draw_what_was_simulated(findings: StudyResult) -> None:
         np.testing.assert_allclose(lines[law][:, 0] * lines[law][:, 1], 9.81, rtol=0.01)
     np.testing.assert_allclose(lines["m g / kp"].prod(axis=1), 9.81)
 
-    names, values = findings.curves["lift_heights"]
+    names, values = result.curves["lift_heights"]
     assert len(names) == values.shape[1]
     assert values[0, 1:].tolist() == [0.0] * (len(names) - 1)

@@ -12,7 +12,7 @@ from actuated_characters.studies.framework.study import RunSpec, StudyResult
 from actuated_characters.studies.reactions import HIT, IMPULSES, lost_momentum, measure
 from msgs_config.messages.projectiles import BallStates, ball_names
 from msgs_config.messages.throw import ProjectileThrow
-from tests.support.in_process import InProcessLaboratory
+from tests.support.in_process import InProcessRunner
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
@@ -20,51 +20,51 @@ GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module")
-def laboratory(tmp_path_factory: pytest.TempPathFactory) -> InProcessLaboratory:
-    return InProcessLaboratory(Path(tmp_path_factory.mktemp("studies")))
+def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
+    return InProcessRunner(Path(tmp_path_factory.mktemp("studies")))
 
 
 @pytest.fixture(scope="module")
-def findings(laboratory: InProcessLaboratory) -> StudyResult:
-    return load_study("reactions").run(laboratory)
+def result(runner: InProcessRunner) -> StudyResult:
+    return load_study("reactions").run(runner)
 
 
-def column(findings: StudyResult, name: str) -> list[float]:
-    (number,) = [i for i, each in enumerate(findings.columns) if each.startswith(name)]
-    values = [row[number] for row in findings.rows]
+def column(result: StudyResult, name: str) -> list[float]:
+    (number,) = [i for i, each in enumerate(result.columns) if each.startswith(name)]
+    values = [row[number] for row in result.rows]
     assert all(isinstance(value, float) for value in values)
     return [float(value) for value in values if isinstance(value, float)]
 
 
-def test_the_measured_impulses_are_about_those_that_were_planned(findings: StudyResult) -> None:
-    measured = np.array(column(findings, "measured impulse"))
+def test_the_measured_impulses_are_about_those_that_were_planned(result: StudyResult) -> None:
+    measured = np.array(column(result, "measured impulse"))
 
     # without restitution a ball loses all that it has, less what the chest takes along
     np.testing.assert_allclose(measured, IMPULSES, rtol=0.15)
 
 
-def test_the_harder_the_hit_the_farther_the_root_gives_way(findings: StudyResult) -> None:
-    peaks = column(findings, "largest displacement")
+def test_the_harder_the_hit_the_farther_the_root_gives_way(result: StudyResult) -> None:
+    peaks = column(result, "largest displacement")
 
     assert peaks == sorted(peaks) and len(set(peaks)) == len(IMPULSES)
 
 
-def test_it_is_back_within_two_seconds_if_it_does_not_fall(findings: StudyResult) -> None:
-    back = column(findings, "back on the clip")
+def test_it_is_back_within_two_seconds_if_it_does_not_fall(result: StudyResult) -> None:
+    back = column(result, "back on the clip")
 
     assert max(back[:-1]) <= 2.0 and back[-1] > 2.0
-    assert column(findings, "LIMP")[:-1] == [0.0] * 3 and column(findings, "LIMP")[-1] > 0.5
-    assert min(column(findings, "REACT")[:-1]) > 0.0
+    assert column(result, "LIMP")[:-1] == [0.0] * 3 and column(result, "LIMP")[-1] > 0.5
+    assert min(column(result, "REACT")[:-1]) > 0.0
 
 
-def test_the_pictures_are_there(findings: StudyResult) -> None:
+def test_the_pictures_are_there(result: StudyResult) -> None:
     kinds = ("ragdoll", "active_ragdoll", "reactive")
-    assert set(findings.figures) == {"reactions", *(f"reactions_{kind}" for kind in kinds)}
-    assert all(isinstance(figure, Figure) for figure in findings.figures.values())
+    assert set(result.figures) == {"reactions", *(f"reactions_{kind}" for kind in kinds)}
+    assert all(isinstance(figure, Figure) for figure in result.figures.values())
 
 
-def test_a_ball_that_hits_nothing_loses_no_momentum(laboratory: InProcessLaboratory) -> None:
-    run = laboratory.run(RunSpec("past", "pendulum", 1.2)).recording
+def test_a_ball_that_hits_nothing_loses_no_momentum(runner: InProcessRunner) -> None:
+    run = runner.run(RunSpec("past", "pendulum", 1.2)).recording
     throw = ProjectileThrow(3.0, 0.1, (0.0, 0.0, 9.0), (2.0, 0.0, 0.0))
     falls = np.zeros((len(run.times), 13))
     falls[:, 7], falls[:, 9] = 2.0, -GRAVITY * run.times
@@ -78,10 +78,10 @@ def test_a_ball_that_hits_nothing_loses_no_momentum(laboratory: InProcessLaborat
 
 
 def test_who_is_not_hit_gives_way_nowhere_and_is_back_at_once(
-    laboratory: InProcessLaboratory,
+    runner: InProcessRunner,
 ) -> None:
     case = RunSpec("walk", "humanoid", 1.5, reference={"reference": "clip", "clip": "walk"})
-    run = laboratory.run(case).recording
+    run = runner.run(case).recording
     size = len(run.effort)
     unseen = ProjectileThrow(1.0, 0.1, (0.0, 0.0, 9.0), (0.0, 0.0, 0.0))
     run = replace(run, throws=((unseen,), *[()] * (size - 1)), balls=(None,) * (size + 1))

@@ -21,7 +21,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations
 from sim_node.physics.world import WorldSettings
-from tests.support.in_process import InProcessLaboratory
+from tests.support.in_process import InProcessRunner
 from tests.support.physics import FLOATING_CHARACTERS, LoneWorld, character, momentum, random_state
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
@@ -133,7 +133,7 @@ def test_a_boxs_inertia_is_that_of_its_grains(tmp_path: Path) -> None:
     squares = np.array([(y**2 + z**2).mean(), (x**2 + z**2).mean(), (x**2 + y**2).mean()])
 
     # Act
-    loaded = load_character(write_box(InProcessLaboratory(tmp_path), box))
+    loaded = load_character(write_box(InProcessRunner(tmp_path), box))
 
     # Assert
     np.testing.assert_allclose(box.inertia, 3.0 * squares, rtol=1e-3)
@@ -179,18 +179,18 @@ def test_forces_that_sum_to_zero_have_the_torque_about_any_point() -> None:
 
 @pytest.fixture(scope="module")
 def rigid(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
-    return load_study("rigid_body").run(InProcessLaboratory(tmp_path_factory.mktemp("rigid")))
+    return load_study("rigid_body").run(InProcessRunner(tmp_path_factory.mktemp("rigid")))
 
 
 @pytest.fixture(scope="module")
-def jointed(tmp_path_factory: pytest.TempPathFactory) -> tuple[StudyResult, InProcessLaboratory]:
-    laboratory = InProcessLaboratory(tmp_path_factory.mktemp("jointed"))
-    return load_study("joint_torque").run(laboratory), laboratory
+def jointed(tmp_path_factory: pytest.TempPathFactory) -> tuple[StudyResult, InProcessRunner]:
+    runner = InProcessRunner(tmp_path_factory.mktemp("jointed"))
+    return load_study("joint_torque").run(runner), runner
 
 
-def column(findings: StudyResult, start_of_name: str) -> list[float]:
-    (index,) = [k for k, name in enumerate(findings.columns) if name.startswith(start_of_name)]
-    cells = [row[index] for row in findings.rows]
+def column(result: StudyResult, start_of_name: str) -> list[float]:
+    (index,) = [k for k, name in enumerate(result.columns) if name.startswith(start_of_name)]
+    cells = [row[index] for row in result.rows]
     return [float("nan") if cell is None else float(cell) for cell in cells]
 
 
@@ -229,18 +229,18 @@ def test_a_box_spun_about_its_middle_axis_turns_over(rigid: StudyResult) -> None
 
 
 def test_forces_between_two_bodies_do_what_the_joint_torque_does(
-    jointed: tuple[StudyResult, InProcessLaboratory],
+    jointed: tuple[StudyResult, InProcessRunner],
 ) -> None:
-    findings, laboratory = jointed
-    names, values = findings.curves["joint_torque_hinge"]
+    result, runner = jointed
+    names, values = result.curves["joint_torque_hinge"]
     curve = dict(zip(names, values.T, strict=True))
 
     by_torque, by_forces = curve["hinge_by_torque_rad"], curve["hinge_by_forces_rad"]
     np.testing.assert_allclose(by_forces, by_torque, atol=1e-12)
     assert np.ptp(by_torque) > 1.0
-    *_, nothing = column(findings, "state off")
+    *_, nothing = column(result, "state off")
     assert nothing > 0.5
-    (pushed,) = [case for case in laboratory.cases if case.label == "forces"]
+    (pushed,) = [case for case in runner.cases if case.label == "forces"]
     by_tick: dict[int, list[tuple[float, ...]]] = {}
     for push in pushed.pushes:
         by_tick.setdefault(push.stamp_ns, []).append(push.wrench)
@@ -250,17 +250,17 @@ def test_forces_between_two_bodies_do_what_the_joint_torque_does(
 
 @pytest.mark.parametrize("pair", [0, 1, 2])
 def test_without_one_of_the_pairs_the_motion_is_another(
-    jointed: tuple[StudyResult, InProcessLaboratory], pair: int
+    jointed: tuple[StudyResult, InProcessRunner], pair: int
 ) -> None:
     # Arrange
-    findings, laboratory = jointed
-    names, values = findings.curves["joint_torque_hinge"]
+    result, runner = jointed
+    names, values = result.curves["joint_torque_hinge"]
     by_torque = values[:, list(names).index("hinge_by_torque_rad")]
-    (pushed,) = [case for case in laboratory.cases if case.label == "forces"]
+    (pushed,) = [case for case in runner.cases if case.label == "forces"]
 
     # Act: six pushes a tick, each force and then its opposite
     some = [push for number, push in enumerate(pushed.pushes) if number % 6 // 2 != pair]
-    recording = laboratory.run(replace(pushed, label="some", pushes=some)).recording
+    recording = runner.run(replace(pushed, label="some", pushes=some)).recording
 
     # Assert
     angle = recording.position[:, recording.layout.dof_names.index(HINGE)]
@@ -268,16 +268,16 @@ def test_without_one_of_the_pairs_the_motion_is_another(
 
 
 def test_a_joint_torque_changes_no_momentum_and_a_root_force_does(
-    jointed: tuple[StudyResult, InProcessLaboratory],
+    jointed: tuple[StudyResult, InProcessRunner],
 ) -> None:
-    findings, _ = jointed
-    coarse, fine, _, root, _ = range(len(findings.rows))
+    result, _ = jointed
+    coarse, fine, _, root, _ = range(len(result.rows))
 
     for what in ("P changed", "L changed", "centre of mass"):
-        changed = column(findings, what)
+        changed = column(result, what)
         assert changed[coarse] / changed[fine] == pytest.approx(8.0, rel=0.1)  # 1920 / 240
         assert changed[fine] < 0.01 * changed[root]
-    assert column(findings, "P changed")[root] == pytest.approx(0.5 * 2.0, rel=0.01)  # f t
-    assert column(findings, "centre of mass")[root] == pytest.approx(
+    assert column(result, "P changed")[root] == pytest.approx(0.5 * 2.0, rel=0.01)  # f t
+    assert column(result, "centre of mass")[root] == pytest.approx(
         0.5 * 0.5 / 3.0 * 2.0**2, rel=0.01
     )  # f t^2 / 2 m

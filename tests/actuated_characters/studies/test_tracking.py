@@ -22,7 +22,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import pybullet
 from msgs_config.geometry import rotations
 from sim_node.physics.world import WorldSettings
-from tests.support.in_process import InProcessLaboratory
+from tests.support.in_process import InProcessRunner
 from tests.support.physics import LoneWorld, character
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
@@ -226,11 +226,9 @@ def test_clearances_are_the_engines_distances_to_the_ground() -> None:
 # What the lecture expects of runs
 
 
-def by_key(findings: StudyResult, keys: int) -> Mapping[tuple[Cell, ...], dict[str, Cell]]:
+def by_key(result: StudyResult, keys: int) -> Mapping[tuple[Cell, ...], dict[str, Cell]]:
     """The table's rows by their first cells, each by the names of its columns."""
-    return {
-        tuple(row[:keys]): dict(zip(findings.columns, row, strict=True)) for row in findings.rows
-    }
+    return {tuple(row[:keys]): dict(zip(result.columns, row, strict=True)) for row in result.rows}
 
 
 def number(cell: object) -> float:
@@ -241,11 +239,11 @@ def number(cell: object) -> float:
 def test_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gains, "_DURATION", 2.5)
     monkeypatch.setattr(gains, "_PICTURES", 1)
-    laboratory = InProcessLaboratory(tmp_path)
+    runner = InProcessRunner(tmp_path)
 
-    findings = gains.STUDY.run(laboratory)
+    result = gains.STUDY.run(runner)
 
-    table = by_key(findings, 2)
+    table = by_key(result, 2)
     error, late, theory = "joint error (rad)", "knee lag (ms)", "by theory (ms)"
     following = {name: table[name, "clip"] for name, _ in table}
     normal = following["normal stiffness"]
@@ -259,8 +257,8 @@ def test_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         assert number(row[late]) == pytest.approx(number(row[theory]), abs=15.0)
         assert number(row[error]) > number(following[name][error])
     assert number(table["normal stiffness", "zero"][late]) > 60.0
-    assert len(laboratory.cases) == gains.STUDY.runs
-    assert set(findings.figures) == {"gains", "gains_poses"}
+    assert len(runner.cases) == gains.STUDY.runs
+    assert set(result.figures) == {"gains", "gains_poses"}
 
 
 def test_delay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -268,9 +266,9 @@ def test_delay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(delay, "_RATES", (240, 960))
     monkeypatch.setattr(delay, "_DELAYS", (0, 1, 4))
 
-    findings = delay.STUDY.run(InProcessLaboratory(tmp_path))
+    result = delay.STUDY.run(InProcessRunner(tmp_path))
 
-    table = by_key(findings, 2)
+    table = by_key(result, 2)
     error, growth = "mean joint error (rad)", "growth a tick by theory"
     stable = {key for key, row in table.items() if number(row[growth]) < 1.0}
     assert stable == {(240, 0), (960, 0), (960, 1)}
@@ -285,11 +283,11 @@ def test_assistance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(assistance, "_DURATION", 1.1)
     monkeypatch.setattr(assistance, "_STRENGTHS", (1.0, 0.01, 0.0))
     monkeypatch.setattr(assistance, "_PICTURES", 1)
-    laboratory = InProcessLaboratory(tmp_path)
+    runner = InProcessRunner(tmp_path)
 
-    findings = assistance.STUDY.run(laboratory)
+    result = assistance.STUDY.run(runner)
 
-    table = by_key(findings, 1)
+    table = by_key(result, 1)
     falls, force = "falls at (s)", "root force / weight until then"
     assert table["x 1",][falls] is None
     assert 0.5 < number(table["none",][falls]) <= number(table["x 0.01",][falls]) < 1.1
@@ -297,7 +295,7 @@ def test_assistance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert table["none",][force] == 0.0
     # a root that is commanded, by nothing, and one that may not be
     assert list(table["x 0",].values())[1:] == list(table["none",].values())[1:]
-    assert any("the same states" in note for note in findings.notes)
+    assert any("the same states" in note for note in result.notes)
 
 
 def test_weaker_assistance_keeps_its_damping_ratio() -> None:
@@ -319,9 +317,9 @@ def test_clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clips, "_PICTURES", 1)
     monkeypatch.setattr(clips, "available_clips", lambda _: ["crawl", "kick", "walk"])
 
-    findings = clips.STUDY.run(InProcessLaboratory(tmp_path))
+    result = clips.STUDY.run(InProcessRunner(tmp_path))
 
-    table = by_key(findings, 1)
+    table = by_key(result, 1)
     for row in table.values():
         assert 0.01 < number(row["mean joint error (rad)"]) <= number(row["bound (rad)"])
         assert number(row["largest joint error (rad)"]) > number(row["mean joint error (rad)"])
@@ -334,12 +332,12 @@ def test_a_clip_without_assistance_is_told_to_fall(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = character("humanoid")
-    laboratory = InProcessLaboratory(tmp_path)
-    run = laboratory.run
+    runner = InProcessRunner(tmp_path)
+    run = runner.run
 
     def unassisted(case: RunSpec) -> RunResult:
         return run(replace(case, duration=1.5, controller={"root_assistance": False}))
 
-    monkeypatch.setattr(laboratory, "run", unassisted)
+    monkeypatch.setattr(runner, "run", unassisted)
 
-    assert clips._track(laboratory, whole, "walk").falls
+    assert clips._track(runner, whole, "walk").falls
