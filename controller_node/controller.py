@@ -147,14 +147,16 @@ class Controller:
         make_law(settings.law, self._plant)
         if settings.balance is not None and self._balance is None:
             raise ConfigurationError(
-                f"parameter 'balance' needs the key 'feet' in {self._character.file}"
+                f"parameter 'balance.enabled' needs the key 'feet' in {self._character.file}"
             )
         if self._planner is not None and settings.law != "stable_pd":
             raise ConfigurationError(
                 f"a planner foresees the law stable_pd alone; 'law' is {settings.law}"
             )
         if self._planner is not None and settings.balance is not None:
-            raise ConfigurationError("a planner keeps balance itself; 'balance' must be false")
+            raise ConfigurationError(
+                "a planner keeps balance itself; 'balance.enabled' must be false"
+            )
 
     def _check_inertia(self, character: Character) -> None:
         """A joint that moves no inertia would make the mass matrix singular."""

@@ -62,14 +62,12 @@ class ControllerNode(Node):
         given = given_parameters(self)
         loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)))
         self._character = placed(loaded, given)
-        for warning in self._character.warnings:
-            self.get_logger().warning(warning)
         self._layout = self._character.layout
         self._declared = PARAMETERS + character_parameters(self._character, given)
         self._values = resolve(self._declared, given)
         declare(self, self._declared, self._values)
         motion = make_motion(self._character, self._values)
-        for warning in motion.warnings:
+        for warning in self._character.warnings + self._values.warnings + motion.warnings:
             self.get_logger().warning(warning)
         self._controller = make_controller(self._character, motion.reference, self._values)
         self._answer: Answer | None = None

@@ -56,7 +56,7 @@ PARAMETERS = [
         live=True,
     ),
     Parameter(
-        "balance",
+        "balance.enabled",
         False,
         "add the virtual force that keeps it on its two feet to the law",
         live=True,
@@ -171,7 +171,7 @@ def make_settings(character: Character, values: Values) -> Settings:
 
 
 def _balances(values: Values) -> bool:
-    return values.flag("balance") and not _is_ragdoll(values)
+    return values.flag("balance.enabled") and not _is_ragdoll(values)
 
 
 def _is_ragdoll(values: Values) -> bool:

@@ -7,7 +7,7 @@ specifications by the same function, so that a value is right or wrong in the sa
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from msgs_config.errors import ConfigurationError, one_of
 
@@ -70,8 +70,14 @@ class Parameter:
         return ConfigurationError(f"parameter '{self.name}' is {value!r}; it must be {right}")
 
 
+RENAMED = {"balance": "balance.enabled"}
+"""What parameters were called before, in parameter files, options and bags."""
+
+
 class Values(dict[str, Value]):
     """The values of a node's parameters by name, each taken out in the type that it has."""
+
+    warnings: tuple[str, ...] = ()  # of names that were given and have become others
 
     def flag(self, name: str) -> bool:
         """The value of a parameter that is true or false."""
@@ -125,15 +131,31 @@ def resolve(parameters: Iterable[Parameter], given: Mapping[str, object]) -> Val
         ConfigurationError: a value is wrong, or a name is none of the parameters'.
     """
     by_name = {parameter.name: parameter for parameter in parameters}
+    old = [name for name in given if name in RENAMED]
+    given = with_present_names(given)
     for name in given:
         if name not in by_name and name not in _OF_EVERY_NODE:
             raise ConfigurationError(one_of("parameter", name, sorted(by_name)))
-    return Values(
+    values = Values(
         {
             name: parameter.checked(given[name]) if name in given else parameter.default
             for name, parameter in by_name.items()
         }
     )
+    values.warnings = tuple(f"parameter '{name}' is called '{RENAMED[name]}' now" for name in old)
+    return values
+
+
+def with_present_names(given: Mapping[str, object]) -> dict[str, Any]:
+    """Values by the names that parameters have today.
+
+    Raises:
+        ConfigurationError: a parameter is given by both of its names.
+    """
+    for old, new in RENAMED.items():
+        if old in given and new in given:
+            raise ConfigurationError(f"parameter '{new}' is given twice, also as '{old}'")
+    return {RENAMED.get(name, name): value for name, value in given.items()}
 
 
 _OF_EVERY_NODE = ("use_sim_time", "start_type_description_service")

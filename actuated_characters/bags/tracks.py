@@ -19,6 +19,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder, decode, state_in_layout
 from msgs_config.messages.session import ANONYMOUS, session_of
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
+from msgs_config.parameters import with_present_names
 from msgs_config.shared_parameters import RATE
 
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
@@ -241,7 +242,7 @@ class CharacterTimeline:
         with suppress(ValueError, KeyError, TypeError, RecursionError):  # of another controller
             content = json.loads(text)
             settings = ControllerSettings(
-                dict(content["parameters"]), content.get("parameters_after_stamp_ns")
+                with_present_names(content["parameters"]), content.get("parameters_after_stamp_ns")
             )
             self.controller.append(settings)
 

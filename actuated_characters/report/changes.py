@@ -65,7 +65,7 @@ def law(parameters: Mapping[str, Any]) -> str | None:
     found = parameters.get("law")
     if found is None:
         return None
-    return f"{found}, balance" if parameters.get("balance") else str(found)
+    return f"{found}, balance" if parameters.get("balance.enabled") else str(found)
 
 
 def gains(parameters: Mapping[str, Any], names: Sequence[str]) -> list[GainsInForce]:

@@ -95,7 +95,7 @@ def make_plan(
     controller_parameters.check_world(controller, simulator)
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
-    warnings = character.warnings + motion.warnings
+    warnings = character.warnings + motion.warnings + simulator.warnings + controller.warnings
     return Plan(character, motion.reference, simulator, controller, warnings)
 
 

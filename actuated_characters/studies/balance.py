@@ -56,7 +56,7 @@ class BalanceStudy:
     def run(self, runner: StudyRunner) -> StudyResult:
         """Stand with and without the virtual force, then be pushed harder and harder."""
         stood = runner.run(_case("stand", _STANDING))
-        limp = runner.run(_case("without", _PUSHED, {"balance": False}))
+        limp = runner.run(_case("without", _PUSHED, {"balance.enabled": False}))
         limits = {name: _largest_impulse(runner, name) for name in _DIRECTIONS}
         mass = stood.recording.character.mass
         rows = [
@@ -121,7 +121,12 @@ def _case(
         duration,
         reference={"reference": "keyframes", "keyframes": "humanoid_stand"},
         simulator={"rate": _RATE, "wrench_duration": _PUSH_DURATION},
-        controller={"root_assistance": False, "balance": True, **_SOFT_HIPS, **(controller or {})},
+        controller={
+            "root_assistance": False,
+            "balance.enabled": True,
+            **_SOFT_HIPS,
+            **(controller or {}),
+        },
         pushes=[push] if any(impulse) else [],
     )
 

@@ -16,7 +16,7 @@ from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import LayoutError, MessageError
 from msgs_config.messages.probe import DynamicsSample, read_probe
 from msgs_config.messages.session import ANONYMOUS, SESSION, session_of
-from msgs_config.parameters import Value, Values
+from msgs_config.parameters import Value, Values, with_present_names
 from msgs_config.versions import installed_versions, read_versions
 
 
@@ -106,7 +106,7 @@ def parse(text: str) -> RunConfiguration:
                 [np.inf if limit is None else limit for limit in content["effort_limits"]]
             ),
             mass=float(content["mass"]),
-            parameters=dict(content["parameters"]),
+            parameters=with_present_names(content["parameters"]),
             probe=None if probe is None else read_probe(probe, layout.size),
             versions=read_versions(content.get("versions")),
             session=session_of(str(content.get("session", ""))),

@@ -290,7 +290,12 @@ def test_the_weight_is_borne_once_whatever_law_it_is_added_to(
     position = bent_pose(humanoid)
     position[elbow] = 1.5
     state = StampedState(TickClock(RATE_HZ).stamp_ns(1), position, 0.0 * position, None)
-    limp = {"gain_scale.p": 0.0, "gain_scale.d": 0.0, "root_assistance": False, "balance": True}
+    limp = {
+        "gain_scale.p": 0.0,
+        "gain_scale.d": 0.0,
+        "root_assistance": False,
+        "balance.enabled": True,
+    }
 
     effort, _ = controller("humanoid", law=law, **limp).compute_effort(state, state.stamp_ns)
 

@@ -388,6 +388,19 @@ def test_what_a_controller_says_of_itself_is_there_once(pendulum: Made, tmp_path
     assert recording.controller[0].parameters["rate"] == 240
 
 
+def test_a_parameter_of_an_old_bag_has_its_present_name(pendulum: Made, tmp_path: Path) -> None:
+    plan, topic = pendulum.plan, topics.CONFIGURATION.of(topics.CONTROLLER_NODE)
+    text = configuration.describe(plan.character, plan.controller, since_ns=None)
+    assert '"balance.enabled"' in text
+    old = text.replace('"balance.enabled"', '"balance"')
+    said = [(topic, serialize_message(String(data=old)))]
+
+    recording = read_recording(write_bag(tmp_path / "bag", [*pendulum.messages(), *said]))
+
+    assert recording.controller[0].parameters["balance.enabled"] is False
+    assert "balance" not in recording.controller[0].parameters
+
+
 def test_two_simulators_are_told_apart(pendulum: Made, tmp_path: Path) -> None:
     other = make_run("pendulum", 0.01, gravity=1.0)
     messages = [*pendulum.messages(), said_configuration(other.plan)]

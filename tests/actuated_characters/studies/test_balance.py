@@ -49,7 +49,9 @@ def test_it_stands_by_joint_efforts_alone(stood: RunResult) -> None:
 
 
 def test_without_the_virtual_force_it_falls(tmp_path: Path) -> None:
-    outcome = InProcessRunner(tmp_path).run(balance._case("without", 2.0, {"balance": False}))
+    outcome = InProcessRunner(tmp_path).run(
+        balance._case("without", 2.0, {"balance.enabled": False})
+    )
 
     assert not balance.survives(outcome)
     assert 0.5 < balance.standing_time(outcome.recording) < 2.0

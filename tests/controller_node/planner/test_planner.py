@@ -415,7 +415,7 @@ REFUSED: dict[str, tuple[str, Mapping[str, object], str]] = {
         "'recorded' is for the behaviour tracking; 'behaviour' is reactive",
     ),
     "another law": ("humanoid", {"law": "pd"}, "'law' is pd"),
-    "virtual forces": ("humanoid", {"balance": True}, "'balance' must be false"),
+    "virtual forces": ("humanoid", {"balance.enabled": True}, "'balance.enabled' must be false"),
     "a short horizon": ("humanoid", {"plan.horizon": 0.05, "plan.period": 0.1}, "plan.horizon"),
     "a delay beyond the next plan": (
         "humanoid",

@@ -143,7 +143,7 @@ def test_a_dropped_ragdoll_gains_no_energy_and_comes_to_rest_within_its_limits(s
 def test_as_a_behaviour_it_has_no_effort_and_falls() -> None:
     # Arrange
     given = {"reference": "clip", "clip": "walk"}
-    own = {"behaviour": "ragdoll", "law": "computed_torque", "balance": True}
+    own = {"behaviour": "ragdoll", "law": "computed_torque", "balance.enabled": True}
     plan = make_plan("humanoid", 1.0, given, {}, own)
 
     # Act
