@@ -62,5 +62,5 @@ class SimulationError(ActuatedCharactersError):
 def one_of(what: str, value: object, choices: list[str]) -> str:
     """The sentence for a name that is not among the valid ones."""
     close = get_close_matches(str(value), choices, n=1)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
-    return f"unknown {what} {str(value)!r}; there are: {', '.join(choices)}{hint}"
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return f"unknown {what} {str(value)!r}; {hint}there are: {', '.join(choices)}"

@@ -388,7 +388,7 @@ def test_a_topic_is_added_once_and_before_its_messages(tmp_path: Path) -> None:
         writer.add_topic("/text", String, QOS)
         with pytest.raises(RecordingError, match="has topic '/text' already"):
             writer.add_topic("/text", Clock, QOS)
-        with pytest.raises(RecordingError, match="unknown topic '/texts'; there are: /text"):
+        with pytest.raises(RecordingError, match=r"'/texts'; did you mean '/text'\? there"):
             writer.write("/texts", b"", 1)
 
 
@@ -417,7 +417,7 @@ def test_only_the_chosen_topics_are_read(recording: Path) -> None:
 def test_a_topic_that_was_not_recorded_is_an_error_that_names_those_that_were(
     recording: Path,
 ) -> None:
-    with pytest.raises(RecordingError, match="unknown topic '/torques'; there are: /clock, "):
+    with pytest.raises(RecordingError, match="unknown topic '/torques'; "):
         list(read_messages(recording, ["/torques"]))
 
 

@@ -293,7 +293,9 @@ def test_of_several_characters_one_must_be_named(pendulum: Made, tmp_path: Path)
     bag = write_both(tmp_path / "bag", pendulum.messages(), pendulum.messages())
 
     assert "several characters (left, right)" in refusal(bag)
-    with pytest.raises(RecordingError, match="unknown character 'lef'; there are: left, right"):
+    with pytest.raises(
+        RecordingError, match=r"'lef'; did you mean 'left'\? there are: left, right"
+    ):
         read_recording(bag, "lef")
 
 
