@@ -8,6 +8,7 @@ from types import FrameType
 
 from rich.console import Console
 from rich.markup import escape
+from rich.padding import Padding
 from rich.table import Table
 
 from actuated_characters.commands.compare import add_compare
@@ -66,6 +67,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="actuated_characters",
         description="Simulated characters, actuated by torques over ROS 2 topics.",
     )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the versions and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_run(commands)
     add_reconstruct(commands)
@@ -90,6 +92,16 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+class _Version(argparse.Action):
+    """Prints the versions of what the last bits of a run depend on, which take a while to find."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *ignored: object) -> None:
+        from msgs_config.versions import installed_versions
+
+        print("\n".join(f"{name} {version}" for name, version in installed_versions().items()))
+        parser.exit()
+
+
 def _list(options: argparse.Namespace) -> None:
     del options
     from controller_node.references.files.clip import available_clips
@@ -109,18 +121,16 @@ def _list(options: argparse.Namespace) -> None:
 
 
 def _parameters(options: argparse.Namespace) -> None:
-    listed = _parameters_of(options.node, options.character)
-    table = Table(title=f"parameters of {options.node}", title_justify="left")
-    for column in ("name", "default", "unit", "description"):
-        table.add_column(column, overflow="fold")
-    for parameter in listed:
+    console = Console(highlight=False)
+    for parameter in _parameters_of(options.node, options.character):
+        value = f"{_shortened(parameter.default)} {parameter.unit}".rstrip()
         choices = f": {' | '.join(parameter.choices)}" if parameter.choices else ""
-        live = " (live)" if parameter.live else ""
-        default = _shortened(parameter.default)
-        table.add_row(
-            parameter.name, escape(default), parameter.unit, parameter.description + choices + live
-        )
-    Console().print(table)
+        about = f"{parameter.description}{choices}{' (live)' if parameter.live else ''}"
+        if console.is_terminal:
+            console.print(f"[bold]{escape(parameter.name)}[/bold]: {escape(value)}")
+            console.print(Padding(escape(about), (0, 0, 0, 4)))
+        else:  # a line each, to be searched
+            print(f"{parameter.name}: {value}  {about}")
 
 
 def _parameters_of(node: str, character_name: str) -> list[Parameter]:
