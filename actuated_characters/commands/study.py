@@ -53,10 +53,10 @@ def _study(options: argparse.Namespace) -> None:
     with own_domain() as domain:  # one for all runs
         os.environ.setdefault("ROS_DOMAIN_ID", str(domain))
         for name, directory in directories.items():
-            _conduct(load_study(name), directory, keep_runs=options.keep_runs)
+            _run_study(load_study(name), directory, keep_runs=options.keep_runs)
 
 
-def _conduct(study: "Study", directory: Path, *, keep_runs: bool) -> None:
+def _run_study(study: "Study", directory: Path, *, keep_runs: bool) -> None:
     from actuated_characters.studies.framework.runner import TopicRunner, write_result
 
     console = Console()
