@@ -64,3 +64,20 @@ def test_the_controller_of_the_readme_holds_the_pendulum_at_its_target(tmp_path,
     angle = last.position[0]
     assert last.velocity[0] == pytest.approx(0.0, abs=1e-6)
     assert 50.0 * (1.0 - angle) == pytest.approx(9.81 * 0.5 * math.sin(angle), rel=1e-6)
+
+
+# The pages
+
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+ROOMS = "msgs_config|sim_node|controller_node|actuated_characters|tests|benchmarks"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_a_page_links_to_and_names_is_there(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    links = [link for link in re.findall(r"\]\(([^)#]+)", text) if "://" not in link]
+    files = re.findall(rf"`((?:{ROOMS})/[\w/.]+)`", text)
+
+    assert [link for link in links if not (page.parent / link).exists()] == []
+    assert [file for file in files if not (ROOT / file).exists()] == []
