@@ -128,10 +128,16 @@ def resolve(parameters: Iterable[Parameter], given: Mapping[str, object]) -> Val
     """The value of every parameter: the one given, checked, or else its default.
 
     Raises:
-        ConfigurationError: a value is wrong, or a name is none of the parameters'.
+        ConfigurationError: a value is wrong, a name is none of the parameters', or a parameter is
+            given by both of its names.
     """
     by_name = {parameter.name: parameter for parameter in parameters}
     old = [name for name in given if name in RENAMED]
+    for name in old:
+        if RENAMED[name] in given:
+            raise ConfigurationError(
+                f"parameter '{RENAMED[name]}' is given twice, also as '{name}'"
+            )
     given = with_present_names(given)
     for name in given:
         if name not in by_name and name not in _OF_EVERY_NODE:
@@ -147,14 +153,7 @@ def resolve(parameters: Iterable[Parameter], given: Mapping[str, object]) -> Val
 
 
 def with_present_names(given: Mapping[str, object]) -> dict[str, Any]:
-    """Values by the names that parameters have today.
-
-    Raises:
-        ConfigurationError: a parameter is given by both of its names.
-    """
-    for old, new in RENAMED.items():
-        if old in given and new in given:
-            raise ConfigurationError(f"parameter '{new}' is given twice, also as '{old}'")
+    """Values by the names that parameters have today."""
     return {RENAMED.get(name, name): value for name, value in given.items()}
 
 

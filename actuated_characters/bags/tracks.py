@@ -242,7 +242,8 @@ class CharacterTimeline:
         with suppress(ValueError, KeyError, TypeError, RecursionError):  # of another controller
             content = json.loads(text)
             settings = ControllerSettings(
-                with_present_names(content["parameters"]), content.get("parameters_after_stamp_ns")
+                with_present_names(dict(content["parameters"])),
+                content.get("parameters_after_stamp_ns"),
             )
             self.controller.append(settings)
 

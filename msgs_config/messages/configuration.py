@@ -106,7 +106,7 @@ def parse(text: str) -> RunConfiguration:
                 [np.inf if limit is None else limit for limit in content["effort_limits"]]
             ),
             mass=float(content["mass"]),
-            parameters=with_present_names(content["parameters"]),
+            parameters=with_present_names(dict(content["parameters"])),
             probe=None if probe is None else read_probe(probe, layout.size),
             versions=read_versions(content.get("versions")),
             session=session_of(str(content.get("session", ""))),
