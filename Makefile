@@ -46,7 +46,7 @@ quick: .venv/.installed-test ## Check style and types, run the tests that are no
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow" --durations 5 --durations-min 5
 
 hashes: .venv/.installed-test ## Renew the golden hashes, after a change that is meant to alter states
-	$(BIN)/python tests/support/golden.py
+	$(BIN)/python -m tests.support.golden
 
 other-numpy: .venv/.installed-test ## Compare the golden runs with the oldest and the newest numpy allowed
 	for version in '==1.26.4' '>=2,<3'; do \
