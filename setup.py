@@ -7,7 +7,6 @@ from setuptools import find_packages, setup
 PACKAGE = "actuated_characters"
 ROOTS = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
 SHARED = {"launch": "*.launch.py", "config": "*.yaml", "examples": "*.py"}
-
 setup(
     name=PACKAGE,
     version="0.2.0",
@@ -17,6 +16,7 @@ setup(
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),
     package_data={
+        "": ["py.typed"],
         "msgs_config": ["runtime/*.xml", "character/data/*"],
         "controller_node": ["references/data/*.yaml"],
     },
@@ -52,21 +52,29 @@ setup(
         ],
         # `planner: predictive` and `reconstruct`: numba compiles their rollouts (210 MB, BSD-2).
         "plan": ["llvmlite>=0.44", "numba>=0.61,<0.70"],
+        # `gymnasium.make("actuated_characters/Track-v0")` (4 MB with what it needs, MIT).
+        "gymnasium": ["gymnasium>=1.0,<2"],
+        # `make docs`: the pages as a site (60 MB with what they need, BSD-2 and MIT).
+        "docs": ["furo>=2024.8", "myst-parser>=4,<6", "sphinx>=8,<9"],
         # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
         "video": ["av>=14,<19"],
         # `colcon test` chooses pytest because this extra, of this name, lists it.
         # The linters are held to one minor version: a new one may have new rules.
         "test": [
             "av>=14,<19",
+            "furo>=2024.8",
+            "gymnasium>=1.0,<2",
             "hypothesis>=6.98,<7",
             "import-linter>=2.9,<3",
             "mcap-ros2-support>=0.5.5,<0.7",
             "mypy>=2.4,<2.5",
+            "myst-parser>=4,<6",
             "numba>=0.61,<0.70",
             "pytest>=7.4,<10",
             "pytest-xdist>=3.5,<4",
             "ruff>=0.17.5,<0.18",
             "setuptools>=65,<80",  # an environment of Python 3.12 has none; colcon's limit
+            "sphinx>=8,<9",
             "types-PyYAML>=6.0.12",
             "urdfdom-py>=1.2.1.post1,<2",
         ],

@@ -1,0 +1,297 @@
+"""Simulation and controller for Python, without ROS; the states are those of `run`, to the bit."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.runs.execution import run_in_process, run_over_topics
+from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.run_directory import prepare_directory, read_figures
+from controller_node import parameters as controller_parameters
+from controller_node.references.base import Reference
+from controller_node.references.factory import make_motion
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
+from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.parameters import resolve
+from msgs_config.shared_parameters import placed
+from sim_node import parameters as simulator_parameters
+from sim_node.initial_state import as_values
+from sim_node.physics import simulation
+from sim_node.physics.wrenches import WrenchQueue
+
+if TYPE_CHECKING:
+    from sensor_msgs.msg import JointState
+
+_NONE: Mapping[str, object] = MappingProxyType({})
+
+
+class Controller:
+    """Inverse dynamics: the efforts that `controller_node` answers a state with."""
+
+    def __init__(
+        self, character: Character, parameters: Mapping[str, object] = _NONE, **more: object
+    ) -> None:
+        """Make a controller of `controller_node`'s parameters.
+
+        Args:
+            character: As `load_character` gives it.
+            parameters: By name (docs/parameters.md), such as `{"gains.right_knee.p": 300.0}`.
+            more: The same for names without a dot. `clip` and `keyframes` choose the reference.
+
+        Raises:
+            ActuatedCharactersError: a name or a value is wrong.
+        """
+        given = {**parameters, **more}
+        for name in ("clip", "keyframes"):
+            if name in more:
+                given.setdefault("reference", name)
+        self.character = placed(character, given)
+        declared = controller_parameters.PARAMETERS
+        own = controller_parameters.character_parameters(self.character, given)
+        self._values = resolve(declared + own, given)
+        motion = make_motion(self.character, self._values)
+        self.reference: Reference = motion.reference
+        self.start = motion.first_state()
+        """The state in which the reference begins."""
+        self._controller = controller_parameters.make_controller(
+            self.character, motion.reference, self._values
+        )
+        self._episode_ns: int | None = None
+        joints = controller_parameters.commanded_joints(self.character, self._values)
+        self._commanded = self.character.layout.mask(joints)
+
+    @property
+    def needs_contacts(self) -> bool:
+        """Whether its behaviour looks at contacts."""
+        return self._controller.needs_contacts
+
+    def compute_effort(self, state: StampedState, contacts: FloatArray | None = None) -> FloatArray:
+        """The effort (n,) for a state, N and N m; zero where it commands nothing.
+
+        An episode begins with a state without effort. Frames: docs/topics.md.
+
+        Args:
+            state: Of the present tick.
+            contacts: Net wrenches (links, 6) of the tick before, world axes, for behaviours.
+
+        Raises:
+            ActuatedCharactersError: the stamp is no tick, or contacts are missing.
+        """
+        effort, _ = self.compute(state, contacts)
+        return effort
+
+    def compute(
+        self, state: StampedState, contacts: FloatArray | None = None
+    ) -> tuple[FloatArray, StampedReference]:
+        """As `compute_effort`, and the desired state at the state's stamp."""
+        if state.effort is None or self._episode_ns is None:
+            self._episode_ns = state.stamp_ns
+        effort, reference = self._controller.compute_effort(state, self._episode_ns, contacts)
+        return np.where(self._commanded, effort, 0.0), reference
+
+    def answer(self, message: "JointState") -> "JointState":
+        """The message for `joint_torques` that answers one of `joint_states`.
+
+        Raises:
+            ActuatedCharactersError: the message is no state of the character.
+        """
+        from msgs_config.messages.ros_state import effort_message, read_state
+
+        layout = self.character.layout
+        effort = self.compute_effort(read_state(layout, message))
+        return effort_message(layout, message.header, effort, self._commanded)
+
+
+class Simulation:
+    """Forward dynamics: one character in its world, a tick a step, as `sim_node` simulates it."""
+
+    def __init__(
+        self,
+        character: Character,
+        start: StampedState | None = None,
+        parameters: Mapping[str, object] = _NONE,
+        **more: object,
+    ) -> None:
+        """Build the world.
+
+        Args:
+            character: As `load_character` gives it.
+            start: Where it begins, such as a controller's `start`; None: in its rest pose.
+            parameters: Of `sim_node`, by name (docs/parameters.md).
+            more: The same for names without a dot, such as `gravity=3.71`.
+
+        Raises:
+            ActuatedCharactersError: a name or a value is wrong.
+        """
+        given = {**parameters, **more}
+        character = placed(character, given)
+        own = simulator_parameters.character_parameters(character)
+        begins: Mapping[str, object] = _NONE if start is None else as_values(start)
+        everything = {"commanded_joints": _drivable(character), **begins, **given}
+        self._values = resolve(simulator_parameters.PARAMETERS + own, everything)
+        self.character = character
+        setup = simulator_parameters.make_character_setup(character, self._values)
+        settings = simulator_parameters.make_settings(self._values)
+        self._simulation = simulation.Simulation([setup], settings)
+        self._simulation.watches_contacts = True
+        self._pushes = WrenchQueue(character)
+        self._hash = StateHash()
+        self._first_tick = self._simulation.tick
+
+    def __enter__(self) -> "Simulation":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the engine."""
+        self._simulation.close()
+
+    @property
+    def state(self) -> StampedState:
+        """The present state; without effort if it is an episode's first."""
+        return self._simulation.actors[0].state
+
+    @property
+    def rate_hz(self) -> int:
+        """Ticks a second."""
+        return self._simulation.settings.rate_hz
+
+    @property
+    def ticks(self) -> int:
+        """How many ticks have passed since the episode began."""
+        return self._simulation.tick - self._first_tick
+
+    @property
+    def time(self) -> float:
+        """Time in s since the episode began."""
+        return self.ticks / self.rate_hz
+
+    @property
+    def contacts(self) -> FloatArray:
+        """Net contact wrenches (links, 6) of the last tick: N and N m, world axes."""
+        contacts = self._simulation.actors[0].contacts
+        if contacts is None:
+            return np.zeros((len(self.character.links), 6))
+        return contacts.wrenches
+
+    @property
+    def state_hash(self) -> str:
+        """SHA-256 over all states that `step` has led to, as in a run's `summary.json`."""
+        return self._hash.hexdigest()
+
+    def push(
+        self,
+        link: str,
+        force: Sequence[float] = (0.0, 0.0, 0.0),
+        torque: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Push a link from the next step on, for the parameter `wrench_duration`.
+
+        Args:
+            link: Its name.
+            force: N, world axes, at the link's centre of mass.
+            torque: N m, world axes.
+
+        Raises:
+            CommandError: no such link, or a number is not finite.
+        """
+        self._pushes.add(
+            [link],
+            np.array([[*force, *torque]], dtype=float),
+            np.zeros((0, 3)),
+            first_tick=self._simulation.tick,
+            ticks=simulator_parameters.push_ticks(self._values),
+        )
+
+    def step(self, effort: FloatArray) -> StampedState:
+        """Apply an effort (n,) for one tick, clipped to its limits; the state that follows.
+
+        Raises:
+            ConfigurationError: the effort has another shape.
+            SimulationError: the state has diverged; the message names the degree of freedom.
+        """
+        if np.shape(effort) != (self.character.layout.size,):
+            raise ConfigurationError(
+                f"an effort has shape {np.shape(effort)}; it must be "
+                f"({self.character.layout.size},), one entry a degree of freedom"
+            )
+        (one,) = self._simulation.actors
+        if one.state.effort is None:
+            self._hash.add(one.state)
+        pushes = self._pushes.take(self._simulation.tick)
+        self._simulation.step([np.where(one.commanded, effort, 0.0)], [pushes])
+        self._hash.add(one.state)
+        return one.state
+
+    def reset(self, start: StampedState | None = None) -> StampedState:
+        """Begin a new episode, which equals a fresh world to the bit; its first state.
+
+        `start` is where it begins, from now on; None: where the last one did.
+        """
+        self._pushes.clear()
+        self._simulation.reset()
+        self._first_tick = self._simulation.tick
+        if start is not None:
+            self._simulation.begin_in({"": start})
+        return self.state
+
+
+def run(
+    character: str = "humanoid",
+    duration: float = 10.0,
+    *,
+    output: str | Path,
+    in_process: bool = False,
+    overwrite: bool = False,
+    simulator: Mapping[str, object] = _NONE,
+    controller: Mapping[str, object] = _NONE,
+    **reference: object,
+) -> dict[str, object]:
+    """Run simulator, controller and recorder as processes over topics.
+
+    Args:
+        character: Name of one that ships, or path of its YAML or URDF file.
+        duration: Length in s.
+        output: Directory of the results: bag, figures, parameters and logs (docs/runs.md).
+        in_process: Join simulation and controller in this process: the same states, no bag.
+        overwrite: Replace the results in `output`.
+        simulator: Parameters of `sim_node`, by name.
+        controller: Parameters of `controller_node`, by name.
+        reference: The motion: `clip`, `keyframes` or `reference`; none: the rest pose.
+
+    Returns:
+        The figures of `summary.json`.
+
+    Raises:
+        ActuatedCharactersError: a name or a value is wrong, or a process failed.
+    """
+    for name in ("clip", "keyframes"):
+        if name in reference:
+            reference.setdefault("reference", name)
+    plan = make_plan(character, duration, reference, simulator, controller)
+    directory = Path(output).absolute()
+    prepare_directory(directory, overwrite=overwrite)
+    if in_process:
+        run_in_process(plan, directory, progress=_ignore)
+    else:
+        run_over_topics(plan, directory, write_bag=True, progress=_ignore)
+    figures, _ = read_figures(directory)
+    return figures
+
+
+def _ignore(ticks: int) -> None:
+    """Report no progress."""
+
+
+def _drivable(character: Character) -> list[str]:
+    """The joints that have a motor, and the root of a floating base."""
+    root = ["root"] * character.layout.has_floating_base
+    return root + character.layout.actuated_joint_names

@@ -1,0 +1,93 @@
+"""The Gymnasium environment: its library's own checker, our states, and when an episode ends."""
+
+import warnings
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import actuated_characters as ac
+from actuated_characters.environments import TRACK
+from actuated_characters.environments.track import TrackEnv
+
+
+def make(**options: object) -> TrackEnv:
+    environment = gymnasium.make(TRACK, **options).unwrapped
+    assert isinstance(environment, TrackEnv)
+    return environment
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"clip": "walk"}, {"character": "lift"}, {"character": "franka_panda", "ticks_per_step": 1}],
+    ids=["humanoid", "lift", "arm"],
+)
+def test_gymnasiums_own_checker_passes(options: dict[str, object]) -> None:
+    environment = make(**options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that efforts are in N m, not between -1 and 1
+        check_env(environment)
+    environment.close()
+
+
+def test_the_efforts_of_a_controller_give_the_states_of_a_run() -> None:
+    character = ac.load_character("humanoid")
+    controller = ac.Controller(character, clip="walk", root_assistance=False)
+    environment = make(clip="walk", ticks_per_step=1)
+    environment.reset(seed=0)
+    with ac.Simulation(character, controller.start) as simulation:
+        for _ in range(60):
+            effort = controller.compute_effort(simulation.state)
+            simulation.step(effort)
+            environment.step(effort[6:])
+        assert environment.simulation.state_hash == simulation.state_hash
+    environment.close()
+
+
+def test_a_motion_that_is_tracked_is_worth_more_than_one_that_is_not_and_a_fall_ends_it() -> None:
+    rewards, ends = [], []
+    controller = ac.Controller(ac.load_character("humanoid"), clip="walk", root_assistance=False)
+    environment = make(clip="walk", ticks_per_step=1)
+    for answer in (lambda state: np.zeros(34), controller.compute_effort):
+        environment.reset(seed=0)
+        total, terminated = 0.0, False
+        while not terminated and environment.simulation.time < 3.0:
+            effort = answer(environment.simulation.state)
+            _, reward, terminated, truncated, _ = environment.step(effort[6:])
+            assert 0.0 < reward <= 1.0
+            assert not truncated
+            total += reward
+        rewards.append(total)
+        ends.append(terminated)
+    assert ends == [True, True]  # without a plan it falls, as the lecture says
+    assert rewards[1] > 1.5 * rewards[0]
+    environment.close()
+
+
+def test_an_episode_is_truncated_after_its_duration_and_may_begin_anywhere() -> None:
+    environment = make(character="franka_panda", reference="sine", duration=0.1, ticks_per_step=8)
+    _, info = environment.reset(options={"start": 0.4})
+    assert info == {"time": 0.0, "reference_time": 0.4}
+    ends = [environment.step(np.zeros(9))[3] for _ in range(3)]
+    assert ends == [False, False, True]
+
+    random = make(character="franka_panda", reference="sine", random_start=True)
+    times = [random.reset(seed=seed)[1]["reference_time"] for seed in (1, 2, 1)]
+    assert times[0] == times[2] != times[1]
+    random.close()
+    environment.close()
+
+
+def test_the_page_works() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "python.md").read_text("utf-8")
+    (code,) = [part for part in page.split("```") if "import gymnasium" in part]
+    exec(code.removeprefix("python"), {})
+
+
+def test_a_mistake_is_one_clear_line() -> None:
+    with pytest.raises(ac.ActuatedCharactersError, match="ticks_per_step is 0; it must be 1"):
+        make(ticks_per_step=0)
+    with pytest.raises(ac.ActuatedCharactersError, match="moonwalk"):
+        make(clip="moonwalk")
