@@ -17,7 +17,7 @@ endif
 # and for each worker of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help venv demo backflip test quick hashes other-numpy bench soak kills noise long-recording format clean distclean
+.PHONY: help venv demo backflip test quick docs hashes pages other-numpy bench soak kills noise long-recording format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -47,6 +47,12 @@ quick: .venv/.installed-test ## Check style and types, run the tests that are no
 
 hashes: .venv/.installed-test ## Renew the golden hashes, after a change that is meant to alter states
 	$(BIN)/python -m tests.support.golden
+
+docs: .venv/.installed-test ## Build the documentation as a site in build/docs
+	$(BIN)/python -m sphinx -q -W --keep-going docs build/docs
+
+pages: .venv/.installed-test ## Renew the pages that are made from the code
+	$(BIN)/python -m tests.support.parameter_page
 
 other-numpy: .venv/.installed-test ## Compare the golden runs with the oldest and the newest numpy allowed
 	for version in '==1.26.4' '>=2,<3'; do \

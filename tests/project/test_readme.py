@@ -1,9 +1,11 @@
-"""The README says what the code does: its topics, its commands, its controller in 40 lines."""
+"""The README and the pages say what the code does: topics, commands, a controller in 40 lines."""
 
 import math
 import re
 import shlex
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,43 +13,52 @@ import pytest
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.cli import _parser
 from msgs_config.messages import topics
+from tests.support import parameter_page
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-DESIGN = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+ROOMS = "msgs_config|sim_node|controller_node|actuated_characters|tests|benchmarks|examples|config"
 
 
 def _type_name(message_type):
     return f"{message_type.__module__.split('.')[0]}/{message_type.__name__}"
 
 
-@pytest.mark.parametrize("text", [README, DESIGN], ids=["README", "design"])
-def test_every_topic_stands_in_the_table_with_its_type(text):
+@pytest.mark.parametrize("page", ["topics", "design"])
+def test_every_topic_stands_in_the_table_with_its_type(page):
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     for topic in vars(topics).values():
         if isinstance(topic, topics.Topic):
             row = rf"\| `{re.escape(topic.name)}` \| {_type_name(topic.message_type)} \|"
             assert re.search(row, text), topic.name
 
 
-def test_every_command_line_of_the_readme_is_one_that_the_parser_takes():
-    text = README.replace("\\\n", " ")  # a line that goes on
-    lines = re.findall(r"^\.venv/bin/actuated_characters ([^#\n]*)", text, flags=re.MULTILINE)
-    assert len(lines) >= 5
+def test_every_command_line_of_a_page_is_one_that_the_parser_takes():
+    lines = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8").replace("\\\n", " ")  # a line that goes on
+        lines += re.findall(
+            r"^ *\.venv/bin/actuated_characters ([^#\n]*)", text, flags=re.MULTILINE
+        )
+    assert len(lines) >= 30
     for line in lines:
-        assert _parser().parse_args(shlex.split(line)).command
+        line = line.replace("study NAME", "study lift")
+        assert _parser().parse_args(shlex.split(line)).command, line
 
 
 def test_every_make_target_of_the_readme_exists():
     targets = set(re.findall(r"^make (\w+)", README, flags=re.MULTILINE))
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    assert targets >= {"demo", "test", "bench"}
+    assert targets >= {"demo", "backflip"}
     for target in targets:
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
 
 
 @pytest.mark.slow
 def test_the_controller_of_the_readme_holds_the_pendulum_at_its_target(tmp_path, processes):
-    code = re.search(r"```python\n(.*?)```", README, flags=re.DOTALL)[1]
+    blocks = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    (code,) = [block for block in blocks if "class Swing" in block]
     assert len(code.splitlines()) <= 40
     (tmp_path / "swing.py").write_text(code, encoding="utf-8")
 
@@ -66,13 +77,6 @@ def test_the_controller_of_the_readme_holds_the_pendulum_at_its_target(tmp_path,
     assert 50.0 * (1.0 - angle) == pytest.approx(9.81 * 0.5 * math.sin(angle), rel=1e-6)
 
 
-# The pages
-
-
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-ROOMS = "msgs_config|sim_node|controller_node|actuated_characters|tests|benchmarks"
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_what_a_page_links_to_and_names_is_there(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
@@ -81,3 +85,19 @@ def test_what_a_page_links_to_and_names_is_there(page: Path) -> None:
 
     assert [link for link in links if not (page.parent / link).exists()] == []
     assert [file for file in files if not (ROOT / file).exists()] == []
+
+
+def test_the_page_of_parameters_is_that_of_their_declarations() -> None:
+    page = parameter_page.PAGE.read_text(encoding="utf-8")
+    assert page == parameter_page.content(), "make pages renews it"
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+    """A link to a page, a heading or a file that is not there is a warning."""
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "docs", tmp_path]
+    built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+    assert built.stderr == ""
+    assert built.returncode == 0
+    assert "compute_effort" in (tmp_path / "api.html").read_text(encoding="utf-8")
