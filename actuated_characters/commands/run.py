@@ -271,15 +271,15 @@ def _reference(options: argparse.Namespace) -> dict[str, object]:
 
 def _pushes(texts: list[str], plan: "Plan", found_in: "FoundWith | None") -> "list[PlannedPush]":
     """Those of `--push`; without any, those with which a reconstruction was found."""
-    from actuated_characters.runs.planned_wrenches import parsed_push, pushes_within
+    from actuated_characters.runs.planned_wrenches import parse_push, parse_pushes_within
 
     if _NO_PUSH in texts:
         if set(texts) != {_NO_PUSH}:
             raise ConfigurationError(f"--push {_NO_PUSH} goes with no other --push")
         return []
     if texts or found_in is None:
-        return [parsed_push(text, plan) for text in texts]
-    return pushes_within(found_in.pushes, plan)
+        return [parse_push(text, plan) for text in texts]
+    return parse_pushes_within(found_in.pushes, plan)
 
 
 def _set_option(name: str, value: str | None, controller: dict[str, object]) -> None:

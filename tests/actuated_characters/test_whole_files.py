@@ -9,7 +9,8 @@ import pytest
 
 from actuated_characters.metrics.run_metrics import COLUMNS
 from actuated_characters.render.stills import save_png
-from actuated_characters.runs.planned_wrenches import PlannedPush, write_pushes
+from actuated_characters.runs.planned_files import write_planned
+from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.run_directory import (
     PARAMETERS,
     PLOT,
@@ -90,7 +91,7 @@ WRITERS: dict[str, tuple[Callable[[Path], object], str]] = {  # and the file tha
         f"{PARAMETERS}/sim_node.yaml",
     ),
     "pushes": (
-        lambda run: write_pushes(
+        lambda run: write_planned(
             run / PARAMETERS / "pushes.json", 20 * [PlannedPush(1, "rod", (0.0,) * 6)]
         ),
         f"{PARAMETERS}/pushes.json",

@@ -23,7 +23,7 @@ from actuated_characters.reconstruction.reconstruction import Job, Reconstructio
 from actuated_characters.reconstruction.search import Progress, Settings, result, search
 from actuated_characters.reconstruction.workers import Workers
 from actuated_characters.reconstruction.world import Branch, Grown, Place, TrialWorld
-from actuated_characters.runs.planned_wrenches import pushes_within
+from actuated_characters.runs.planned_wrenches import parse_pushes_within
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
 from tests.support.ros import wait_until
 
@@ -306,8 +306,8 @@ def test_pushes_that_it_was_found_with_come_again_unless_others_are_given(
 def test_pushes_that_would_begin_at_the_end_or_later_are_left_out() -> None:
     plan = Problem("humanoid", "kick", 0.2).plan()
 
-    assert not pushes_within(["root:1,0,0@0.199", "root:1,0,0@0.2", "root:1,0,0@9"], plan)
-    assert len(pushes_within(["root:1,0,0@0.197"], plan)) == 1
+    assert not parse_pushes_within(["root:1,0,0@0.199", "root:1,0,0@0.2", "root:1,0,0@9"], plan)
+    assert len(parse_pushes_within(["root:1,0,0@0.197"], plan)) == 1
 
 
 def test_no_push_goes_with_no_other(

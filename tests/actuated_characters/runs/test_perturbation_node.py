@@ -14,11 +14,11 @@ from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.runs.execution import run_in_process, run_over_topics
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.planned_files import write_planned
 from actuated_characters.runs.planned_wrenches import (
     PlannedPush,
-    planned_push,
+    plan_push,
     read_pushes,
-    write_pushes,
 )
 from actuated_characters.runs.run_directory import prepare_directory, read_figures
 from controller_node.parameters import make_controller
@@ -213,7 +213,7 @@ def test_a_push_for_a_time_after_the_run_never_acts() -> None:
     [(0.0, 1), (0.1, 25), (0.1 + 1e-9, 25), (0.103, 26), (39 / RATE, 40), (0.2479, 60)],
 )
 def test_a_push_is_planned_for_the_tick_nearest_to_its_time(time: float, tick: int) -> None:
-    push = planned_push(plan_of(), "chest", (1.0, 2.0, 3.0), time)
+    push = plan_push(plan_of(), "chest", (1.0, 2.0, 3.0), time)
 
     expected = PlannedPush(CLOCK.stamp_ns(tick), "chest", (1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
     assert push == expected
@@ -233,7 +233,7 @@ def test_a_push_that_cannot_act_is_refused_in_a_line(wrong: str) -> None:
     link, force, time, expected = WRONG_PLANS[wrong]
 
     with pytest.raises(ConfigurationError) as caught:
-        planned_push(plan_of(), link, force, time)
+        plan_push(plan_of(), link, force, time)
 
     line = str(caught.value)
     assert "\n" not in line and all(part in line for part in expected)
@@ -245,7 +245,7 @@ def test_a_push_that_cannot_act_is_refused_in_a_line(wrong: str) -> None:
 def test_what_is_written_is_read_to_the_bit(tmp_path: Path) -> None:
     exact = PlannedPush(2**53 + 1, "chest", (0.1, 1e-300, -1e300, 1 / 3, 0.0, -0.0), HAND)
 
-    write_pushes(tmp_path / "pushes.json", [*PLANNED, exact])
+    write_planned(tmp_path / "pushes.json", [*PLANNED, exact])
 
     assert_same(read_pushes(tmp_path / "pushes.json"), [*PLANNED, exact])
 

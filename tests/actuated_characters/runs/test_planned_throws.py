@@ -14,16 +14,16 @@ from actuated_characters.replay.through_topics import replay_commands
 from actuated_characters.runs.execution import run_in_process, run_over_topics
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.planned_files import write_planned
 from actuated_characters.runs.planned_throws import (
-    Aim,
     PlannedThrow,
+    ThrowRequest,
+    parse_throw,
+    plan_throw,
     plan_throws,
-    planned_throw,
-    read_aim,
     read_throws,
-    write_throws,
 )
-from actuated_characters.runs.planned_wrenches import planned_push
+from actuated_characters.runs.planned_wrenches import plan_push
 from actuated_characters.runs.run_directory import prepare_directory, read_figures
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
@@ -104,7 +104,7 @@ def test_a_ball_hits_its_target_at_its_time_from_its_side(
     plan = plan_of(1.0, reference)
     speed = 6.0 if reference is HELD else 12.0  # a walk is some centimetres from its reference
 
-    planned, before = planned_throw(plan, Aim(1.0, speed, 0.8, "neck", side, radius=0.06))
+    planned, before = plan_throw(plan, ThrowRequest(1.0, speed, 0.8, "neck", side, radius=0.06))
     hit = first_hit(plan, planned)
 
     assert before == () and hit.links == ("neck",)
@@ -133,10 +133,10 @@ def test_a_small_ball_from_far_away_is_aimed_at_the_surface(radius: float, dista
 
 def test_a_side_turns_with_the_character() -> None:
     turned = plan_of(placement=[1.0, 2.0, 0.0, np.pi / 2.0])
-    aim = Aim(1.0, 6.1, 0.8, "neck", "front", radius=0.06)
+    aim = ThrowRequest(1.0, 6.1, 0.8, "neck", "front", radius=0.06)
 
-    throw, _ = planned_throw(turned, aim)
-    plain, _ = planned_throw(plan_of(), aim)
+    throw, _ = plan_throw(turned, aim)
+    plain, _ = plan_throw(plan_of(), aim)
 
     x, y, z = plain.throw.position
     assert throw.throw.position == pytest.approx((1.0 - y, 2.0 + x, z), abs=1e-5)
@@ -156,7 +156,7 @@ def test_a_ball_flies_at_its_speed_and_upwards_as_gravity_takes_away(
         plan = plan_of(**simulator)
     rate = plan.simulator.integer("rate")
 
-    planned, _ = planned_throw(plan, Aim(1.0, 5.0, 0.9, "neck", "right", 3.0, 0.06))
+    planned, _ = plan_throw(plan, ThrowRequest(1.0, 5.0, 0.9, "neck", "right", 3.0, 0.06))
 
     vx, vy, vz = planned.throw.velocity
     time = 0.9 - (TickClock(rate).first_tick_from(planned.stamp_ns) - 1) / rate
@@ -181,13 +181,13 @@ def test_what_is_in_the_way_is_said() -> None:
 
 
 def test_a_throw_is_read_as_it_is_written() -> None:
-    assert read_aim("mass=2 speed=8 at=2.0 from=left target=chest") == Aim(
+    assert parse_throw("mass=2 speed=8 at=2.0 from=left target=chest") == ThrowRequest(
         2.0, 8.0, 2.0, "chest", "left"
     )
-    assert read_aim("at=1,speed=3,target=neck,mass=1,distance=4,radius=0.1,from=-30") == Aim(
-        1.0, 3.0, 1.0, "neck", "-30", 4.0, 0.1
-    )
-    assert Aim(7.0, 1.0, 1.0, "neck").size == natural_radius(7.0)
+    assert parse_throw(
+        "at=1,speed=3,target=neck,mass=1,distance=4,radius=0.1,from=-30"
+    ) == ThrowRequest(1.0, 3.0, 1.0, "neck", "-30", 4.0, 0.1)
+    assert ThrowRequest(7.0, 1.0, 1.0, "neck").size == natural_radius(7.0)
 
 
 GOOD = ["mass=2", "speed=8", "at=0.9", "target=chest"]
@@ -232,9 +232,9 @@ def test_what_a_throw_needs_is_named(key: str) -> None:
     rest = [part for part in GOOD if not part.startswith(f"{key}=")]
 
     with pytest.raises(ConfigurationError, match=f"'{key}' is missing; write it as"):
-        read_aim(" ".join(rest))
+        parse_throw(" ".join(rest))
     with pytest.raises(ConfigurationError, match="'from' twice"):
-        read_aim("from=left from=right")
+        parse_throw("from=left from=right")
 
 
 def test_no_more_balls_than_an_episode_may_have() -> None:
@@ -251,7 +251,7 @@ def test_what_is_written_is_read_to_the_bit(tmp_path: Path) -> None:
     )
     early = PlannedThrow(1, exact.throw)
 
-    write_throws(tmp_path / "throws.json", [exact, early])
+    write_planned(tmp_path / "throws.json", [exact, early])
 
     found = read_throws(tmp_path / "throws.json")
     assert [each.stamp_ns for each in found] == [1, 2**53 + 1]
@@ -398,7 +398,7 @@ def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path
     prepare_directory(directory, overwrite=False)
     plan = plan_of(0.25)
     throws, _ = plan_throws(plan, ["mass=1 speed=10 at=0.2 distance=1 target=neck radius=0.05"])
-    pushes = [planned_push(plan, "chest", (10.0, 0.0, 0.0), 0.1)]
+    pushes = [plan_push(plan, "chest", (10.0, 0.0, 0.0), 0.1)]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("ROS_DOMAIN_ID", raising=False)
