@@ -56,6 +56,8 @@ def make_plan(
     reference: Mapping[str, object],
     simulator_settings: Mapping[str, object],
     controller_settings: Mapping[str, object],
+    *,
+    loaded: Character | None = None,
 ) -> Plan:
     """Resolve all parameters of both sides, and the initial state that the reference begins with.
 
@@ -65,6 +67,7 @@ def make_plan(
         reference: The controller's parameters that say what is tracked.
         simulator_settings: Parameters of `sim_node` that the user set, by name.
         controller_settings: Parameters of `controller_node` that the user set, by name.
+        loaded: The character of that name, where it is loaded already.
 
     Raises:
         ActuatedCharactersError: a name or value is wrong; says which, and what there is.
@@ -75,7 +78,7 @@ def make_plan(
             raise ConfigurationError(f"parameter '{name}' is set by {option}")
     for given in (simulator_given, controller_given):
         given["character"] = character_name
-    character = placed(load_character(character_name), simulator_given)
+    character = placed(loaded or load_character(character_name), simulator_given)
     controller_given = {**reference, **controller_given}
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller = resolve(

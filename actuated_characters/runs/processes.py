@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 from actuated_characters.runs.run_directory import LOGS, PARAMETERS, write_parameters
 
@@ -26,24 +25,6 @@ MODULES = {
 _END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 _LIBC = ctypes.CDLL(None)  # loaded before a fork, not after
-
-
-class SystemProcess(Protocol):
-    """The part of `subprocess.Popen` that a `Child` uses."""
-
-    pid: int
-
-    def poll(self) -> int | None:
-        """Return the exit code, None while the process runs."""
-
-    def wait(self, timeout: float | None = None) -> int:
-        """Return the exit code once the process has ended; raise TimeoutExpired."""
-
-    def send_signal(self, sig: int) -> None:
-        """Send a signal, unless the process has ended."""
-
-    def kill(self) -> None:
-        """Send SIGKILL."""
 
 
 class Child:
@@ -66,9 +47,8 @@ class Child:
         """
         self.name = log.stem
         self._log = log
-        self._output = (  # open as long as the child is remembered
-            tempfile.TemporaryFile() if output is None else output.open("w+b")  # noqa: SIM115
-        )
+        # open as long as the child is remembered
+        self._output = output.open("w+b") if output else tempfile.TemporaryFile()  # noqa: SIM115
         self._read = 0  # bytes of the output
         own = dict(os.environ if environment is None else environment)
         self._process = self._start(arguments, own, cwd)
@@ -76,7 +56,7 @@ class Child:
 
     def _start(
         self, arguments: Sequence[str], environment: dict[str, str], cwd: Path | None
-    ) -> SystemProcess:
+    ) -> "subprocess.Popen[bytes]":
         with self._log.open("wb") as log:
             return subprocess.Popen(
                 [sys.executable, *arguments],

@@ -30,7 +30,7 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_srvs.srv import SetBool, Trigger
 
-from actuated_characters.runs.processes import MODULES, Child, SystemProcess
+from actuated_characters.runs.processes import MODULES, Child
 from msgs_config.character.layout import ROOT
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
@@ -107,7 +107,7 @@ class Process(Child):
 
     def _start(
         self, arguments: Sequence[str], environment: dict[str, str], cwd: Path | None
-    ) -> SystemProcess:
+    ) -> Fork | subprocess.Popen[bytes]:
         if self._module is None:
             return super()._start(arguments, environment, cwd)
         folder = cwd or Path.cwd()
