@@ -52,13 +52,14 @@ setup(
         ],
         # `planner: predictive` and `reconstruct`: numba compiles their rollouts (210 MB, BSD-2).
         "plan": ["llvmlite>=0.44", "numba>=0.61,<0.70"],
-        # `--print-completion`: a script for bash or zsh (23 kB, Apache-2.0, pure Python).
-        "completion": ["shtab>=1.13,<2"],
+        # Completion of the command line in bash and zsh (43 kB, Apache-2.0, pure Python).
+        "completion": ["argcomplete>=3.5,<4"],
         # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
         "video": ["av>=14,<19"],
         # `colcon test` chooses pytest because this extra, of this name, lists it.
         # The linters are held to one minor version: a new one may have new rules.
         "test": [
+            "argcomplete>=3.5,<4",
             "av>=14,<19",
             "hypothesis>=6.98,<7",
             "import-linter>=2.9,<3",
@@ -69,7 +70,6 @@ setup(
             "pytest-xdist>=3.5,<4",
             "ruff>=0.17.5,<0.18",
             "setuptools>=65,<80",  # an environment of Python 3.12 has none; colcon's limit
-            "shtab>=1.13,<2",
             "types-PyYAML>=6.0.12",
             "urdfdom-py>=1.2.1.post1,<2",
         ],

@@ -10,10 +10,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.padding import Padding
 
-from actuated_characters.commands.common.settings import NODES, add_character, add_command
+from actuated_characters.commands.common.settings import (
+    NODES,
+    add_character,
+    add_command,
+    parameters_of,
+)
 from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.compare import add_compare
-from actuated_characters.commands.completion import add_completion
+from actuated_characters.commands.completion import add_names, complete
 from actuated_characters.commands.export import add_export
 from actuated_characters.commands.info import add_info
 from actuated_characters.commands.reconstruct import add_reconstruct
@@ -24,7 +29,6 @@ from actuated_characters.commands.report import add_report
 from actuated_characters.commands.run import add_run
 from actuated_characters.commands.study import add_study
 from msgs_config.errors import ActuatedCharactersError
-from msgs_config.parameters import Parameter
 from msgs_config.runtime.process import EXIT_ERROR, limit_threads
 
 _interrupted = False
@@ -37,7 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
     try:
-        options = _parser().parse_args(arguments)
+        parser = _parser()
+        complete(parser)
+        options = parser.parse_args(arguments)
         code = options.command(options)
     except (ActuatedCharactersError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -69,7 +75,6 @@ def _parser() -> argparse.ArgumentParser:
         description="Simulated characters, actuated by torques over ROS 2 topics.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the versions and exit")
-    add_completion(parser)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in (
         *(add_run, add_reconstruct, add_render, add_replay, add_info),
@@ -87,6 +92,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parameters.add_argument("node", choices=(*NODES, "recorder"))
     add_character(parameters)
+    for command in commands.choices.values():
+        add_names(command)
     return parser
 
 
@@ -119,7 +126,7 @@ def _list(options: argparse.Namespace) -> None:
 
 def _parameters(options: argparse.Namespace) -> None:
     console = Console(highlight=False)
-    for parameter in _parameters_of(options.node, options.character):
+    for parameter in parameters_of(options.node, options.character):
         value = f"{_shortened(parameter.default)} {parameter.unit}".rstrip()
         choices = f": {' | '.join(parameter.choices)}" if parameter.choices else ""
         about = f"{parameter.description}{choices}{' (live)' if parameter.live else ''}"
@@ -128,21 +135,6 @@ def _parameters(options: argparse.Namespace) -> None:
             console.print(Padding(escape(about), (0, 0, 0, 4)))
         else:  # a line each, to be searched
             print(f"{parameter.name}: {value}  {about}")
-
-
-def _parameters_of(node: str, character_name: str) -> list[Parameter]:
-    from actuated_characters.recorder import node as recorder
-    from controller_node import parameters as controller
-    from msgs_config.character.loading import load_character
-    from sim_node import parameters as simulator
-
-    if node == "recorder":
-        return recorder.PARAMETERS
-    character = load_character(character_name)
-    if node == "sim_node":
-        own = simulator.character_parameters(character)
-        return [simulator.CHARACTERS, *simulator.PARAMETERS, *own]
-    return controller.PARAMETERS + controller.character_parameters(character)
 
 
 def _shortened(value: object) -> str:

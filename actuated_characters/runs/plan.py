@@ -1,4 +1,4 @@
-"""What a run is made of, checked before anything is started."""
+"""The plan of a run: character, reference and parameters, checked before anything starts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ SHARED = ("rate", "gravity", "placement", "command_delay_ticks")
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
-    "characters": "nobody: a run has one character; start sim_node itself for several",
+    "characters": "no run, which has one character; start sim_node itself for several",
     INITIAL_STATE: "the run itself: where the reference begins, unless initial_position says it",
     "max_ticks": "--duration",
     "session": "the run itself, which makes one for all its nodes",
@@ -42,7 +42,7 @@ class Plan:
     reference: Reference
     simulator: Values
     controller: Values
-    warnings: tuple[str, ...]  # what the user should know
+    warnings: tuple[str, ...]  # that the user should read
 
     @property
     def ticks(self) -> int:
@@ -64,13 +64,13 @@ def make_plan(
     Args:
         character_name: A shipped character, or the path of a YAML file.
         duration: Length of the run in s.
-        reference: The controller's parameters that say what is tracked.
+        reference: The controller's parameters of what is tracked.
         simulator_settings: Parameters of `sim_node` that the user set, by name.
         controller_settings: Parameters of `controller_node` that the user set, by name.
         loaded: The character of that name, where it is loaded already.
 
     Raises:
-        ActuatedCharactersError: a name or value is wrong; says which, and what there is.
+        ActuatedCharactersError: a name or value is wrong; names it and the valid ones.
     """
     simulator_given, controller_given = _shared(simulator_settings, controller_settings)
     for name, option in _SET_BY_RUN.items():
@@ -103,7 +103,7 @@ def make_plan(
 
 
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:
-    # nobody is there to resume what has paused, or to wait forever
+    # a run ends with an error rather than pause or wait forever
     defaults = {"on_fault": "abort", "lockstep_timeout": _LOCKSTEP_TIMEOUT}
     parameters = simulator_parameters.PARAMETERS
     own = simulator_parameters.character_parameters(character)

@@ -11,6 +11,7 @@ from msgs_config.errors import ConfigurationError, one_of
 if TYPE_CHECKING:  # it takes a while to import
     from controller_node.references.files.reconstructed import FoundWith
     from msgs_config.character.model import Character
+    from msgs_config.parameters import Parameter
 
 Commands = argparse._SubParsersAction
 NODES = ("sim_node", "controller_node")
@@ -108,3 +109,19 @@ def bring_parameters(
             {name: brought[name] for name in brought if name not in (*settings, *taken)}
         )
     return found
+
+
+def parameters_of(node: str, character_name: str) -> "list[Parameter]":
+    """The parameters of a node by its name; `recorder` has the same for all characters."""
+    from actuated_characters.recorder import node as recorder
+    from controller_node import parameters as controller
+    from msgs_config.character.loading import load_character
+    from sim_node import parameters as simulator
+
+    if node == "recorder":
+        return recorder.PARAMETERS
+    character = load_character(character_name)
+    if node == "sim_node":
+        own = simulator.character_parameters(character)
+        return [simulator.CHARACTERS, *simulator.PARAMETERS, *own]
+    return controller.PARAMETERS + controller.character_parameters(character)

@@ -388,6 +388,7 @@ def test_the_command_writes_a_file_and_a_table(
         (("--output", "walk.json", "--resume"), "cannot resume from"),
         (("--output", "walk.json", "--push", "root:1,2"), "write it as LINK:FX,FY,FZ@S"),
         (("--output", "walk.json", "--push", "root:9,0,0@9"), "time is 9.0 s; it must be 0 s to"),
+        (("--clip", "walk"), "reconstructions/humanoid-walk.json exists; --resume goes on"),
         ((*SET, "controller_node.law:=pd"), "'law' is pd"),
         ((*SET, "controller_node.law:=pd", "--workers", "2"), "'law' is pd"),
         ((*SET, "controller_node.planner:=none"), "reconstruct sets it itself"),
@@ -404,6 +405,8 @@ def test_a_mistake_is_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there.json").write_text("{}")
+    (tmp_path / "reconstructions").mkdir()
+    (tmp_path / "reconstructions" / "humanoid-walk.json").touch()
 
     code = main(["reconstruct", *options, *(() if "--workers" in options else ("--workers", "1"))])
 
