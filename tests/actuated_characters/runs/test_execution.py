@@ -16,6 +16,7 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.cli import main
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.processes import MODULES
 from msgs_config.character.loading import load_character
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
@@ -244,18 +245,21 @@ def own_handlers() -> Iterator[None]:
     signal.signal(signal.SIGTERM, handler)
 
 
-def test_results_are_not_overwritten_unasked(
+def test_results_are_not_overwritten_unasked_and_other_files_never_deleted(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, own_handlers: None
 ) -> None:
     arguments = [*SHORT, "--output", str(tmp_path / "run")]
     assert main(arguments) == 0
     before = summary_of(tmp_path / "run")
 
-    code = main(arguments)
-
-    assert code == 1
+    assert main(arguments) == 1
     assert "error: " in (errors := capsys.readouterr().err) and "--overwrite" in errors
+    (tmp_path / "run" / "thesis.tex").write_text("years of work")
+    assert main([*arguments, "--overwrite"]) == 1
+
+    assert str(tmp_path / "run") in capsys.readouterr().err
     assert summary_of(tmp_path / "run") == before
+    assert (tmp_path / "run" / "thesis.tex").read_text() == "years of work"
 
 
 def test_overwriting_replaces_the_results_and_ends_with_the_path_of_the_picture(
@@ -272,22 +276,6 @@ def test_overwriting_replaces_the_results_and_ends_with_the_path_of_the_picture(
     assert summary_of(directory)["ticks"] == 24
     assert not (directory / "bag").exists()
     assert capsys.readouterr().out.splitlines()[-1].endswith(f": {directory / 'plot.png'}")
-
-
-def test_files_that_are_no_results_are_never_deleted(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, own_handlers: None
-) -> None:
-    directory = tmp_path / "thesis"
-    directory.mkdir()
-    (directory / "thesis.tex").write_text("years of work")
-    (directory / "summary.json").write_text("{}")
-
-    code = main([*SHORT, "--overwrite", "--output", str(directory)])
-
-    assert code == 1
-    assert str(directory) in capsys.readouterr().err
-    assert {path.name for path in directory.iterdir()} == {"thesis.tex", "summary.json"}
-    assert (directory / "thesis.tex").read_text() == "years of work"
 
 
 # Errors
@@ -417,20 +405,13 @@ def test_no_process_outlives_a_run_that_is_killed(processes: Processes, tmp_path
     wait_until(lambda: run.family == {}, "the end of all its processes", SECONDS)
 
 
-@pytest.mark.parametrize(
-    ("node", "module"),
-    [
-        ("sim_node", "sim_node.main"),
-        ("controller_node", "controller_node.main"),
-        ("recorder", "actuated_characters.recorder.main"),
-    ],
-)
+@pytest.mark.parametrize("node", ["sim_node", "controller_node", "recorder"])
 def test_a_node_that_is_killed_ends_the_run_and_is_named(
-    processes: Processes, tmp_path: Path, node: str, module: str
+    processes: Processes, tmp_path: Path, node: str
 ) -> None:
     run = Run(processes, *LONG_WALK, "--output", "run").wait_for_ticks(tmp_path / "run")
 
-    os.kill(run.pid_of(module), signal.SIGKILL)
+    os.kill(run.pid_of(MODULES[node]), signal.SIGKILL)
 
     assert run.process.wait(SECONDS) == 1
     assert f"{node} failed: killed by SIGKILL" in run.error

@@ -145,15 +145,6 @@ def test_the_states_are_those_of_one_process_with_the_same_pushes_to_the_bit(pus
 
 
 @pytest.mark.slow
-def test_the_states_are_those_without_pushes_until_the_first_one_acts(pushed: Made) -> None:
-    alone = states_without_ros(plan_of(), [])
-
-    first = pushed.recording.velocity[1] - alone[1].velocity
-    assert pushed.recording.position[0].tobytes() == alone[0].position.tobytes()
-    assert np.abs(first).max() > 0.01
-
-
-@pytest.mark.slow
 def test_a_run_in_one_process_takes_the_same_pushes(pushed: Made, tmp_path: Path) -> None:
     prepare_directory(tmp_path / "run", overwrite=False)
 
