@@ -69,13 +69,11 @@ def run_over_topics(
     sent = _write_planned(directory, pushes, throws, recording) if pushes or throws else None
     with _environment(directory) as environment, Children(directory, environment) as children:
         recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
-        others = [recorder]
-        if sent is not None:
-            others.insert(0, children.start_node("pusher", sent, *session))
-        waits = (*session, "-p", both if sent is None else all_three)
-        others.insert(0, children.start_node("controller_node", plan.controller, *waits))
+        sender = [children.start_node("pusher", sent, *session)] if sent else []
+        waits = (*session, "-p", all_three if sent else both)
+        controller = children.start_node("controller_node", plan.controller, *waits)
         simulator = children.start_node("sim_node", plan.simulator, *session, "-p", both)
-        _wait_for_end(simulator, others, progress)
+        _wait_for_end(simulator, [controller, *sender, recorder], progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
     recorded, _ = read_figures(directory)

@@ -8,7 +8,7 @@ from controller_node.behaviours.factory import choose_behaviour
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
 from controller_node.references.base import Reference
-from controller_node.references.factory import make_motion
+from controller_node.references.factory import Motion, make_motion
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
@@ -76,30 +76,28 @@ def make_plan(
     for name, option in _SET_BY_RUN.items():
         if name in simulator_given or name in controller_given:
             raise ConfigurationError(f"parameter '{name}' is set by {option}")
-    for given in (simulator_given, controller_given):
-        given["character"] = character_name
+    simulator_given["character"] = character_name
+    controller_given = {**reference, **controller_given, "character": character_name}
     character = placed(loaded or load_character(character_name), simulator_given)
-    controller_given = {**reference, **controller_given}
     _keep_assistance_in_step(character, simulator_given, controller_given)
-    controller = resolve(
-        controller_parameters.PARAMETERS
-        + controller_parameters.character_parameters(character, controller_given),
-        controller_given,
-    )
-    motion = make_motion(character, controller)
-    choose_behaviour(character, controller)
-    check_planning(character, controller)
+    controller, motion = _controller_values(character, controller_given)
     commanded = controller_parameters.commanded_joints(character, controller)
-    defaults = {
-        "commanded_joints": commanded,
-        **as_values(motion.first_state()),
-    }
+    defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings + simulator.warnings + controller.warnings
     return Plan(character, motion.reference, simulator, controller, warnings)
+
+
+def _controller_values(character: Character, given: Mapping[str, object]) -> tuple[Values, Motion]:
+    own = controller_parameters.character_parameters(character, given)
+    values = resolve(controller_parameters.PARAMETERS + own, given)
+    motion = make_motion(character, values)
+    choose_behaviour(character, values)
+    check_planning(character, values)
+    return values, motion
 
 
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:

@@ -70,14 +70,7 @@ def find_impact(
             the ball comes from too far for its size, or past the link.
     """
     names = [one.name for one in character.links]
-    if link not in names:
-        raise ConfigurationError(one_of("link", link, names))
-    if not distance <= _MOST_RADII * radius:
-        raise ConfigurationError(
-            f"distance is {distance:g} m; a ball with a radius of {radius:.3g} m may come from "
-            f"{_MOST_RADII * radius:g} m at most"
-        )
-    row = names.index(link)
+    row = _row(names, link, radius, distance)
     with World(WorldSettings(ground=False)) as world:
         both = BallAndCharacter(world, character, radius)
         target = both.put_character(position)[row]
@@ -90,12 +83,27 @@ def find_impact(
             )
         left, met = _trace(both, row, target, origin, radius, distance)
     if left is None:
+        raise _missed(link, radius, distance)
+    return Impact(target, target + left * origin, tuple(sorted(names[each] for each in met)))
+
+
+def _row(names: list[str], link: str, radius: float, distance: float) -> int:
+    """The row of a link; raises ConfigurationError as `find_impact` does."""
+    if link not in names:
+        raise ConfigurationError(one_of("link", link, names))
+    if not distance <= _MOST_RADII * radius:
         raise ConfigurationError(
-            f"a ball with a radius of {radius:.3g} m that comes from {distance:g} m away does "
-            f"not touch '{link}'; take another 'radius' or 'from', or come from nearer"
+            f"distance is {distance:g} m; a ball with a radius of {radius:.3g} m may come from "
+            f"{_MOST_RADII * radius:g} m at most"
         )
-    before = sorted(names[each] for each in met - {row})
-    return Impact(target, target + left * origin, tuple(before))
+    return names.index(link)
+
+
+def _missed(link: str, radius: float, distance: float) -> ConfigurationError:
+    return ConfigurationError(
+        f"a ball with a radius of {radius:.3g} m that comes from {distance:g} m away does "
+        f"not touch '{link}'; take another 'radius' or 'from', or come from nearer"
+    )
 
 
 def _trace(
@@ -114,7 +122,7 @@ def _trace(
     gaps = both.put_ball(target + left * origin)
     for _ in range(_LAST_STEPS + round(distance / radius)):
         if gaps[row] < _CLOSE:
-            return left, met
+            return left, met - {row}
         left -= min(gaps[row], radius)  # or it would jump over what is in the way
         gaps = both.put_ball(target + left * origin)
         met |= set(np.flatnonzero(gaps < 0.0).tolist())
