@@ -56,11 +56,14 @@ setup(
         "gymnasium": ["gymnasium>=1.0,<2"],
         # `make docs`: the pages as a site (60 MB with what they need, BSD-2 and MIT).
         "docs": ["furo>=2024.8", "myst-parser>=4,<6", "sphinx>=8,<9"],
+        # Completion of the command line in bash and zsh (43 kB, Apache-2.0, pure Python).
+        "completion": ["argcomplete>=3.5,<4"],
         # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
         "video": ["av>=14,<19"],
         # `colcon test` chooses pytest because this extra, of this name, lists it.
         # The linters are held to one minor version: a new one may have new rules.
         "test": [
+            "argcomplete>=3.5,<4",
             "av>=14,<19",
             "furo>=2024.8",
             "gymnasium>=1.0,<2",

@@ -9,9 +9,16 @@ from types import FrameType
 from rich.console import Console
 from rich.markup import escape
 from rich.padding import Padding
-from rich.table import Table
 
+from actuated_characters.commands.common.settings import (
+    NODES,
+    add_character,
+    add_command,
+    parameters_of,
+)
+from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.compare import add_compare
+from actuated_characters.commands.completion import add_names, complete
 from actuated_characters.commands.export import add_export
 from actuated_characters.commands.info import add_info
 from actuated_characters.commands.reconstruct import add_reconstruct
@@ -22,10 +29,8 @@ from actuated_characters.commands.report import add_report
 from actuated_characters.commands.run import add_run
 from actuated_characters.commands.study import add_study
 from msgs_config.errors import ActuatedCharactersError
-from msgs_config.parameters import Parameter
 from msgs_config.runtime.process import EXIT_ERROR, limit_threads
 
-_NODES = ("sim_node", "controller_node")
 _interrupted = False
 _EXIT_INTERRUPTED = 130
 
@@ -36,7 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
     try:
-        options = _parser().parse_args(arguments)
+        parser = _parser()
+        complete(parser)
+        options = parser.parse_args(arguments)
         code = options.command(options)
     except (ActuatedCharactersError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -69,26 +76,24 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the versions and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    add_run(commands)
-    add_reconstruct(commands)
-    add_render(commands)
-    add_replay(commands)
-    add_info(commands)
-    add_report(commands)
-    add_compare(commands)
-    add_export(commands)
-    add_recover(commands)
-    add_study(commands)
-    listing = commands.add_parser("list", help="list the characters and their clips")
-    listing.set_defaults(command=_list)
-    parameters = commands.add_parser(
-        "parameters", help="list a node's parameters", description="List a node's parameters."
+    for add in (
+        *(add_run, add_reconstruct, add_render, add_replay, add_info),
+        *(add_report, add_compare, add_export, add_recover, add_study),
+    ):
+        add(commands)
+    add_command(commands, _list, "list", "list the characters and their clips", "", [])
+    parameters = add_command(
+        commands,
+        _parameters,
+        "parameters",
+        "list a node's parameters",
+        "List a node's parameters.",
+        ["parameters controller_node"],
     )
-    parameters.set_defaults(command=_parameters)
-    parameters.add_argument("node", choices=(*_NODES, "recorder"))
-    parameters.add_argument(
-        "--character", default="humanoid", help="name, or path of a .yaml or .urdf file"
-    )
+    parameters.add_argument("node", choices=(*NODES, "recorder"))
+    add_character(parameters)
+    for command in commands.choices.values():
+        add_names(command)
     return parser
 
 
@@ -108,21 +113,20 @@ def _list(options: argparse.Namespace) -> None:
     from msgs_config.character.file import shipped_characters
     from msgs_config.character.loading import load_character
 
-    table = Table(title="characters", title_justify="left")
-    for column in ("name", "degrees of freedom", "mass", "clips"):
-        table.add_column(column)
+    rows = []
     for name in shipped_characters():
         character = load_character(name)
         clips = ", ".join(available_clips(character)) or "-"
         base = "floating" if character.layout.has_floating_base else "fixed"
         freedom = f"{character.layout.size}, {base} base"
-        table.add_row(name, freedom, f"{character.mass:.3g} kg", clips)
-    Console().print(table)
+        rows.append((name, freedom, f"{character.mass:.3g} kg", clips))
+    columns = ("name", "degrees of freedom", "mass", "clips")
+    Console().print(make_table("characters", columns, rows, right=False))
 
 
 def _parameters(options: argparse.Namespace) -> None:
     console = Console(highlight=False)
-    for parameter in _parameters_of(options.node, options.character):
+    for parameter in parameters_of(options.node, options.character):
         value = f"{_shortened(parameter.default)} {parameter.unit}".rstrip()
         choices = f": {' | '.join(parameter.choices)}" if parameter.choices else ""
         about = f"{parameter.description}{choices}{' (live)' if parameter.live else ''}"
@@ -131,21 +135,6 @@ def _parameters(options: argparse.Namespace) -> None:
             console.print(Padding(escape(about), (0, 0, 0, 4)))
         else:  # a line each, to be searched
             print(f"{parameter.name}: {value}  {about}")
-
-
-def _parameters_of(node: str, character_name: str) -> list[Parameter]:
-    from actuated_characters.recorder import node as recorder
-    from controller_node import parameters as controller
-    from msgs_config.character.loading import load_character
-    from sim_node import parameters as simulator
-
-    if node == "recorder":
-        return recorder.PARAMETERS
-    character = load_character(character_name)
-    if node == "sim_node":
-        own = simulator.character_parameters(character)
-        return [simulator.CHARACTERS, *simulator.PARAMETERS, *own]
-    return controller.PARAMETERS + controller.character_parameters(character)
 
 
 def _shortened(value: object) -> str:

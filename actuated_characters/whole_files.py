@@ -8,15 +8,15 @@ from msgs_config.errors import RecordingError
 
 
 def part_of(path: Path) -> Path:
-    """Where a file is as long as it is not whole: beside its place, hidden."""
+    """The path of a file while it is written: beside its place, hidden."""
     return path.with_name(f".{path.name}.part")
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A name to write a file under, which gets its own name at the end.
+    """The path to write a file to, which is renamed to `path` at the end.
 
-    After an error what was there before is still there, and nothing of the new file.
+    After an error the former file is still there, and nothing of the new one.
     """
     part = part_of(path)
     try:
@@ -29,7 +29,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[Path]:
-    """Like `replacing`, and what the file system objects to is one line.
+    """Like `replacing`, with an error of the file system in one line.
 
     Raises:
         RecordingError: the file cannot be written; says which and why.

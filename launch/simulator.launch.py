@@ -1,4 +1,4 @@
-"""The simulator alone: whoever answers its states moves the character."""
+"""The simulator alone; any node that answers its states moves the character."""
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown

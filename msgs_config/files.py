@@ -3,6 +3,8 @@
 import importlib.util
 import re
 from contextlib import suppress
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -168,12 +170,17 @@ def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> El
     Raises:
         error: the text is no XML, declares a document type, or is too deep or too large.
     """
-    parser = ElementTree.XMLParser(target=_PlainTreeBuilder())
     try:
-        parser.feed(text.strip("\0 \t\r\n"))
-        root: ElementTree.Element = parser.close()
+        return deepcopy(_parse_xml(text))
     except (ElementTree.ParseError, ValueError) as cause:  # ValueError: an unknown encoding
         raise error(f"{path}: not valid XML: {str(cause)[:200]}") from cause
+
+
+@lru_cache(maxsize=4)  # a node's start reads its character's URDF nine times
+def _parse_xml(text: str) -> ElementTree.Element:
+    parser = ElementTree.XMLParser(target=_PlainTreeBuilder())
+    parser.feed(text.strip("\0 \t\r\n"))
+    root: ElementTree.Element = parser.close()
     return root
 
 

@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from actuated_characters.commands.common.settings import Commands, add_command
+from actuated_characters.commands.common.tables import make_table, show
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -22,19 +24,18 @@ _SHOWN_OF_A_HASH = 12
 _LONGEST_VALUE = 60  # characters
 
 
-def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_compare(commands: "Commands[argparse.ArgumentParser]") -> None:
     """Add the command to those of `actuated_characters`."""
-    compare = commands.add_parser(
+    compare = add_command(
+        commands,
+        _compare,
         "compare",
-        help="compare two recorded runs",
-        description=(
-            "Compare two recorded runs of a character tick by tick: the first tick and degree of "
-            "freedom that differ, how the difference grows, figures, parameters, versions. Exit "
-            "code 0 if the states are identical, 1 if not."
-        ),
-        epilog="example: actuated_characters compare runs/demo runs/falls",
+        "compare two recorded runs",
+        "Compare two recorded runs of a character tick by tick: the first tick and degree of "
+        "freedom that differ, how the difference grows, figures, parameters, versions. Exit code 0 "
+        "if the states are identical, 1 if not.",
+        ["compare runs/demo runs/falls"],
     )
-    compare.set_defaults(command=_compare)
     compare.add_argument("first", type=Path, metavar="BAG", help="a run's directory, or a bag")
     compare.add_argument("second", type=Path, metavar="BAG", help="another one")
     compare.add_argument(
@@ -109,32 +110,25 @@ def _verdict(comparison: "Comparison", tolerance: float | None) -> str:
 
 
 def _growth_table(comparison: "Comparison") -> Table:
-    table = Table(title="largest difference in each second", title_justify="left")
-    columns = ("from (s)", "joints (rad)", "sliders (m)", "root (m)")
-    for column in columns:
-        table.add_column(column, justify="right")
-    rows = comparison.growth.by_second()
-    stride = -(-len(rows) // _MOST_SECONDS)
-    for row in rows[::stride]:
-        table.add_row(f"{row[0]:g}", *(_number(value) for value in row[1:]))
-    return table
+    seconds = comparison.growth.by_second()
+    stride = -(-len(seconds) // _MOST_SECONDS)
+    return make_table(
+        "largest difference in each second",
+        ("from (s)", "joints (rad)", "sliders (m)", "root (m)"),
+        [(f"{row[0]:g}", *(show(value, 6) for value in row[1:])) for row in seconds[::stride]],
+    )
 
 
 def _figures_table(comparison: "Comparison") -> Table:
-    table = Table(title="figures", title_justify="left")
-    table.add_column("")
-    for column in ("first", "second", "second - first"):
-        table.add_column(column, justify="right")
-    for name, (ours, theirs) in comparison.figures.items():
-        numbers = all(isinstance(value, (int, float)) for value in (ours, theirs))
-        flags = isinstance(ours, bool) or isinstance(theirs, bool)
-        difference = ""
-        if numbers and not flags:
-            assert isinstance(ours, (int, float)) and isinstance(theirs, (int, float))
-            difference = _number(theirs - ours)
-        shown = [_figure(name, value) for value in (ours, theirs)]
-        table.add_row(name, *shown, difference)
-    return table
+    rows = []
+    for name, values in comparison.figures.items():
+        shown = [str(v)[:_SHOWN_OF_A_HASH] if name == _HASH else show(v, 6) for v in values]
+        ours, theirs = (
+            v if isinstance(v, (int, float)) and not isinstance(v, bool) else None for v in values
+        )
+        difference = "" if ours is None or theirs is None else show(float(theirs - ours), 6)
+        rows.append((name, *shown, difference))
+    return make_table("figures", ("", "first", "second", "second - first"), rows)
 
 
 def _print_differences(
@@ -142,12 +136,8 @@ def _print_differences(
 ) -> None:
     if not differences:
         return
-    table = Table(title=f"{title} that differ", title_justify="left")
-    for column in ("", "first", "second"):
-        table.add_column(column, overflow="fold")
-    for name, values in differences.items():
-        table.add_row(escape(name), *(escape(_short(value)) for value in values))
-    console.print(table)
+    rows = [(name, *map(_shorten, values)) for name, values in differences.items()]
+    console.print(make_table(f"{title} that differ", ("", "first", "second"), rows, right=False))
 
 
 def _versions(first: Path, second: Path) -> dict[str, tuple[object, object]]:
@@ -157,16 +147,6 @@ def _versions(first: Path, second: Path) -> dict[str, tuple[object, object]]:
     return differences(recorded_versions(first), recorded_versions(second))
 
 
-def _figure(name: str, value: object) -> str:
-    if name == _HASH:
-        return str(value)[:_SHOWN_OF_A_HASH]
-    return _number(value) if isinstance(value, float) else str("-" if value is None else value)
-
-
-def _number(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.6g}"
-
-
-def _short(value: object) -> str:
+def _shorten(value: object) -> str:
     text = "-" if value is None else str(value)
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."

@@ -3,23 +3,23 @@
 import argparse
 from pathlib import Path
 
+from actuated_characters.commands.common.settings import Commands, add_bag, add_command
 
-def add_export(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+
+def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
     """Add the command to those of `actuated_characters`."""
-    export = commands.add_parser(
+    export = add_command(
+        commands,
+        _export,
         "export",
-        help="write a recorded run's joint states as CSV",
-        description=(
-            "Write the joint states of a recorded run as CSV, one row a state: time_s (since "
-            "the first state), stamp_ns, episode (from 1), then position.DOF (rad or m), "
-            "velocity.DOF (rad/s or m/s) and effort.DOF (N m or N, applied in the tick before the "
-            "state; empty where there was none) of each degree of freedom. Numbers are read back "
-            "to the last bit."
-        ),
-        epilog="example: actuated_characters export runs/demo --output demo.csv",
+        "write a recorded run's joint states as CSV",
+        "Write the joint states of a recorded run as CSV, one row a state: time_s (since the first "
+        "state), stamp_ns, episode (from 1), then position.DOF (rad or m), velocity.DOF (rad/s or "
+        "m/s) and effort.DOF (N m or N, applied in the tick before the state; empty where there "
+        "was none) of each degree of freedom. Numbers are read back to the last bit.",
+        ["export runs/demo --output demo.csv"],
     )
-    export.set_defaults(command=_export)
-    export.add_argument("bag", type=Path, metavar="BAG", help="a run's directory, or a bag")
+    add_bag(export)
     export.add_argument("--output", type=Path, required=True, metavar="FILE.csv")
     export.add_argument("--character", metavar="NAME", help="which, where there are several")
     export.add_argument(

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-from rich.table import Table
+
+from actuated_characters.commands.common.progress import progress_bar
+from actuated_characters.commands.common.settings import Commands, add_command
+from actuated_characters.commands.common.tables import make_table
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.bags.recovery.recover import Recovered
@@ -16,20 +17,19 @@ if TYPE_CHECKING:  # it takes a second to import
 _NS_PER_S = 10**9
 
 
-def add_recover(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_recover(commands: "Commands[argparse.ArgumentParser]") -> None:
     """Add the command to those of `actuated_characters`."""
-    recover = commands.add_parser(
+    recover = add_command(
+        commands,
+        _recover,
         "recover",
-        help="make a bag complete that its recorder could not close",
-        description=(
-            "Make a complete bag (MCAP) of all that reached the disk before a recorder was killed, "
-            "the disk was full, or a copy broke off: at most the last second of a run is missing. "
-            "The new bag takes the old one's place, which is kept beside it as BAG.damaged. In a "
-            "run's directory the figures that it lacks are made. A complete bag is not touched."
-        ),
-        epilog="example: actuated_characters recover runs/demo",
+        "make a bag complete that its recorder could not close",
+        "Make a complete bag (MCAP) of all that reached the disk before a recorder was killed, the "
+        "disk was full, or a copy broke off: at most the last second of a run is missing. The new "
+        "bag takes the old one's place, which is kept beside it as BAG.damaged. In a run's "
+        "directory the figures that it lacks are made. A complete bag is not touched.",
+        ["recover runs/demo"],
     )
-    recover.set_defaults(command=_recover)
     recover.add_argument(
         "bag", type=Path, metavar="BAG", help="a run's directory, or the directory of a bag"
     )
@@ -38,23 +38,22 @@ def add_recover(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
 def _recover(options: argparse.Namespace) -> None:
     from actuated_characters.bags.recovery.recover import recover
 
-    with _progress_bar() as bar:
-        task = bar.add_task("")
+    with progress_bar("", 1.0) as bar:
 
         def report(what: str, fraction: float | None) -> None:
-            bar.update(task, description=what, completed=fraction or 0.0, total=1.0)
+            bar.update(bar.task_ids[0], description=what, completed=fraction or 0.0)
 
         recovered = recover(options.bag, report)
     _tell(recovered)
 
 
 def _tell(recovered: "Recovered") -> None:
-    console = Console()
     contents, bag = recovered.contents, recovered.bag
     if recovered.damaged is None:
         print(f"{bag} is complete ({contents.counts.total()} messages): nothing to recover")
     else:
-        console.print(_table(recovered))
+        counts = sorted(contents.counts.items())
+        Console().print(make_table("recovered", ("topic", "messages"), counts))
         last = datetime.fromtimestamp(contents.last_log_time_ns / _NS_PER_S, UTC)
         print(f"{bag}: {contents.counts.total()} messages, the last one of {last:%F %T.%f} UTC")
         for lost in contents.lost:
@@ -66,21 +65,3 @@ def _tell(recovered: "Recovered") -> None:
         print(f"figures: {directory}, as they were: of the whole run, the bag is a part of it")
     if recovered.unmeasured:
         print(f"no figures: {recovered.unmeasured}")
-
-
-def _table(recovered: "Recovered") -> Table:
-    table = Table(title="recovered", title_justify="left")
-    table.add_column("topic", overflow="fold")
-    table.add_column("messages", justify="right")
-    for topic, count in sorted(recovered.contents.counts.items()):
-        table.add_row(escape(topic), str(count))
-    return table
-
-
-def _progress_bar() -> Progress:
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        console=Console(stderr=True),
-    )

@@ -3,27 +3,27 @@
 import argparse
 from pathlib import Path
 
+from actuated_characters.commands.common.settings import Commands, add_bag, add_command
 from msgs_config.errors import ConfigurationError
 
 _STILLS = 8
 _MOST_STILLS = 100
 
 
-def add_report(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_report(commands: "Commands[argparse.ArgumentParser]") -> None:
     """Add the command to those of `actuated_characters`."""
-    report = commands.add_parser(
+    report = add_command(
+        commands,
+        _report,
         "report",
-        help="draw a recorded run's figures as a page",
-        description=(
-            "Draw the tracking error of each joint, the torques against their limits, the root's "
-            "path against the reference, contacts, and tick times, with pushes, resets and "
-            "changed parameters marked: an HTML page that needs nothing beside itself, and its "
-            "pictures as PNG files."
-        ),
-        epilog="example: actuated_characters report runs/demo",
+        "draw a recorded run's figures as a page",
+        "Draw the tracking error of each joint, the torques against their limits, the root's path "
+        "against the reference, contacts, and tick times, with pushes, resets and changed "
+        "parameters marked: an HTML page that needs nothing beside itself, and its pictures as PNG "
+        "files.",
+        ["report runs/demo"],
     )
-    report.set_defaults(command=_report)
-    report.add_argument("bag", type=Path, metavar="BAG", help="a run's directory, or a bag")
+    add_bag(report)
     report.add_argument(
         "--output",
         type=Path,

@@ -6,30 +6,30 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
+from actuated_characters.commands.common.progress import progress_bar
+from actuated_characters.commands.common.settings import Commands, add_command
+from actuated_characters.commands.common.tables import make_table, show
 from actuated_characters.studies.catalogue import NAMES, load_study
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.studies.framework.study import Cell, Study, StudyResult
+    from actuated_characters.studies.framework.study import Study
 
 _ALL = "all"
 
 
-def add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_study(commands: "Commands[argparse.ArgumentParser]") -> None:
     """Add the command to those of `actuated_characters`."""
-    study = commands.add_parser(
+    study = add_command(
+        commands,
+        _study,
         "study",
-        help="work out the lecture's figures",
-        description=(
-            "Work out one of the lecture's topics by runs of the real nodes in lockstep: pictures "
-            "(PNG, SVG), a table (CSV, and printed). docs/lecture.md says what each shows."
-        ),
-        epilog="example: actuated_characters study lift",
+        "work out the lecture's figures",
+        "Work out one of the lecture's topics by runs of the real nodes in lockstep: pictures "
+        "(PNG, SVG), a table (CSV, and printed). docs/lecture.md explains what each shows.",
+        ["study lift"],
     )
-    study.set_defaults(command=_study)
     study.add_argument(
         "name", choices=(*NAMES, _ALL), metavar="NAME", help=", ".join(NAMES) + ", or all"
     )
@@ -52,58 +52,31 @@ def _study(options: argparse.Namespace) -> None:
             )
     with own_domain() as domain:  # one for all runs
         os.environ.setdefault("ROS_DOMAIN_ID", str(domain))
-        for name, directory in directories.items():
-            _run_study(load_study(name), directory, keep_runs=options.keep_runs)
+        for number, (name, directory) in enumerate(directories.items(), start=1):
+            label = f"{name} ({number} of {len(names)})" if len(names) > 1 else name
+            _run_study(load_study(name), label, directory, keep_runs=options.keep_runs)
 
 
-def _run_study(study: "Study", directory: Path, *, keep_runs: bool) -> None:
+def _run_study(study: "Study", label: str, directory: Path, *, keep_runs: bool) -> None:
+    """Run a study with its progress on standard error, write and print its results."""
     from actuated_characters.studies.framework.runner import TopicRunner, write_result
 
-    console = Console()
-    done: dict[str, float] = {}
-    with _progress_bar() as bar:
-        task = bar.add_task(study.name, total=float(study.runs))
+    console, done = Console(), dict[str, float]()
+    with progress_bar(label, float(study.runs), "runs") as bar:
+        task = bar.task_ids[0]
 
-        def report(label: str, share: float) -> None:
-            done[label] = share
+        def report(run: str, share: float) -> None:
+            if run not in done and not bar.console.is_terminal:  # where no bar is drawn
+                bar.console.print(f"{label}: run {len(done) + 1} of {study.runs}, {run}")
+            done[run] = share
             total = max(float(study.runs), float(len(done)))
-            bar.update(
-                task,
-                description=f"{study.name}: {label}",
-                completed=sum(done.values()),
-                total=total,
-            )
+            bar.update(task, completed=sum(done.values()), total=total, state=run)
 
-        runner = TopicRunner(directory, keep_runs=keep_runs, report=report)
-        result = study.run(runner)
-        bar.update(task, description=study.name, completed=bar.tasks[task].total)
+        result = study.run(TopicRunner(directory, keep_runs=keep_runs, report=report))
+        bar.update(task, completed=bar.tasks[task].total, state="")
     files = write_result(directory, study.name, result)
-    console.print(_table(study.title, result))
+    rows = [[show(cell) for cell in row] for row in result.rows]
+    console.print(make_table(study.title, result.columns, rows, right=False))
     for note in result.notes:
         console.print(note)
     console.print(f"in {directory}: {', '.join(file.name for file in files)}")
-
-
-def _table(title: str, result: "StudyResult") -> Table:
-    table = Table(title=title, title_justify="left")
-    for column in result.columns:
-        table.add_column(column, overflow="fold")
-    for row in result.rows:
-        table.add_row(*(_shown(cell) for cell in row))
-    return table
-
-
-def _shown(cell: "Cell") -> str:
-    if cell is None:
-        return "-"
-    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
-
-
-def _progress_bar() -> Progress:
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-    )

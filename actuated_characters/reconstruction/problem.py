@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from actuated_characters.runs.plan import Plan, make_plan
-from actuated_characters.runs.planned_wrenches import PlannedPush, parsed_push
+from actuated_characters.runs.planned_wrenches import PlannedPush, parse_push
 from controller_node.planner.settings import PREDICTIVE, RECORDED
 from controller_node.references.files.clip import read_clip
 from msgs_config.character.loading import load_character
@@ -32,7 +32,7 @@ class Problem:
 
     def planned_pushes(self, plan: Plan) -> tuple[PlannedPush, ...]:
         """The pushes of its plan. Raises ConfigurationError if one is wrong."""
-        return tuple(parsed_push(text, plan) for text in self.pushes)
+        return tuple(parse_push(text, plan) for text in self.pushes)
 
     def plan(self) -> Plan:
         """The run in which the motion is planned, with one thread.

@@ -1,5 +1,6 @@
 """Replays a bag through ROS topics: in the controller's place, or in the simulator's."""
 
+import signal
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,7 +11,13 @@ from actuated_characters.replay.comparison import ReplayResult
 from actuated_characters.replay.players.files import write_character, write_urdf
 from actuated_characters.replay.players.findings import CommandFindings, compare_commands
 from actuated_characters.replay.players.main import COMMANDS, STATES
-from actuated_characters.replay.players.processes import Progress, Tell, session, wait_for_player
+from actuated_characters.replay.players.processes import (
+    Progress,
+    Tell,
+    session,
+    start_player,
+    wait_for_player,
+)
 from actuated_characters.replay.players.results import FoundStates, compare_found
 from actuated_characters.replay.players.script import make_scripts, read_world
 from actuated_characters.replay.players.steering import first_parameters
@@ -72,9 +79,9 @@ def replay_commands(
     with session() as run:
         file = run.directory / "states.npz"
         playing = {"recording": str(path.absolute()), "world": world, "states": str(file)}
-        player = run.start_player(COMMANDS, playing | own)
+        player = start_player(run, COMMANDS, playing | own)
         parameters = _simulator_parameters(run.directory, together, applies) | own
-        simulator = run.start(topics.SIM_NODE, parameters)
+        simulator = run.start_node(topics.SIM_NODE, parameters)
         try:
             wait_for_player(player, [simulator], progress, tell)
         except RunError as error:
@@ -121,8 +128,7 @@ def _simulator_parameters(
 
 def _found_states(player: Child, file: Path, characters: int) -> list[FoundStates]:
     """What a player has heard; nothing if it had not begun to listen."""
-    player.interrupt()  # it may still wait for a simulator that has failed
-    player.end()
+    player.end(signal.SIGINT)  # it may still wait for a simulator that has failed
     if not file.is_file():
         return []
     with np.load(file) as arrays:
@@ -182,11 +188,11 @@ def replay_states(
                 "wait_for_subscribers": 1,
                 SESSION.name: playing[SESSION.name],
             }
-            others.append(run.start(topics.CONTROLLER_NODE, parameters))
+            others.append(run.start_node(topics.CONTROLLER_NODE, parameters))
         else:
             playing["start_patience"] = 0.0
         namespace = "" if start else recording.name
-        player = run.start_player(STATES, playing, namespace)
+        player = start_player(run, STATES, playing, namespace)
         wait_for_player(player, others, progress, tell)
         with np.load(file) as arrays:
             return compare_commands(recording, arrays["commands"])

@@ -7,10 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from actuated_characters.metrics.run_metrics import Measurement
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.in_process import Watch, ticks_in_process
 from actuated_characters.runs.plan import Plan
-from actuated_characters.runs.planned_throws import PlannedThrow, write_throws
-from actuated_characters.runs.planned_wrenches import PlannedPush, write_pushes
+from actuated_characters.runs.planned_files import write_planned
+from actuated_characters.runs.planned_throws import PlannedThrow
+from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.processes import Child, Children
 from actuated_characters.runs.ros_domain import own_domain
 from actuated_characters.runs.run_directory import (
@@ -24,13 +25,21 @@ from msgs_config.errors import RunError
 from msgs_config.messages import configuration
 from msgs_config.messages.session import SESSION, make_session
 
-_START_PATIENCE = 120.0  # s until the first answer, on a machine that may be busy with other things
+_START_TIMEOUT = 120.0  # s until the first answer, on a machine that may be busy with other things
 _POLL_PERIOD = 0.05  # s
 _IN_PROCESS_REPORT = 100  # ticks between reports of progress
+_TICK = "tick "  # begins the recorder's lines about its progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
+_UNMEASURED: Mapping[str, object] = {  # in one process, where no message can be lost or rejected
+    **dict.fromkeys(("rejected_commands", "duplicate_commands"), 0),
+    **dict.fromkeys(("rejected_pushes", "rejected_throws"), 0),
+    **dict.fromkeys(("missing_ticks", "dropped_references"), 0),
+    "lost_messages": {},
+    "foreign_messages": {},
+}
 
 Progress = Callable[[int], None]
-"""Is told the number of ticks so far."""
+"""Is called with the number of ticks so far."""
 
 
 def run_over_topics(
@@ -49,71 +58,57 @@ def run_over_topics(
     and throws are sent by one more process; in lockstep all are there before the first tick.
 
     Raises:
-        RunError: one of the processes failed, with its own message, or what was planned came too
-            late.
+        RunError: one of the processes failed, with its own message, or the simulator rejected a
+            push or throw.
     """
-    # what other nodes in the domain say is of another session, and each process rejects it
+    recording = {**recording, "directory": str(directory), "write_bag": write_bag}
+    # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
-    with _environment(directory) as environment, Children() as children:
-
-        def start(name: str, module: str, parameters: Mapping[str, object], *more: str) -> Child:
-            file = write_parameters(directory, name, parameters)
-            log = directory / LOGS / f"{name}.log"
-            arguments = ["--ros-args", "--params-file", str(file), *session, *more]
-            return children.start(lambda: Child(name, module, arguments, log, environment))
-
-        listening = {
-            **recording,
-            "directory": str(directory),
-            "write_bag": write_bag,
-            "progress_period": 0.1,
-        }
-        recorder = start("recorder", "actuated_characters.recorder.main", listening)
-        # both must be there before the first answer, or a tick would go unrecorded
-        both = ("-p", "wait_for_subscribers:=2")
-        all_three = ("-p", f"wait_for_subscribers:={3 if pushes or throws else 2}")
-        others = [recorder]
-        if pushes or throws:
-            sending = _planned_files(directory, pushes, throws)
-            excluded = recording.get("exclude", ())
-            assert isinstance(excluded, Collection)
-            sending |= _planned_listeners(write_bag, excluded)
-            others.insert(0, start("pusher", "actuated_characters.runs.perturbation_main", sending))
-        others.insert(
-            0, start("controller_node", "controller_node.main", plan.controller, *all_three)
-        )
-        simulator = start("sim_node", "sim_node.main", plan.simulator, *both)
-        _wait_for_end(simulator, others, progress)
+    # subscribers that must be there before the first answer, or a tick would go unrecorded
+    both, all_three = (f"wait_for_subscribers:={count}" for count in (2, 3))
+    sent = _write_planned(directory, pushes, throws, recording) if pushes or throws else None
+    with _environment(directory) as environment, Children(directory, environment) as children:
+        recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
+        sender = [children.start_node("pusher", sent, *session)] if sent else []
+        waits = (*session, "-p", all_three if sent else both)
+        controller = children.start_node("controller_node", plan.controller, *waits)
+        simulator = children.start_node("sim_node", plan.simulator, *session, "-p", both)
+        _wait_for_end(simulator, [controller, *sender, recorder], progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
     recorded, _ = read_figures(directory)
     if recorded["ticks"] != plan.ticks:
         raise RunError(f"{recorded['ticks']} of {plan.ticks} ticks were recorded")
     for what, planned in (("pushes", pushes), ("throws", throws)):
-        refused = recorded[f"rejected_{what}"]
-        if planned and refused:
-            raise RunError(f"sim_node refused {refused} of {len(planned)} {what}")
+        if planned and (rejected := recorded[f"rejected_{what}"]):
+            raise RunError(f"sim_node rejected {rejected} of {len(planned)} {what}")
 
 
-def _planned_files(
-    directory: Path, pushes: Sequence[PlannedPush], throws: Sequence[PlannedThrow]
+def _write_planned(
+    directory: Path,
+    pushes: Sequence[PlannedPush],
+    throws: Sequence[PlannedThrow],
+    recording: Mapping[str, object],
 ) -> dict[str, object]:
-    """Write what was planned; the sender's parameters that say where it is."""
-    folder = directory / PARAMETERS
-    write_pushes(folder / "pushes.json", pushes)
-    write_throws(folder / "throws.json", throws)
-    return {"file": str(folder / "pushes.json"), "throws": str(folder / "throws.json")}
+    """Write the planned pushes and throws; returns the parameters of the process that sends them.
 
+    It waits for the simulator, and for a recorder that keeps the topic in a bag.
+    """
+    excluded = recording.get("exclude", ())
+    assert isinstance(excluded, Collection)
+    left_out = {str(name).removeprefix("/") for name in excluded}
 
-def _planned_listeners(write_bag: bool, excluded: Collection[str]) -> dict[str, object]:
-    """How many listen to what is sent: the simulator, and a recorder that keeps it in a bag."""
-    left_out = {str(name).removeprefix("/") for name in excluded} if write_bag else None
+    def subscribers(topic: str) -> int:
+        return 2 if recording["write_bag"] and topic not in left_out else 1
+
+    files = {what: directory / PARAMETERS / f"{what}.json" for what in ("pushes", "throws")}
+    write_planned(files["pushes"], pushes)
+    write_planned(files["throws"], throws)
     return {
-        parameter: 1 + int(left_out is not None and topic not in left_out)
-        for parameter, topic in (
-            ("wait_for_subscribers", "external_wrench"),
-            ("throw_subscribers", "throw"),
-        )
+        "file": str(files["pushes"]),
+        "throws": str(files["throws"]),
+        "wait_for_subscribers": subscribers("external_wrench"),
+        "throw_subscribers": subscribers("throw"),
     }
 
 
@@ -136,28 +131,23 @@ def _environment(directory: Path) -> Iterator[dict[str, str]]:
 def _wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> None:
     """Wait until the simulator has ended well, and the others have not ended before."""
     recorder = others[-1]
-    start_deadline = time.monotonic() + _START_PATIENCE
+    start_deadline = time.monotonic() + _START_TIMEOUT
     ticks = 0
     while simulator.exit_code is None:
         for child in others:
             if child.exit_code is not None:
                 raise RunError(f"{child.name} failed: {child.last_words()}")
-        ticks = _last_tick(recorder.read_output()) or ticks
+        for line in recorder.read_lines():
+            if line.startswith(_TICK):
+                ticks = int(line.removeprefix(_TICK))
         progress(ticks)
         if ticks < 2 and time.monotonic() > start_deadline:
             raise RunError(
-                f"no answer within {_START_PATIENCE:g} s; sim_node says: {simulator.last_words()}"
+                f"no answer within {_START_TIMEOUT:g} s; sim_node says: {simulator.last_words()}"
             )
         time.sleep(_POLL_PERIOD)
     if simulator.exit_code:
         raise RunError(f"sim_node failed: {simulator.last_words()}")
-
-
-def _last_tick(output: str) -> int | None:
-    """The last tick in what the recorder has printed, in lines of `tick N`."""
-    numbers = [line.removeprefix("tick ") for line in output.splitlines()]
-    whole = [int(number) for number in numbers if number.isdecimal()]
-    return whole[-1] if whole else None
 
 
 def run_in_process(
@@ -167,8 +157,11 @@ def run_in_process(
     progress: Progress,
     pushes: Sequence[PlannedPush] = (),
     throws: Sequence[PlannedThrow] = (),
+    watch: Watch | None = None,
 ) -> None:
     """Run the same simulation and controller as one loop without ROS; figures in a directory.
+
+    `watch` is called with the simulation after each tick.
 
     Raises:
         SimulationError: the simulation diverged.
@@ -178,7 +171,8 @@ def run_in_process(
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     measurement = Measurement(known)
     started = time.perf_counter()
-    for count, tick in enumerate(ticks_in_process(plan, pushes, throws), start=1):
+    ticks = ticks_in_process(plan, pushes, throws, watch=watch)
+    for count, tick in enumerate(ticks, start=1):
         if count == 1:
             measurement.add_state(tick.state)
         measurement.add_state(tick.following)
@@ -186,9 +180,5 @@ def run_in_process(
         if count % _IN_PROCESS_REPORT == 0:
             progress(count)
     figures = measurement.summary(wall_time=time.perf_counter() - started)
-    counts = {"rejected_commands": 0, "duplicate_commands": 0}
-    counts |= {"rejected_pushes": 0, "rejected_throws": 0}
-    losses: dict[str, object] = {"missing_ticks": 0, "dropped_references": 0}
-    losses |= {"lost_messages": {}, "foreign_messages": {}}
-    summary = {"character": known.character} | figures | counts | losses
+    summary = {"character": known.character, **figures, **_UNMEASURED}
     write_figures(directory, summary, measurement.series())

@@ -1,6 +1,6 @@
 """The loop of simulation and controller joined in one process, without ROS."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -15,38 +15,44 @@ from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
 
+Watch = Callable[[Simulation], object]
+"""Is called with the simulation after each tick."""
+
 
 def ticks_in_process(
     plan: Plan,
     pushes: Sequence[PlannedPush] = (),
     throws: Sequence[PlannedThrow] = (),
     controller: Controller | None = None,
+    watch: Watch | None = None,
 ) -> Iterator[Tick]:
     """The ticks of a plan, one by one, with pushes and throws.
 
-    The states are those of a run over topics, bit for bit. Who wants to look at the controller
-    besides gives a fresh one of the plan.
+    The states are those of a run over topics, bit for bit. To look at the controller as well, give
+    a fresh one of the plan; to look at the simulation, a `watch`.
 
     Raises:
         SimulationError: the simulation diverged.
     """
     controller = controller or make_controller(plan.character, plan.reference, plan.controller)
-    role = make_character_setup(plan.character, plan.simulator)
-    schedule, clock = push_schedule(plan, pushes), TickClock(plan.simulator.integer("rate"))
+    setup = make_character_setup(plan.character, plan.simulator)
+    wrenches, clock = push_schedule(plan, pushes), TickClock(plan.simulator.integer("rate"))
     balls = ThrowQueue()
     for throw in throws:
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))
-    with Simulation([role], make_settings(plan.simulator)) as simulation:
+    with Simulation([setup], make_settings(plan.simulator)) as simulation:
         simulation.watches_contacts = controller.needs_contacts
-        (actor,) = simulation.actors
-        episode_ns = actor.state.stamp_ns
+        (character,) = simulation.actors
+        episode_ns = character.state.stamp_ns
         for _ in range(plan.ticks):
-            state = actor.state
-            touched = None if actor.contacts is None else actor.contacts.wrenches
+            state = character.state
+            touched = None if character.contacts is None else character.contacts.wrenches
             effort, reference = controller.compute_effort(state, episode_ns, touched)
-            acting = schedule.take(simulation.tick)
-            thrown = balls.take(simulation.tick)
-            simulation.step([np.where(actor.commanded, effort, 0.0)], [acting], thrown)
-            following = actor.state
+            commanded = np.where(character.commanded, effort, 0.0)
+            acting, thrown = wrenches.take(simulation.tick), balls.take(simulation.tick)
+            simulation.step([commanded], [acting], thrown)
+            following = character.state
             assert following.effort is not None
+            if watch is not None:
+                watch(simulation)
             yield Tick(state, following, reference)

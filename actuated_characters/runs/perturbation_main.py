@@ -1,4 +1,4 @@
-"""The process that sends a run's planned pushes."""
+"""The process that sends a run's planned pushes and throws."""
 
 from collections.abc import Callable
 from typing import NoReturn
@@ -7,15 +7,15 @@ from msgs_config.runtime.process import RunnableNode, limit_threads, run_node
 
 
 def main() -> NoReturn:
-    """Run the pusher until a signal."""
+    """Run the node until a signal."""
     limit_threads()
     run_node(_load)
 
 
 def _load() -> Callable[[], RunnableNode]:
-    from actuated_characters.runs.perturbation_node import PusherNode
+    from actuated_characters.runs.perturbation_node import PerturbationNode
 
-    return PusherNode
+    return PerturbationNode
 
 
 if __name__ == "__main__":

@@ -29,10 +29,10 @@ PARAMETERS = [
     SESSION,
 ]
 
-_PATIENCE = Duration(seconds=10)  # until the simulator has what was sent
+_TIMEOUT = Duration(seconds=10)  # until the simulator has the messages
 
 
-class PusherNode(Node):
+class PerturbationNode(Node):
     """Sends what was planned, and only then subscribes to the torques.
 
     A controller that waits for that subscription answers no state before all of it is there.
@@ -49,7 +49,7 @@ class PusherNode(Node):
         declare(self, PARAMETERS, values)
         session = given_session(values)
         pushes = read_pushes(Path(values.text("file")))
-        self._outboxes = [
+        self._outgoing = [
             _PlannedPublisher(
                 self,
                 topics.EXTERNAL_WRENCH,
@@ -59,7 +59,7 @@ class PusherNode(Node):
         ]
         if values.text("throws"):
             throws, codec = read_throws(Path(values.text("throws"))), ThrowCodec(session)
-            self._outboxes.append(
+            self._outgoing.append(
                 _PlannedPublisher(
                     self,
                     topics.THROW,
@@ -70,37 +70,39 @@ class PusherNode(Node):
         self._torques: DirectSubscription | None = None
 
     def run(self, stop: StopSignal) -> None:
-        """Send as soon as all is heard, then be there until `stop`."""
-        spinner = PollingExecutor(self)
+        """Send as soon as all subscribers are there, then stay until `stop`."""
+        executor = PollingExecutor(self)
         try:
             while not stop:
-                if self._torques is None and all(outbox.is_heard for outbox in self._outboxes):
-                    for outbox in self._outboxes:
-                        outbox.send()
+                if self._torques is None and all(each.is_ready for each in self._outgoing):
+                    for each in self._outgoing:
+                        each.send()
                     self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
                 if self._torques is None or self._torques.take() is None:
-                    spinner.rest()
+                    executor.rest()
                 else:
-                    spinner.received()
+                    executor.received()
         finally:
-            spinner.close()
+            executor.close()
 
 
 class _PlannedPublisher:
-    """Serialised messages for one topic, and how many are to hear them."""
+    """Serialised messages for one topic, and how many subscribers they wait for."""
 
-    def __init__(self, node: Node, topic: Topic, messages: Sequence[bytes], wanted: int) -> None:
+    def __init__(
+        self, node: Node, topic: Topic, messages: Sequence[bytes], subscribers: int
+    ) -> None:
         self._publisher = topics.create_publisher(node, topic)
         self._messages = messages
-        self._wanted = wanted
+        self._subscribers = subscribers
 
     @property
-    def is_heard(self) -> bool:
-        """Whether all are there, or there is nothing to be heard."""
-        return not self._messages or self._publisher.get_subscription_count() >= self._wanted
+    def is_ready(self) -> bool:
+        """Whether all subscribers are there, or there is nothing to send."""
+        return not self._messages or self._publisher.get_subscription_count() >= self._subscribers
 
     def send(self) -> None:
         """Send all; they have arrived when this returns."""
         for message in self._messages:
             self._publisher.publish(message)
-        self._publisher.wait_for_all_acked(_PATIENCE)
+        self._publisher.wait_for_all_acked(_TIMEOUT)

@@ -1,4 +1,4 @@
-"""What a run is made of, checked before anything is started."""
+"""The plan of a run: character, reference and parameters, checked before anything starts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from controller_node.behaviours.factory import choose_behaviour
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
 from controller_node.references.base import Reference
-from controller_node.references.factory import make_motion
+from controller_node.references.factory import Motion, make_motion
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
@@ -25,7 +25,7 @@ SHARED = ("rate", "gravity", "placement", "command_delay_ticks")
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
-    "characters": "nobody: a run has one character; start sim_node itself for several",
+    "characters": "no run, which has one character; start sim_node itself for several",
     INITIAL_STATE: "the run itself: where the reference begins, unless initial_position says it",
     "max_ticks": "--duration",
     "session": "the run itself, which makes one for all its nodes",
@@ -42,7 +42,7 @@ class Plan:
     reference: Reference
     simulator: Values
     controller: Values
-    warnings: tuple[str, ...]  # what the user should know
+    warnings: tuple[str, ...]  # that the user should read
 
     @property
     def ticks(self) -> int:
@@ -56,41 +56,33 @@ def make_plan(
     reference: Mapping[str, object],
     simulator_settings: Mapping[str, object],
     controller_settings: Mapping[str, object],
+    *,
+    loaded: Character | None = None,
 ) -> Plan:
     """Resolve all parameters of both sides, and the initial state that the reference begins with.
 
     Args:
         character_name: A shipped character, or the path of a YAML file.
         duration: Length of the run in s.
-        reference: The controller's parameters that say what is tracked.
+        reference: The controller's parameters of what is tracked.
         simulator_settings: Parameters of `sim_node` that the user set, by name.
         controller_settings: Parameters of `controller_node` that the user set, by name.
+        loaded: The character of that name, where it is loaded already.
 
     Raises:
-        ActuatedCharactersError: a name or value is wrong; says which, and what there is.
+        ActuatedCharactersError: a name or value is wrong; names it and the valid ones.
     """
     simulator_given, controller_given = _shared(simulator_settings, controller_settings)
     for name, option in _SET_BY_RUN.items():
         if name in simulator_given or name in controller_given:
             raise ConfigurationError(f"parameter '{name}' is set by {option}")
-    for given in (simulator_given, controller_given):
-        given["character"] = character_name
-    character = placed(load_character(character_name), simulator_given)
-    controller_given = {**reference, **controller_given}
+    simulator_given["character"] = character_name
+    controller_given = {**reference, **controller_given, "character": character_name}
+    character = placed(loaded or load_character(character_name), simulator_given)
     _keep_assistance_in_step(character, simulator_given, controller_given)
-    controller = resolve(
-        controller_parameters.PARAMETERS
-        + controller_parameters.character_parameters(character, controller_given),
-        controller_given,
-    )
-    motion = make_motion(character, controller)
-    choose_behaviour(character, controller)
-    check_planning(character, controller)
+    controller, motion = _controller_values(character, controller_given)
     commanded = controller_parameters.commanded_joints(character, controller)
-    defaults = {
-        "commanded_joints": commanded,
-        **as_values(motion.first_state()),
-    }
+    defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)
     _check_engines(character, simulator.number("gravity"))
@@ -99,8 +91,17 @@ def make_plan(
     return Plan(character, motion.reference, simulator, controller, warnings)
 
 
+def _controller_values(character: Character, given: Mapping[str, object]) -> tuple[Values, Motion]:
+    own = controller_parameters.character_parameters(character, given)
+    values = resolve(controller_parameters.PARAMETERS + own, given)
+    motion = make_motion(character, values)
+    choose_behaviour(character, values)
+    check_planning(character, values)
+    return values, motion
+
+
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:
-    # nobody is there to resume what has paused, or to wait forever
+    # a run ends with an error rather than pause or wait forever
     defaults = {"on_fault": "abort", "lockstep_timeout": _LOCKSTEP_TIMEOUT}
     parameters = simulator_parameters.PARAMETERS
     own = simulator_parameters.character_parameters(character)

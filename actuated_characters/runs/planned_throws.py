@@ -1,19 +1,19 @@
 """Balls that are thrown at a link, planned before a run so that they hit it at a time."""
 
-import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from actuated_characters.runs.plan import Plan
-from actuated_characters.whole_files import write_whole
+from actuated_characters.runs.planned_files import Planned, read_planned
 from controller_node.behaviours.posture import Posture
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
-from msgs_config.errors import CommandError, ConfigurationError, RecordingError, one_of
+from msgs_config.errors import CommandError, ConfigurationError, one_of
 from msgs_config.geometry import fixed_order, rotations
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
@@ -33,37 +33,33 @@ SIDES: Mapping[str, float | None] = {
 _NEEDED = ("mass", "speed", "at", "target")
 _TEXTS = ("target", "from")
 _KEYS = (*_NEEDED, "from", "distance", "radius")
-_DISTANCE = 2.0  # m
 _SLOWEST = 1e-3  # m/s
 _EXAMPLE = "mass=2 speed=8 at=2.0 from=left target=chest"
 
 
 @dataclass(frozen=True)
-class PlannedThrow:
+class PlannedThrow(Planned):
     """A ball that is let go in the state of a stamp."""
 
-    stamp_ns: int
     throw: ProjectileThrow
 
 
 @dataclass(frozen=True)
-class Aim:
-    """What a user says of a throw."""
+class ThrowRequest:
+    """A throw as a user describes it."""
 
     mass: float  # kg
     speed: float  # m/s, along the straight way to the target
     at: float  # s since the first state: when it hits
     target: str  # a link
     side: str = "front"  # of `SIDES`, or an angle as they have it, degrees
-    distance: float = _DISTANCE  # m, of the place where it is let go from the link's centre of mass
+    distance: float = 2.0  # m, from the link's centre of mass to where the ball is let go
     radius: float | None = None  # m; None: of a density that balls have
 
     def __post_init__(self) -> None:
-        least = {"mass": self.mass, "speed": self.speed, "distance": self.distance}
-        if self.radius is not None:
-            least["radius"] = self.radius
-        for name, value in least.items():
-            if not (math.isfinite(value) and value > 0.0):
+        for name in ("mass", "speed", "distance", "radius"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise ConfigurationError(f"{name} is {value:g}; it must be above 0")
         if self.speed < _SLOWEST:
             raise ConfigurationError(
@@ -76,11 +72,11 @@ class Aim:
         return natural_radius(self.mass) if self.radius is None else self.radius
 
 
-def read_aim(text: str) -> Aim:
-    """What `mass=2 speed=8 at=2.0 from=left target=chest` says.
+def parse_throw(text: str) -> ThrowRequest:
+    """The request of a text such as `mass=2 speed=8 at=2.0 from=left target=chest`.
 
     Raises:
-        ConfigurationError: a key is unknown, twice or missing, or a value cannot be.
+        ConfigurationError: a key is unknown, repeated or missing, or a value cannot be used.
     """
     given: dict[str, str] = {}
     for part in text.replace(",", " ").split():
@@ -95,19 +91,11 @@ def read_aim(text: str) -> Aim:
     missing = [key for key in _NEEDED if key not in given]
     if missing:
         raise ConfigurationError(f"'{missing[0]}' is missing; write it as '{_EXAMPLE}'")
-    number = {key: _number(key, value) for key, value in given.items() if key not in _TEXTS}
-    side = given.get("from", Aim.side)
+    side = given.get("from", ThrowRequest.side)
     if side not in SIDES:
         _number("from", side, f"an angle in degrees, or one of {', '.join(SIDES)}")
-    return Aim(
-        mass=number["mass"],
-        speed=number["speed"],
-        at=number["at"],
-        target=given["target"],
-        side=side,
-        distance=number.get("distance", Aim.distance),
-        radius=number.get("radius"),
-    )
+    numbers = {key: _number(key, value) for key, value in given.items() if key not in _TEXTS}
+    return ThrowRequest(target=given["target"], side=side, **numbers)
 
 
 def _number(key: str, value: str, what: str = "a number") -> float:
@@ -120,55 +108,54 @@ def _number(key: str, value: str, what: str = "a number") -> float:
     return found
 
 
-def planned_throw(plan: Plan, aim: Aim) -> tuple[PlannedThrow, tuple[str, ...]]:
-    """A throw that hits a link, as the reference has it at that time; and what is in its way.
+def plan_throw(plan: Plan, request: ThrowRequest) -> tuple[PlannedThrow, tuple[str, ...]]:
+    """A throw that hits a link, where the reference has it at that time, and the links in its way.
 
-    The ball is let go so many whole ticks before as it needs for the straight way at its speed,
-    and upwards by so much more as gravity takes away until then.
+    The ball is let go as many whole ticks before as it needs for the straight way at its speed,
+    and upwards by as much more as gravity takes away until then.
 
     Raises:
         ConfigurationError: the link does not exist, the time is beyond the run or too early for
-            the ball to arrive, or it would touch the ground before.
+            the ball to arrive, or the ball would touch the ground before.
+        CommandError: a ball like that cannot be thrown.
     """
-    try:
-        return _planned(plan, aim)
-    except CommandError as error:
-        raise ConfigurationError(str(error)) from error
-
-
-def _planned(plan: Plan, aim: Aim) -> tuple[PlannedThrow, tuple[str, ...]]:
-    rate, character = plan.simulator.integer("rate"), plan.character
+    rate, size = plan.simulator.integer("rate"), request.size
     end = plan.ticks / rate
-    if not 0.0 <= aim.at < end:
-        raise ConfigurationError(f"at is {aim.at:g} s; it must be 0 s to less than {end:g} s")
-    position = plan.reference.sample(aim.at).configuration.position
-    origin = _direction(character, position, aim.side)
-    impact = find_impact(character, position, aim.target, origin, aim.size, aim.distance)
-    way = aim.distance - float(fixed_order.dot(impact.centre - impact.target, origin))
-    ticks = max(round(way / aim.speed * rate), 1)
-    first = round(aim.at * rate) - ticks
+    if not 0.0 <= request.at < end:
+        raise ConfigurationError(f"at is {request.at:g} s; it must be 0 s to less than {end:g} s")
+    position = plan.reference.sample(request.at).configuration.position
+    origin = _direction(plan.character, position, request.side)
+    impact = find_impact(plan.character, position, request.target, origin, size, request.distance)
+    way = request.distance - float(fixed_order.dot(impact.centre - impact.target, origin))
+    ticks = max(round(way / request.speed * rate), 1)
+    first = round(request.at * rate) - ticks
     if first < 0:
         raise ConfigurationError(
-            f"at is {aim.at:g} s; from {aim.distance:g} m away at {aim.speed:g} m/s the ball needs "
-            f"{ticks / rate:.3g} s to '{aim.target}': let it hit later, or come from nearer"
+            f"at is {request.at:g} s; from {request.distance:g} m away at {request.speed:g} m/s "
+            f"the ball needs {ticks / rate:.3g} s to '{request.target}': let it hit later, or come "
+            "from nearer"
         )
     time, step = ticks / rate, 1.0 / (rate * plan.simulator.integer("substeps"))
-    start = impact.centre + aim.speed * time * origin
+    start = impact.centre + request.speed * time * origin
     # the engine's fall: it moves on with the velocity at the end of each of its steps
     rise = 0.5 * plan.simulator.number("gravity") * (time + step)
-    velocity = -aim.speed * origin + np.array((0.0, 0.0, rise))
-    lowest = min(float(start[2]), float(impact.centre[2])) - aim.size
-    if plan.simulator.text("terrain") == PLANE and lowest < 0.0:
-        raise ConfigurationError(
-            f"a ball with a radius of {aim.size:.3g} m on its way to '{aim.target}' would be "
-            f"{-lowest:.2g} m in the ground; take a smaller 'radius', or another 'from'"
-        )
-    throw = ProjectileThrow(aim.mass, aim.size, _triple(start), _triple(velocity))
+    velocity = -request.speed * origin + np.array((0.0, 0.0, rise))
+    _check_ground(plan, request, min(float(start[2]), float(impact.centre[2])) - size)
+    throw = ProjectileThrow(request.mass, size, _triple(start), _triple(velocity))
     return PlannedThrow(TickClock(rate).stamp_ns(1 + first), throw), impact.before
 
 
+def _check_ground(plan: Plan, request: ThrowRequest, lowest: float) -> None:
+    """Raise ConfigurationError if the lowest point of a ball's way, m, is in the ground."""
+    if plan.simulator.text("terrain") == PLANE and lowest < 0.0:
+        raise ConfigurationError(
+            f"a ball with a radius of {request.size:.3g} m on its way to '{request.target}' would "
+            f"be {-lowest:.2g} m in the ground; take a smaller 'radius', or another 'from'"
+        )
+
+
 def plan_throws(plan: Plan, texts: Sequence[str]) -> tuple[list[PlannedThrow], list[str]]:
-    """The throws that texts describe, see `read_aim`; and what the user should know.
+    """The throws that texts describe, see `parse_throw`; and warnings.
 
     Raises:
         ConfigurationError: one of them cannot be; says which.
@@ -178,8 +165,8 @@ def plan_throws(plan: Plan, texts: Sequence[str]) -> tuple[list[PlannedThrow], l
     throws, notes = [], []
     for text in texts:
         try:
-            throw, before = planned_throw(plan, read_aim(text))
-        except ConfigurationError as error:
+            throw, before = plan_throw(plan, parse_throw(text))
+        except (ConfigurationError, CommandError) as error:
             raise ConfigurationError(f"throw '{text}': {error}") from error
         throws.append(throw)
         if before:
@@ -187,25 +174,13 @@ def plan_throws(plan: Plan, texts: Sequence[str]) -> tuple[list[PlannedThrow], l
     return throws, notes
 
 
-def write_throws(file: Path, throws: Sequence[PlannedThrow]) -> None:
-    """Write throws for the node to send, the first one first."""
-    in_order = sorted(throws, key=lambda throw: throw.stamp_ns)
-    write_whole(file, json.dumps([asdict(throw) for throw in in_order], indent=1))
-
-
 def read_throws(file: Path) -> list[PlannedThrow]:
-    """Read what `write_throws` wrote.
+    """Read a file of `write_planned`. Raises RecordingError as `read_planned`."""
 
-    Raises:
-        RecordingError: the file does not exist or holds something else.
-    """
-    try:
-        content = json.loads(file.read_text("utf-8"))
-        return [
-            PlannedThrow(each["stamp_ns"], ProjectileThrow(**each["throw"])) for each in content
-        ]
-    except (OSError, ValueError, TypeError, KeyError, CommandError) as error:
-        raise RecordingError(f"{file} holds no throws: {error}") from error
+    def make(fields: Mapping[str, Any]) -> PlannedThrow:
+        return PlannedThrow(fields["stamp_ns"], ProjectileThrow(**fields["throw"]))
+
+    return read_planned(file, "throws", make)
 
 
 def _direction(character: Character, position: FloatArray, side: str) -> FloatArray:

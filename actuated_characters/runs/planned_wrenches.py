@@ -1,15 +1,14 @@
 """Pushes that are planned before a run, each with the stamp of the tick that it begins with."""
 
-import json
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from actuated_characters.runs.plan import Plan
-from actuated_characters.whole_files import write_whole
-from msgs_config.errors import ConfigurationError, RecordingError, one_of
+from actuated_characters.runs.planned_files import Planned, read_planned
+from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.parameters import push_ticks
@@ -17,10 +16,9 @@ from sim_node.physics.wrenches import WrenchQueue
 
 
 @dataclass(frozen=True)
-class PlannedPush:
+class PlannedPush(Planned):
     """A force and a torque on a link from a stamp on, for the simulator's `wrench_duration`."""
 
-    stamp_ns: int
     link: str
     wrench: tuple[float, ...]  # (6,): force N, torque N m; world axes
     point: tuple[float, float, float] | None = None  # m, link frame; None: the centre of mass
@@ -29,6 +27,11 @@ class PlannedPush:
         """The push as a message's content."""
         points = [] if self.point is None else [self.point]
         return WrenchArrays.of_rows(self.stamp_ns, [self.link], [self.wrench], points)
+
+
+def read_pushes(file: Path) -> list[PlannedPush]:
+    """Read a file of `write_planned`. Raises RecordingError as `read_planned`."""
+    return read_planned(file, "pushes", lambda fields: PlannedPush(**fields))
 
 
 def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
@@ -46,30 +49,30 @@ def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
     return schedule
 
 
-def parsed_push(text: str, plan: Plan) -> PlannedPush:
-    """The push that a text `LINK:FX,FY,FZ@S` says: N, world axes, and s since the first state.
+def parse_push(text: str, plan: Plan) -> PlannedPush:
+    """The push of a text `LINK:FX,FY,FZ@S`: N, world axes, and s since the first state.
 
     Raises:
-        ConfigurationError: the text is not of that form, or see `planned_push`.
+        ConfigurationError: the text is not of that form, or see `plan_push`.
     """
-    return planned_push(plan, *_parts(text))
+    return plan_push(plan, *_split(text))
 
 
-def pushes_within(texts: Sequence[str], plan: Plan) -> list[PlannedPush]:
-    """The pushes that texts say, but for those that would begin after the run.
+def parse_pushes_within(texts: Sequence[str], plan: Plan) -> list[PlannedPush]:
+    """The pushes of texts, without those that would begin after the run.
 
     Raises:
-        ConfigurationError: as `parsed_push`.
+        ConfigurationError: as `parse_push`.
     """
     rate = plan.simulator.integer("rate")
     return [
-        planned_push(plan, link, force, time)
-        for link, force, time in map(_parts, texts)
+        plan_push(plan, link, force, time)
+        for link, force, time in map(_split, texts)
         if not (math.isfinite(time) and round(time * rate) >= plan.ticks)
     ]
 
 
-def _parts(text: str) -> tuple[str, tuple[float, float, float], float]:
+def _split(text: str) -> tuple[str, tuple[float, float, float], float]:
     """Link, force and time of a text. Raises ConfigurationError if it is of another form."""
     found = re.fullmatch(r"(.+):([^,@]+),([^,@]+),([^,@]+)@([^,@]+)", text)
     try:
@@ -83,27 +86,7 @@ def _parts(text: str) -> tuple[str, tuple[float, float, float], float]:
     return found[1], (x, y, z), time
 
 
-def write_pushes(file: Path, pushes: Sequence[PlannedPush]) -> None:
-    """Write pushes for the node to send, the first one first."""
-    in_order = sorted(pushes, key=lambda push: push.stamp_ns)
-    write_whole(file, json.dumps([asdict(push) for push in in_order], indent=1))
-
-
-def read_pushes(file: Path) -> list[PlannedPush]:
-    """Read what `write_pushes` wrote.
-
-    Raises:
-        RecordingError: the file does not exist or holds something else.
-    """
-    try:
-        return [PlannedPush(**push) for push in json.loads(file.read_text("utf-8"))]
-    except (OSError, ValueError, TypeError) as error:
-        raise RecordingError(f"{file} holds no pushes: {error}") from error
-
-
-def planned_push(
-    plan: Plan, link: str, force: tuple[float, float, float], time: float
-) -> PlannedPush:
+def plan_push(plan: Plan, link: str, force: tuple[float, float, float], time: float) -> PlannedPush:
     """A force (N, world axes) on a link's centre of mass, at a time in s since the first state.
 
     Raises:
@@ -116,11 +99,10 @@ def planned_push(
         raise ConfigurationError(f"push: {one_of('link', link, links)}")
     if not all(math.isfinite(value) for value in force):
         raise ConfigurationError(f"push on '{link}': force is {force}; it must be finite")
-    end = plan.ticks / rate
     tick = round(time * rate) if math.isfinite(time) else -1
     if not 0 <= tick < plan.ticks:
         raise ConfigurationError(
-            f"push on '{link}': time is {time} s; it must be 0 s to less than {end:g} s"
+            f"push on '{link}': time is {time} s; it must be 0 s to less than "
+            f"{plan.ticks / rate:g} s"
         )
-    stamp_ns = TickClock(rate).stamp_ns(1 + tick)
-    return PlannedPush(stamp_ns, link, (*force, 0.0, 0.0, 0.0))
+    return PlannedPush(TickClock(rate).stamp_ns(1 + tick), link, (*force, 0.0, 0.0, 0.0))

@@ -5,11 +5,24 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
-_END_PATIENCE = 10.0  # s that a child has to end after SIGINT, before it is killed
+from actuated_characters.runs.run_directory import LOGS, PARAMETERS, write_parameters
+
+MODULES = {
+    "sim_node": "sim_node.main",
+    "controller_node": "controller_node.main",
+    "recorder": "actuated_characters.recorder.main",
+    "pusher": "actuated_characters.runs.perturbation_main",
+    "player": "actuated_characters.replay.players.main",
+}
+"""The modules that are run by `python -m`, by the names of the nodes."""
+
+_END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 _LIBC = ctypes.CDLL(None)  # loaded before a fork, not after
 
@@ -17,47 +30,73 @@ _LIBC = ctypes.CDLL(None)  # loaded before a fork, not after
 class Child:
     """One process: its standard output can be read, its standard error goes to a log file."""
 
+    signal_at_parents_end = signal.SIGTERM
+
     def __init__(
         self,
-        name: str,
-        module: str,
         arguments: Sequence[str],
         log: Path,
-        environment: Mapping[str, str],
+        *,
+        output: Path | None = None,
+        environment: Mapping[str, str] | None = None,
+        cwd: Path | None = None,
     ) -> None:
-        """Start `python -m module arguments`; it ends with this process, however that ends."""
-        self.name = name
+        """Start `python arguments`; it ends with this process, however that ends.
+
+        Without a file `output` the standard output is kept in one without a name.
+        """
+        self.name = log.stem
         self._log = log
-        with log.open("wb") as sink:
-            self._process = subprocess.Popen(
-                # -P: no module of the same name from the directory where the user stands
-                [sys.executable, "-P", "-m", module, *arguments],
+        # open as long as the child is remembered
+        self._output = output.open("w+b") if output else tempfile.TemporaryFile()  # noqa: SIM115
+        self._read = 0  # bytes of the output
+        own = dict(os.environ if environment is None else environment)
+        self._process = self._start(arguments, own, cwd)
+        self.pid = self._process.pid
+
+    def _start(
+        self, arguments: Sequence[str], environment: dict[str, str], cwd: Path | None
+    ) -> "subprocess.Popen[bytes]":
+        with self._log.open("wb") as log:
+            return subprocess.Popen(
+                [sys.executable, *arguments],
+                cwd=cwd,
                 env=environment,
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=sink,
+                stdout=self._output,
+                stderr=log,
                 start_new_session=True,  # Ctrl-C is this process's, which ends the others in order
-                preexec_fn=_end_with_parent,
+                preexec_fn=partial(end_with_parent, self.signal_at_parents_end),
             )
-        assert self._process.stdout is not None
-        self._output = self._process.stdout
-        os.set_blocking(self._output.fileno(), False)
-        self.pid = self._process.pid
 
     @property
     def exit_code(self) -> int | None:
         """The exit code, None while the process runs."""
         return self._process.poll()
 
-    def read_output(self) -> str:
-        """What it has printed since the last call."""
-        return (self._output.read() or b"").decode(errors="replace")
+    @property
+    def stdout(self) -> str:
+        """The standard output so far."""
+        return self._output_from(0).decode(errors="replace")
+
+    @property
+    def stderr(self) -> str:
+        """The log so far."""
+        return self._log.read_text(errors="replace")
+
+    def read_lines(self) -> list[str]:
+        """The complete lines of the standard output since the last call."""
+        whole, newline, _ = self._output_from(self._read).rpartition(b"\n")
+        self._read += len(whole + newline)
+        return whole.decode(errors="replace").splitlines()
+
+    def _output_from(self, offset: int) -> bytes:
+        descriptor = self._output.fileno()  # read without moving the offset, which the child shares
+        return os.pread(descriptor, os.fstat(descriptor).st_size - offset, offset)
 
     def last_words(self) -> str:
-        """What it said of its end: its error, or else the last line that it logged."""
-        lines = [
-            line for line in self._log.read_text(errors="replace").splitlines() if line.strip()
-        ]
+        """The reason for the end: the error in the log, or else its last line."""
+        lines = [line for line in self.stderr.splitlines() if line.strip()]
         errors = [line for line in lines if line.startswith("error: ")]
         if errors:
             return errors[-1].removeprefix("error: ")
@@ -65,47 +104,66 @@ class Child:
             return f"killed by {signal.Signals(-self.exit_code).name}"
         return lines[-1] if lines else f"exit code {self.exit_code}; it logged nothing"
 
-    def interrupt(self) -> None:
-        """Ask it to end in good order."""
+    def send(self, number: signal.Signals) -> None:
+        """Send a signal, unless the process has ended."""
         if self.exit_code is None:
-            self._process.send_signal(signal.SIGINT)
+            self._process.send_signal(number)
 
-    def end(self) -> int:
-        """Wait for its end, and kill it if that does not come; returns the exit code."""
+    def end(self, request: signal.Signals | None = None, patience: float = _END_TIMEOUT) -> int:
+        """Send a signal if one is given, wait, kill after `patience` s; return the exit code."""
+        if request is not None:
+            self.send(request)
         try:
-            code = self._process.wait(_END_PATIENCE)
+            return self._process.wait(patience)
         except subprocess.TimeoutExpired:
             self._process.kill()
-            code = self._process.wait()
-        self._output.close()
-        return code
+            return self._process.wait()
 
 
 class Children:
-    """Children in a `with` block; on leaving it they are ended, the last one started first."""
+    """The package's nodes in a `with` block; leaving it ends them, the last one started first."""
 
-    def __init__(self) -> None:
+    def __init__(self, directory: Path, environment: Mapping[str, str] | None = None) -> None:
+        """Parameter files and logs go below `directory`, as those of a run do."""
+        self.directory = directory
+        self._environment = environment
         self._children: list[Child] = []
+        for folder in (PARAMETERS, LOGS):
+            (directory / folder).mkdir(parents=True, exist_ok=True)
 
     def __enter__(self) -> "Children":
         return self
 
     def __exit__(self, *error: object) -> None:
         for child in reversed(self._children):
-            child.interrupt()
-            child.end()
+            child.end(signal.SIGINT)
 
-    def start(self, make_child: Callable[[], Child]) -> Child:
-        """Start a child; a signal waits until the child is one that will be ended."""
+    def start_node(
+        self,
+        name: str,
+        parameters: Mapping[str, object],
+        *ros_arguments: str,
+        arguments: Sequence[str] = (),
+        any_node: bool = False,
+    ) -> Child:
+        """Start a node; a signal waits until the child is one that will be ended.
+
+        The parameters are for the node of that name in the root namespace, or for `any_node`.
+        """
+        file = write_parameters(self.directory, name, parameters, "/**" if any_node else name)
+        # -P: no module of the same name from the directory where the user stands
+        command = ["-P", "-m", MODULES[name], *arguments]
+        command += ["--ros-args", "--params-file", str(file), *ros_arguments]
+        log = self.directory / LOGS / f"{name}.log"
         with _signals_held():
-            child = make_child()
+            child = Child(command, log, environment=self._environment)
             self._children.append(child)
         return child
 
 
 @contextmanager
 def _signals_held() -> Iterator[None]:
-    """Keep what comes for afterwards; a mask would hold it back from one thread alone."""
+    """Keep signals for afterwards; a mask would hold them back from one thread alone."""
     received: list[int] = []
     handlers = {
         number: signal.signal(number, lambda number, frame: received.append(number))
@@ -120,6 +178,6 @@ def _signals_held() -> Iterator[None]:
             signal.raise_signal(caught)
 
 
-def _end_with_parent() -> None:
-    """Let the kernel send SIGTERM to this child when its parent is gone, even killed."""
-    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+def end_with_parent(number: signal.Signals) -> None:
+    """Let the kernel send a signal to this process when its parent is gone, even killed."""
+    _LIBC.prctl(_PR_SET_PDEATHSIG, number)

@@ -1,4 +1,4 @@
-"""A ROS domain of one's own, so that two runs on a machine never hear each other."""
+"""Free ROS domains, so that two runs on a machine never receive each other's messages."""
 
 import fcntl
 import os
@@ -24,7 +24,7 @@ def own_domain() -> Iterator[int]:
     """
     directory = Path(tempfile.gettempdir()) / f"actuated_characters_domains_{os.getuid()}"
     directory.mkdir(exist_ok=True)
-    start = os.getpid()  # spread, so that many runs at once seldom try the same one
+    start = os.getpid()  # spread: many runs at once seldom try the same domain
     for offset in range(len(_DOMAINS)):
         domain = _DOMAINS[(start + offset) % len(_DOMAINS)]
         path = directory / str(domain)
@@ -42,11 +42,11 @@ def own_domain() -> Iterator[int]:
 
 
 def _lock(path: Path) -> int | None:
-    """An open, locked file; None if somebody else has it."""
+    """The descriptor of an open, locked file; None if another process holds its lock."""
     descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        # who held it before may have removed the file between our opening and locking it
+        # the former holder may have removed the file between opening and locking it here
         if path.stat().st_ino == os.fstat(descriptor).st_ino:
             return descriptor
     except OSError:

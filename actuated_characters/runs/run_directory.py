@@ -72,14 +72,18 @@ def write_figures(directory: Path, summary: dict[str, object], series: FloatArra
     write_whole(directory / SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
-def write_parameters(directory: Path, name: str, parameters: Mapping[str, object]) -> Path:
-    """Write a node's parameter file, as `--params-file` takes it; returns its path.
+def write_parameters(
+    directory: Path, name: str, parameters: Mapping[str, object], node: str | None = None
+) -> Path:
+    """Write `NAME.yaml`, as `--params-file` takes it; returns its path.
+
+    The parameters are for the node of that name, or for those that the pattern `node` matches.
 
     Raises:
-        RecordingError: it cannot be written.
+        RecordingError: the file cannot be written.
     """
     file = directory / PARAMETERS / f"{name}.yaml"
-    content = {name: {"ros__parameters": dict(parameters)}}
+    content = {node or name: {"ros__parameters": dict(parameters)}}
     write_whole(file, yaml.safe_dump(content))
     return file
 

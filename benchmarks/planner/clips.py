@@ -29,7 +29,7 @@ from actuated_characters.commands.common.settings import node_settings  # noqa: 
 from actuated_characters.reconstruction.world import is_lost  # noqa: E402
 from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import Plan, make_plan  # noqa: E402
-from actuated_characters.runs.planned_wrenches import pushes_within  # noqa: E402
+from actuated_characters.runs.planned_wrenches import parse_pushes_within  # noqa: E402
 from controller_node.parameters import make_controller  # noqa: E402
 from controller_node.references.files.clip import available_clips, read_clip  # noqa: E402
 from msgs_config.character.dynamics import DynamicsModel  # noqa: E402
@@ -114,7 +114,7 @@ def attempt(task: Task) -> Attempt:
     """Track a clip until it is lost or ends."""
     plan, own = _plan(task, task.world), _plan(task, task.character)
     controller = make_controller(own.character, own.reference, own.controller)
-    pushes = pushes_within(task.pushes, plan)
+    pushes = parse_pushes_within(task.pushes, plan)
     layout, rate = plan.character.layout, _rate(plan)
     centre = DynamicsModel(plan.character).centre_of_mass_at
     off, turns = [], []

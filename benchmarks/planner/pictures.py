@@ -20,7 +20,7 @@ from actuated_characters.render.engine.renderer import Picture, Renderer
 from actuated_characters.render.stills import pose_strip
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
-from actuated_characters.runs.planned_wrenches import pushes_within
+from actuated_characters.runs.planned_wrenches import parse_pushes_within
 from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
@@ -86,7 +86,7 @@ def simulate(clip: str, duration: float, pushes: Sequence[str] = ()) -> Seen:
     plan = make_plan(
         "humanoid", duration, motion, {"wrench_duration": 0.2}, {"planner": "predictive"}
     )
-    ticks = list(ticks_in_process(plan, pushes_within(pushes, plan)))
+    ticks = list(ticks_in_process(plan, parse_pushes_within(pushes, plan)))
     references = [tick.reference.position for tick in ticks if tick.reference is not None]
     positions = np.array([tick.state.position for tick in ticks])
     return Seen(plan.character, positions, np.array(references), plan.simulator.integer("rate"))

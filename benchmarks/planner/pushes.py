@@ -31,7 +31,7 @@ from actuated_characters.commands.common.settings import node_settings  # noqa: 
 from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import Plan, make_plan  # noqa: E402
 from actuated_characters.runs.planned_throws import PlannedThrow, plan_throws  # noqa: E402
-from actuated_characters.runs.planned_wrenches import PlannedPush, planned_push  # noqa: E402
+from actuated_characters.runs.planned_wrenches import PlannedPush, plan_push  # noqa: E402
 from benchmarks.planner.push_picture import draw  # noqa: E402
 from controller_node.behaviours.base import Mode  # noqa: E402
 from controller_node.parameters import make_controller  # noqa: E402
@@ -210,7 +210,7 @@ def attempt(walk: Walk) -> Outcome:
 def _planned(plan: Plan, walk: Walk) -> list[PlannedPush]:
     lasts = KINDS[walk.kind].lasts
     return [
-        planned_push(plan, LINK, (x / lasts, y / lasts, 0.0), push.time)
+        plan_push(plan, LINK, (x / lasts, y / lasts, 0.0), push.time)
         for push in walk.pushes
         for x, y in [push.impulse]
     ]

@@ -12,11 +12,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from actuated_characters.runs.processes import Child, Children
-from actuated_characters.runs.run_directory import PARAMETERS, write_parameters
 from msgs_config.messages import topics
 
 _PATIENCE = 120.0  # s for a whole run
-_MODULES = {topics.RECORDER_NODE: "actuated_characters.recorder.main"}
 
 
 class Nodes:
@@ -32,8 +30,8 @@ class Nodes:
         self._stack.callback(rclpy.try_shutdown)
         self.node = Node("benchmark")
         self._stack.callback(self.node.destroy_node)
-        self._directory = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
-        self._children = self._stack.enter_context(Children())
+        directory = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+        self._children = self._stack.enter_context(Children(directory))
         topic = topics.DIAGNOSTICS
         self.node.create_subscription(topic.message_type, topic.name, self._listen, topic.qos)
         return self
@@ -43,7 +41,7 @@ class Nodes:
 
     def start(self, name: str, parameters: Mapping[str, object]) -> Child:
         """Start one of the package's nodes."""
-        child = start_node(self._children, self._directory, name, parameters)
+        child = self._children.start_node(name, parameters)
         if name == topics.SIM_NODE:
             self._simulator = child
         return child
@@ -74,18 +72,6 @@ class Nodes:
         for status in message.status:
             if status.name.endswith(topics.SIM_NODE):
                 self.reports.append({item.key: item.value for item in status.values})
-
-
-def start_node(
-    children: Children, directory: Path, name: str, parameters: Mapping[str, object]
-) -> Child:
-    """Start one of the package's nodes as a child; parameters and log go to a directory."""
-    (directory / PARAMETERS).mkdir(exist_ok=True)
-    file = write_parameters(directory, name, parameters)
-    arguments = ["--ros-args", "--params-file", str(file)]
-    log = directory / f"{name}.log"
-    module = _MODULES.get(name, f"{name}.main")
-    return children.start(lambda: Child(name, module, arguments, log, dict(os.environ)))
 
 
 def private_memory(child: Child) -> float:

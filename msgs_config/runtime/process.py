@@ -1,4 +1,4 @@
-"""What every node's process does alike: threads, signals, one clear line for an error.
+"""The process of a node: its threads, its signals, its end, one clear line for an error.
 
 Imports neither numpy nor rclpy at the top: the limit on threads must come before numpy loads.
 """
@@ -33,7 +33,7 @@ _USAGE = "usage: {name} [--ros-args ...]\n\n" + _PARAMETERS_ARE_SET
 def limit_threads() -> None:
     """Keep numpy's linear algebra on one thread: on matrices this small more only get in the way.
 
-    To be called before numpy is imported; what the user has set stays.
+    To be called before numpy is imported; variables that the user has set stay.
     """
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
@@ -42,12 +42,12 @@ def limit_threads() -> None:
 def use_batch_scheduling() -> None:
     """Let this process' threads wait until others leave a processor, rather than interrupt them.
 
-    For who only listens to a loop. To be called before there are other threads, which inherit it.
-    Its share of a busy machine stays the same.
+    For processes that only listen to a control loop. To be called before there are other threads,
+    which inherit it. The process' share of a busy machine stays the same.
     """
     if not hasattr(os, "SCHED_BATCH"):  # Linux alone has it
         return
-    if os.sched_getscheduler(0) == os.SCHED_OTHER:  # what somebody has chosen stays
+    if os.sched_getscheduler(0) == os.SCHED_OTHER:  # a policy that the user has chosen stays
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
@@ -93,13 +93,12 @@ class RunnableNode(Protocol):
 def run_node(load: Callable[[], Callable[[], RunnableNode]]) -> NoReturn:
     """Run a node between rclpy's start and end, and end the process.
 
-    rclpy's own signal handlers would end the context under a loop that still has something to
-    publish or to write, so the node is handed a `StopSignal` instead. Once it has left the graph
-    nothing is open any more, and the process ends without taking itself apart: for Python, with
-    all that a node has loaded, that is by far the longest part of its end.
+    rclpy's own signal handlers would end the context under a loop that still publishes or writes,
+    so the node is handed a `StopSignal` instead. Once the node has left the graph nothing is open
+    any more, and the process ends without Python's own finalization, which takes far longer.
 
     Args:
-        load: Imports what the node needs, and gives what makes it.
+        load: Imports the node's modules, and returns its constructor.
     """
     stop = StopSignal()
     node, code = None, EXIT_ERROR
@@ -129,9 +128,9 @@ def _leave(node: RunnableNode | None, code: int) -> None:
 
 
 def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
-    """The variables with which Fast DDS 2.14, Jazzy's, takes up settings of ours.
+    """The variables with which Fast DDS 2.14, Jazzy's, reads the settings of this package.
 
-    Empty where the user has settings. Under LOCALHOST, what that range means is in the file.
+    Empty where the user has settings. Under LOCALHOST the file does what that range means.
     """
     given = environment.get(_PROFILES)
     if given not in (None, str(_ANYWHERE), str(_LOCALHOST)):

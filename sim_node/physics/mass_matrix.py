@@ -1,5 +1,6 @@
 """How a character's joints yield to efforts: the inverse mass matrix, as the engine has it."""
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.world import World, WorldSettings
+
+_MEASURED = deque[tuple[Character, FloatArray]](maxlen=4)  # one has no hash
 
 INSTANT = 1e-7
 """An engine step, s, so short that a difference quotient over it is a derivative."""
@@ -35,7 +38,13 @@ def clear_of_limits(character: Character) -> FloatArray:
 
 
 def measure_inverse_mass_matrix(character: Character) -> FloatArray:
-    """The inverse mass matrix (n, n) near the rest pose: what a unit of each effort accelerates."""
+    """The inverse mass matrix (n, n) near the rest pose: what a unit of each effort accelerates.
+
+    A character's is measured once: both its passive forces and its probe need it.
+    """
+    for known, inverse_mass in _MEASURED:
+        if known is character:
+            return inverse_mass
     size = character.layout.size
     rest, still = clear_of_limits(character), np.zeros(size)
     inverse_mass = np.zeros((size, size))
@@ -46,6 +55,8 @@ def measure_inverse_mass_matrix(character: Character) -> FloatArray:
             body.apply(effort)
             world.step()
             inverse_mass[:, column] = body.read()[1] / INSTANT
+    inverse_mass.setflags(write=False)
+    _MEASURED.append((character, inverse_mass))
     return inverse_mass
 
 

@@ -24,6 +24,29 @@ class Impact:
     before: tuple[str, ...]  # links that it would have met on its way
 
 
+class BallAndCharacter:
+    """A ball beside a character, in a world of their own where nothing moves."""
+
+    def __init__(self, world: World, character: Character, radius: float) -> None:
+        self._world = world
+        self._still = np.zeros(character.layout.size)
+        self._body = world.add(character)
+        world.balls.add(ProjectileThrow(1.0, radius, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+
+    def put_character(self, position: FloatArray) -> FloatArray:
+        """Put the character into a state (n,), message form; returns the links' centres (l, 3)."""
+        self._body.set_state(position, self._still)
+        return np.array(self._body.links.centres())
+
+    def put_ball(self, centre: FloatArray) -> FloatArray:
+        """Put the ball somewhere (3,), m; returns how far (l,) it is from the links' surfaces, m.
+
+        Negative: inside of a link; infinite: the link has no surface.
+        """
+        self._world.balls.place(centre)
+        return self._world.balls.gaps(self._body.links)
+
+
 def find_impact(
     character: Character,
     position: FloatArray,
@@ -36,7 +59,7 @@ def find_impact(
 
     Args:
         character: The character.
-        position: Where it stands (n,), message form.
+        position: Its state (n,), message form.
         link: The link that the ball flies at.
         origin: Unit vector (3,) from the link's centre of mass to where the ball comes from.
         radius: The ball's, m.
@@ -47,40 +70,60 @@ def find_impact(
             the ball comes from too far for its size, or past the link.
     """
     names = [one.name for one in character.links]
-    if link not in names:
-        raise ConfigurationError(one_of("link", link, names))
-    row = names.index(link)
-    if not distance <= _MOST_RADII * radius:
-        raise ConfigurationError(
-            f"distance is {distance:g} m; a ball with a radius of {radius:.3g} m may come from "
-            f"{_MOST_RADII * radius:g} m at most"
-        )
+    row = _row(names, link, radius, distance)
     with World(WorldSettings(ground=False)) as world:
-        body = world.add(character)
-        body.set_state(position, np.zeros(character.layout.size))
-        target = np.array(body.links.centres()[row])
-        far = target + distance * origin
-        x, y, z = far.tolist()
-        world.balls.add(ProjectileThrow(1.0, radius, (x, y, z), (0.0, 0.0, 0.0)))
-        gaps = world.balls.gaps(body.links)
+        both = BallAndCharacter(world, character, radius)
+        target = both.put_character(position)[row]
+        gaps = both.put_ball(target + distance * origin)
         if not np.isfinite(gaps[row]):
             raise ConfigurationError(f"link '{link}' has no surface that could be hit")
         if gaps[row] <= 0.0:
             raise ConfigurationError(
                 f"distance is {distance:g} m; '{link}' is nearer than the radius, {radius:g} m"
             )
-        left, before = distance, set[str]()
-        # the gap is how far the ball may go, at least, until it touches (sphere tracing)
-        for _ in range(_LAST_STEPS + round(distance / radius)):
-            if gaps[row] < _CLOSE:
-                break
-            left -= min(gaps[row], radius)  # or it would jump over what is in the way
-            world.balls.place(target + left * origin)
-            gaps = world.balls.gaps(body.links)
-            before |= {names[each] for each in np.flatnonzero(gaps < 0.0).tolist() if each != row}
-        else:
-            raise ConfigurationError(
-                f"a ball with a radius of {radius:.3g} m that comes from {distance:g} m away does "
-                f"not touch '{link}'; take another 'radius' or 'from', or come from nearer"
-            )
-    return Impact(target, target + left * origin, tuple(sorted(before)))
+        left, met = _trace(both, row, target, origin, radius, distance)
+    if left is None:
+        raise _missed(link, radius, distance)
+    return Impact(target, target + left * origin, tuple(sorted(names[each] for each in met)))
+
+
+def _row(names: list[str], link: str, radius: float, distance: float) -> int:
+    """The row of a link; raises ConfigurationError as `find_impact` does."""
+    if link not in names:
+        raise ConfigurationError(one_of("link", link, names))
+    if not distance <= _MOST_RADII * radius:
+        raise ConfigurationError(
+            f"distance is {distance:g} m; a ball with a radius of {radius:.3g} m may come from "
+            f"{_MOST_RADII * radius:g} m at most"
+        )
+    return names.index(link)
+
+
+def _missed(link: str, radius: float, distance: float) -> ConfigurationError:
+    return ConfigurationError(
+        f"a ball with a radius of {radius:.3g} m that comes from {distance:g} m away does "
+        f"not touch '{link}'; take another 'radius' or 'from', or come from nearer"
+    )
+
+
+def _trace(
+    both: BallAndCharacter,
+    row: int,
+    target: FloatArray,
+    origin: FloatArray,
+    radius: float,
+    distance: float,
+) -> tuple[float | None, set[int]]:
+    """How far (m) from `target` a ball touches link `row`, None if never; rows that it meets.
+
+    The gap is how far the ball may go, at least, until it touches (sphere tracing, Hart 1996).
+    """
+    left, met = distance, set[int]()
+    gaps = both.put_ball(target + left * origin)
+    for _ in range(_LAST_STEPS + round(distance / radius)):
+        if gaps[row] < _CLOSE:
+            return left, met - {row}
+        left -= min(gaps[row], radius)  # or it would jump over what is in the way
+        gaps = both.put_ball(target + left * origin)
+        met |= set(np.flatnonzero(gaps < 0.0).tolist())
+    return None, met

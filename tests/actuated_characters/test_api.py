@@ -15,7 +15,7 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
-from actuated_characters.runs.planned_wrenches import parsed_push
+from actuated_characters.runs.planned_wrenches import parse_push
 from msgs_config.messages.ros_state import read_state
 from tests.support.ros import Processes
 
@@ -36,7 +36,7 @@ def hash_of_run(
     plan = make_plan(character, duration, reference, {}, controller)
     states = StateHash()
     for number, tick in enumerate(
-        ticks_in_process(plan, [parsed_push(push, plan) for push in pushes])
+        ticks_in_process(plan, [parse_push(push, plan) for push in pushes])
     ):
         if number == 0:
             states.add(tick.state)

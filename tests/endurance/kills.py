@@ -135,8 +135,8 @@ def _kill(recorder: Child, life: float) -> tuple[str, float]:
     said, spoke_at, listens = "", 0.0, False
     deadline = time.monotonic() + _PATIENCE
     while time.monotonic() < deadline:
-        if word := recorder.read_output():
-            said, spoke_at = said + word, time.time()
+        if len(word := recorder.stdout) > len(said):
+            said, spoke_at = word, time.time()
             if not listens and _FIRST_STATE.search(said):
                 listens, deadline = True, time.monotonic() + life
         if recorder.exit_code is not None:
@@ -145,9 +145,7 @@ def _kill(recorder: Child, life: float) -> tuple[str, float]:
     os.kill(recorder.pid, signal.SIGKILL)
     while recorder.exit_code is None:
         time.sleep(_POLL_PERIOD)
-    said += recorder.read_output()
-    recorder.end()
-    return said, spoke_at
+    return recorder.stdout, spoke_at
 
 
 def _check(bag: Path, counts: Counter[str], last_flushed: int, found: _Found) -> None:

@@ -6,6 +6,7 @@ What is in the bag is then held against what must have been published.
 
 import argparse
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -87,8 +88,7 @@ def record(
             f"{plan.ticks / taken:.0f} a second; the recorder had "
             f"{processor_time(recorder) / taken:.0%} of a core"
         )
-        recorder.interrupt()
-        if recorder.end():
+        if recorder.end(signal.SIGINT):
             raise RuntimeError(f"the recorder failed: {recorder.last_words()}")
         return plan.ticks
 

@@ -33,7 +33,7 @@ from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import make_plan  # noqa: E402
 from actuated_characters.runs.processes import Child, Children  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
-from benchmarks.support.nodes import private_memory, start_node  # noqa: E402
+from benchmarks.support.nodes import private_memory  # noqa: E402
 from msgs_config.errors import MessageError  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402
 from msgs_config.messages.joint_state import (  # noqa: E402
@@ -179,21 +179,23 @@ def main() -> int:
     first = {name: plan.simulator[name] for name in ("initial_position", "initial_velocity")}
     given = {"character": "pendulum", "session": session}
     console = Console()
-    with own_domain() as domain, tempfile.TemporaryDirectory() as name, Children() as children:
+    with (
+        own_domain() as domain,
+        tempfile.TemporaryDirectory() as name,
+        Children(Path(name)) as children,
+    ):
         os.environ |= {
             "ROS_DOMAIN_ID": str(domain),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         }
         rclpy.init()
         noise = _Noise(Node("noise"), session)
-        folder, waiting = Path(name), {"wait_for_subscribers": 2}
+        waiting = {"wait_for_subscribers": 2}
         started = {
-            topics.CONTROLLER_NODE: start_node(
-                children, folder, topics.CONTROLLER_NODE, {**given, **_MOVING}
+            topics.CONTROLLER_NODE: children.start_node(
+                topics.CONTROLLER_NODE, {**given, **_MOVING}
             ),
-            topics.SIM_NODE: start_node(
-                children, folder, topics.SIM_NODE, {**given, **first, **waiting}
-            ),
+            topics.SIM_NODE: children.start_node(topics.SIM_NODE, {**given, **first, **waiting}),
         }
         growth = run(messages, started, noise)
         ended = [node for node, child in started.items() if child.exit_code is not None]

@@ -33,7 +33,7 @@ from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
 from actuated_characters.runs.processes import Child, Children  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
-from benchmarks.support.nodes import private_memory, start_node  # noqa: E402
+from benchmarks.support.nodes import private_memory  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402
 from msgs_config.messages.clock import TickClock  # noqa: E402
 from msgs_config.messages.joint_state import JointStateDecoder  # noqa: E402
@@ -66,13 +66,12 @@ def soak(ticks: int, seed: int, progress: Progress) -> Findings:
     rclpy.init(context=context)
     node = Node("soak", context=context, start_parameter_services=False)
     try:
-        with tempfile.TemporaryDirectory() as name, Children() as children:
-            directory = Path(name)
+        with tempfile.TemporaryDirectory() as name, Children(Path(name)) as children:
             hold = {"character": "pendulum", "rate": _RATE}
             alone = {**hold, "max_ticks": ticks, "wait_for_subscribers": 2}
             started = {
-                "sim_node": start_node(children, directory, topics.SIM_NODE, alone),
-                "controller_node": start_node(children, directory, topics.CONTROLLER_NODE, hold),
+                "sim_node": children.start_node(topics.SIM_NODE, alone),
+                "controller_node": children.start_node(topics.CONTROLLER_NODE, hold),
             }
             return _Soak(node, started, ticks, seed).run(progress)
     finally:

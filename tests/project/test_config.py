@@ -19,6 +19,7 @@ from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.processes import MODULES
 from controller_node import parameters as for_controller
 from controller_node.controller import Controller
 from controller_node.references.factory import make_motion
@@ -37,7 +38,7 @@ from sim_node.parameters import (
     make_settings,
 )
 from sim_node.physics.simulation import Simulation
-from tests.support.ros import MODULES, Inbox, Process, Processes, SimulatorClient, stamp_ns
+from tests.support.ros import Inbox, Process, Processes, SimulatorClient, stamp_ns
 
 CONFIG = Path(__file__).parents[2] / "config"
 SIMULATOR, CONTROLLER = "/sim_node", "/controller_node"

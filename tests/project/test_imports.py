@@ -158,7 +158,8 @@ def test_every_python_package_that_is_imported_is_required() -> None:
     arguments = setup_arguments()
     requirements = ast.literal_eval(arguments["install_requires"])
     extras = ast.literal_eval(arguments["extras_require"])
-    requirements += extras["video"] + extras["plan"] + extras["gymnasium"]
+    optional = ("video", "plan", "gymnasium", "completion")
+    requirements += [each for extra in optional for each in extras[extra]]
     names = {re.split(r"[<>=[]", requirement)[0] for requirement in requirements}
     required = {distributions.get(name, name) for name in names}
     imported = {

@@ -5,7 +5,6 @@ module as `python -m` does, in a process, a session and an environment of its ow
 start up to there, which is for the tests of just that (`Processes.python`).
 """
 
-import ctypes
 import os
 import runpy
 import signal
@@ -17,15 +16,10 @@ from multiprocessing import forkserver, get_context
 from multiprocessing.context import ForkServerContext
 from pathlib import Path
 
+from actuated_characters.runs.processes import end_with_parent
 from msgs_config.runtime.process import limit_threads
 
 _IMPORTED = ["sim_node.node", "controller_node.node", "actuated_characters.recorder.node"]
-_PR_SET_PDEATHSIG = 1  # prctl(2)
-
-
-def be_killed_with_parent() -> None:
-    """Let this process be killed when its parent ends, however that ends."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 @cache
@@ -68,22 +62,18 @@ class Fork:
         """The exit code, None while it runs."""
         return self._process.exitcode
 
-    def wait(self, timeout: float) -> int:
+    def wait(self, timeout: float | None = None) -> int:
         """The exit code, once it has ended. Raises TimeoutExpired."""
         self._process.join(timeout)
         code = self._process.exitcode
         if code is None:
-            raise subprocess.TimeoutExpired(self._process.name, timeout)
+            raise subprocess.TimeoutExpired(self._process.name, timeout or 0.0)
         return code
 
-    def send_signal(self, number: signal.Signals) -> None:
+    def send_signal(self, sig: int) -> None:
         """Send it a signal, if it has not ended."""
         if self.poll() is None:
-            os.kill(self.pid, number)
-
-    def terminate(self) -> None:
-        """Send it SIGTERM."""
-        self.send_signal(signal.SIGTERM)
+            os.kill(self.pid, sig)
 
     def kill(self) -> None:
         """Send it SIGKILL."""
@@ -100,7 +90,7 @@ def _run(
 ) -> None:
     """Become what `python -m module arguments` is."""
     os.setsid()
-    be_killed_with_parent()
+    end_with_parent(signal.SIGKILL)
     os.chdir(cwd)
     os.environ.clear()
     os.environ.update(environment)

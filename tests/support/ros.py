@@ -6,7 +6,6 @@ Everything waits for a condition with a deadline; nothing sleeps to let somethin
 import os
 import signal
 import subprocess
-import sys
 import time
 from array import array
 from collections.abc import Callable, Mapping, Sequence
@@ -31,11 +30,12 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_srvs.srv import SetBool, Trigger
 
+from actuated_characters.runs.processes import MODULES, Child
 from msgs_config.character.layout import ROOT
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.topics import Topic
-from tests.support.forked import Fork, be_killed_with_parent
+from tests.support.forked import Fork
 
 PATIENCE = 30.0
 """s that a condition may take to come true, on a machine that may be busy with other things."""
@@ -47,11 +47,6 @@ DDS_PROFILES, RANGE = "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY
 """What sets the middleware of the test's own process; the processes under test set it themselves,
 by the range LOCALHOST, as a user's do."""
 
-MODULES = {
-    topics.SIM_NODE: "sim_node.main",
-    topics.CONTROLLER_NODE: "controller_node.main",
-    topics.RECORDER_NODE: "actuated_characters.recorder.main",
-}
 _MIDDLEWARE_SAYS = "sequence size exceeds remaining buffer"
 
 
@@ -80,8 +75,10 @@ def wait_until(
     return result
 
 
-class Process:
+class Process(Child):
     """A process with its output in files; `end` ends it, whatever happens."""
+
+    signal_at_parents_end = signal.SIGKILL
 
     def __init__(
         self,
@@ -95,59 +92,32 @@ class Process:
 
         With `forked_module` it is `python -m forked_module arguments`, by a fork; see `Fork`.
         """
-        self._errors = log.with_suffix(".stderr")
-        self._output = log.with_suffix(".stdout")
+        self._module, self._output_file = forked_module, log.with_suffix(".stdout")
         own = dict(os.environ if environment is None else environment)
         own |= {"PYTHONUNBUFFERED": "1"}
         if own.pop(DDS_PROFILES, None) and own.get(RANGE) == "SYSTEM_DEFAULT":
             own[RANGE] = "LOCALHOST"
-        self._process: Fork | subprocess.Popen[bytes]
-        if forked_module is not None:
-            folder = cwd or Path.cwd()
-            self._process = Fork(forked_module, arguments, self._output, self._errors, folder, own)
-        else:
-            self._process = self._popen(arguments, cwd, own)
-        self.pid = self._process.pid
+        super().__init__(
+            arguments,
+            log.with_suffix(".stderr"),
+            output=self._output_file,
+            environment=own,
+            cwd=cwd,
+        )
 
-    def _popen(
-        self, arguments: Sequence[str], cwd: Path | None, environment: Mapping[str, str]
-    ) -> subprocess.Popen[bytes]:
-        with self._errors.open("wb") as errors, self._output.open("wb") as output:
-            return subprocess.Popen(
-                [sys.executable, *arguments],
-                cwd=cwd,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=errors,
-                start_new_session=True,
-                preexec_fn=be_killed_with_parent,
-            )
-
-    @property
-    def exit_code(self) -> int | None:
-        """The exit code, None while the process runs."""
-        return self._process.poll()
-
-    @property
-    def stderr(self) -> str:
-        """What it has written to its standard error so far."""
-        return self._errors.read_text(errors="replace")
-
-    @property
-    def stdout(self) -> str:
-        """What it has written to its standard output so far."""
-        return self._output.read_text(errors="replace")
+    def _start(
+        self, arguments: Sequence[str], environment: dict[str, str], cwd: Path | None
+    ) -> Fork | subprocess.Popen[bytes]:
+        if self._module is None:
+            return super()._start(arguments, environment, cwd)
+        folder = cwd or Path.cwd()
+        return Fork(self._module, arguments, self._output_file, self._log, folder, environment)
 
     @property
     def peak_memory(self) -> float:
         """The most memory that it has had at any time, MB."""
         lines = Path(f"/proc/{self.pid}/status").read_text().splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024.0
-
-    def send(self, number: signal.Signals) -> None:
-        """Send it a signal."""
-        self._process.send_signal(number)
 
     def wait(self, patience: float = PATIENCE) -> int:
         """Its exit code, once it has ended by itself."""
@@ -158,15 +128,9 @@ class Process:
                 f"process {self.pid} did not end within {patience:g} s:\n{self.stderr}"
             ) from None
 
-    def end(self) -> None:
-        """End it if it has not ended yet."""
-        if self.exit_code is None:
-            self._process.terminate()
-        try:
-            self._process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+    def end(self, request: signal.Signals | None = signal.SIGTERM, patience: float = 5.0) -> int:
+        """End it if it has not ended yet; returns the exit code."""
+        return super().end(request, patience)
 
 
 LOG_LINES = 220

@@ -1,31 +1,26 @@
-"""The progress bars of the sub-commands."""
+"""The progress bars of the commands."""
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 
-def progress_bar(description: str, total: int, unit: str, *, transient: bool = False) -> Progress:
-    """A bar on standard error with one task, of so many units; a transient one leaves no trace."""
+def progress_bar(
+    description: str, total: float, unit: str = "", *, transient: bool = False
+) -> Progress:
+    """A bar on standard error with one task, of so many units; a transient one leaves no trace.
+
+    The task's field `state` is shown beside it.
+    """
+    count = [TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}")] if unit else []
     bar = Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
-        TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"),
+        *count,
+        TextColumn("{task.fields[state]}", markup=False),
         TimeRemainingColumn(),
         console=Console(stderr=True),
         transient=transient,
     )
-    bar.add_task(description, total=total)
+    bar.add_task(description, total=total, state="")
     return bar
-
-
-def search_bar() -> Progress:
-    """A bar on standard error whose tasks say in a field `state` how well it goes."""
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.completed:.0f}/{task.total:.0f}"),
-        TextColumn("{task.fields[state]}", markup=False),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )

@@ -1,7 +1,8 @@
-"""Options that may be repeated, and what `--set NODE.NAME:=VALUE` says."""
+"""Commands and options that several commands have, and what `--set NODE.NAME:=VALUE` sets."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgs_config import files
@@ -9,6 +10,44 @@ from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a while to import
     from controller_node.references.files.reconstructed import FoundWith
+    from msgs_config.character.model import Character
+    from msgs_config.parameters import Parameter
+
+Commands = argparse._SubParsersAction
+NODES = ("sim_node", "controller_node")
+CHARACTER = "humanoid"
+_PUSH = "LINK:FX,FY,FZ@S"
+
+
+def add_command(
+    commands: "Commands[argparse.ArgumentParser]",
+    function: Callable[[argparse.Namespace], object],
+    name: str,
+    about: str,
+    description: str,
+    examples: Sequence[str],
+) -> argparse.ArgumentParser:
+    """Add a command that a function runs; each example is a line without the program's name."""
+    lines = "; ".join(f"actuated_characters {example}" for example in examples)
+    epilog = f"example{'s' * (len(examples) > 1)}: {lines}" if examples else None
+    command = commands.add_parser(name, help=about, description=description, epilog=epilog)
+    command.set_defaults(command=function)
+    return command
+
+
+def add_bag(command: argparse.ArgumentParser) -> None:
+    """Add the positional argument that names a recording."""
+    command.add_argument("bag", type=Path, metavar="BAG", help="a run's directory, or a bag")
+
+
+def add_character(command: argparse.ArgumentParser) -> None:
+    """Add the option that names a character."""
+    command.add_argument(
+        "--character",
+        default=CHARACTER,
+        metavar="NAME",
+        help="name, or path of a .yaml or .urdf file (%(default)s)",
+    )
 
 
 def add_repeated(command: argparse._ActionsContainer, name: str, metavar: str, about: str) -> None:
@@ -17,8 +56,16 @@ def add_repeated(command: argparse._ActionsContainer, name: str, metavar: str, a
     command.add_argument(name, action="append", default=[], metavar=metavar, help=about)
 
 
+def add_inputs(command: argparse._ActionsContainer, push: str, example: str = "") -> None:
+    """Add `--push`, with what is to be said of it, and `--set`."""
+    about = f"a force in N, world axes, on a link at a time in s, {push}"
+    add_repeated(command, "--push", _PUSH, about)
+    about = f"a parameter of sim_node or controller_node{example}"
+    add_repeated(command, "--set", "NODE.NAME:=VALUE", about)
+
+
 def node_settings(texts: Sequence[str], nodes: Sequence[str]) -> dict[str, dict[str, object]]:
-    """The parameters that are set, by node; values are YAML.
+    """The parameters that `--set NODE.NAME:=VALUE` sets, by node; values are YAML.
 
     Raises:
         ConfigurationError: a text is not of that form, its node is none of these, or its value is
@@ -38,25 +85,22 @@ def node_settings(texts: Sequence[str], nodes: Sequence[str]) -> dict[str, dict[
 
 
 def bring_parameters(
-    character: str,
+    character: "Character",
     clip: str | None,
     simulator: dict[str, object],
     controller: dict[str, object],
 ) -> "FoundWith | None":
-    """Set what a clip was found with, unless it is set, if it is a reconstruction.
+    """Set what a reconstructed clip was found with, unless it is set.
 
     Returns all that it was found with, None of other clips.
 
     Raises:
-        ActuatedCharactersError: there is no such character or clip, or its file is malformed.
+        ActuatedCharactersError: there is no such clip, or its file is malformed.
     """
     from actuated_characters.runs.plan import SHARED
     from controller_node.references.files.reconstructed import read_found_with
-    from msgs_config.character.loading import load_character
 
-    if clip is None:
-        return None
-    found = read_found_with(load_character(character), clip)
+    found = None if clip is None else read_found_with(character, clip)
     if found is None:
         return None
     taken = {name for name in SHARED if name in simulator or name in controller}
@@ -65,3 +109,19 @@ def bring_parameters(
             {name: brought[name] for name in brought if name not in (*settings, *taken)}
         )
     return found
+
+
+def parameters_of(node: str, character_name: str) -> "list[Parameter]":
+    """The parameters of a node by its name; `recorder` has the same for all characters."""
+    from actuated_characters.recorder import node as recorder
+    from controller_node import parameters as controller
+    from msgs_config.character.loading import load_character
+    from sim_node import parameters as simulator
+
+    if node == "recorder":
+        return recorder.PARAMETERS
+    character = load_character(character_name)
+    if node == "sim_node":
+        own = simulator.character_parameters(character)
+        return [simulator.CHARACTERS, *simulator.PARAMETERS, *own]
+    return controller.PARAMETERS + controller.character_parameters(character)

@@ -7,15 +7,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-import yaml
-
 from actuated_characters.replay.players.base import TICK, WAITING
 from actuated_characters.runs.processes import Child, Children
 from actuated_characters.runs.ros_domain import own_domain
 from msgs_config.errors import RunError
 
 _POLL_PERIOD = 0.05  # s
-_PLAYER = "actuated_characters.replay.players.main"
 
 Progress = Callable[[int], None]
 """Is told the number of states so far."""
@@ -24,50 +21,24 @@ Tell = Callable[[str], None]
 """Is told a line, such as what is waited for."""
 
 
-class Session:
-    """Child processes with a directory for their files, which goes when they have ended."""
-
-    def __init__(self, children: Children, directory: Path, environment: Mapping[str, str]) -> None:
-        self.directory = directory
-        self._children = children
-        self._environment = environment
-
-    def start(self, name: str, parameters: Mapping[str, object]) -> Child:
-        """Start one of the package's nodes, by its name."""
-        return self._start(name, f"{name}.main", [], parameters)
-
-    def start_player(
-        self, kind: str, parameters: Mapping[str, object], namespace: str = ""
-    ) -> Child:
-        """Start a player of `COMMANDS` or `STATES`."""
-        remap = ["-r", f"__ns:=/{namespace}"] if namespace else []
-        return self._start("player", _PLAYER, [kind], parameters, remap)
-
-    def _start(
-        self,
-        name: str,
-        module: str,
-        first: Sequence[str],
-        parameters: Mapping[str, object],
-        remap: Sequence[str] = (),
-    ) -> Child:
-        file, log = self.directory / f"{name}.yaml", self.directory / f"{name}.log"
-        file.write_text(yaml.safe_dump({"/**": {"ros__parameters": dict(parameters)}}))
-        arguments = [*first, "--ros-args", "--params-file", str(file), *remap]
-        return self._children.start(lambda: Child(name, module, arguments, log, self._environment))
-
-
 @contextmanager
-def session(*, own: bool = True) -> Iterator[Session]:
-    """Processes that hear nobody else; or, unless `own`, all who are on the present domain."""
+def session(*, own: bool = True) -> Iterator[Children]:
+    """Processes on a ROS domain of their own; or, unless `own`, on the present one."""
     with ExitStack() as stack:
-        name = stack.enter_context(tempfile.TemporaryDirectory())
-        environment = {**os.environ, "ROS_LOG_DIR": name}
+        directory = stack.enter_context(tempfile.TemporaryDirectory())
+        environment = {**os.environ, "ROS_LOG_DIR": directory}
         if own:
             environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
             environment["ROS_DOMAIN_ID"] = str(stack.enter_context(own_domain()))
-        children = stack.enter_context(Children())
-        yield Session(children, Path(name), environment)
+        yield stack.enter_context(Children(Path(directory), environment))
+
+
+def start_player(
+    children: Children, kind: str, parameters: Mapping[str, object], namespace: str = ""
+) -> Child:
+    """Start a player of `COMMANDS` or `STATES`."""
+    remap = ["-r", f"__ns:=/{namespace}"] if namespace else []
+    return children.start_node("player", parameters, *remap, arguments=[kind], any_node=True)
 
 
 def wait_for_player(player: Child, others: Sequence[Child], progress: Progress, tell: Tell) -> None:
@@ -76,11 +47,9 @@ def wait_for_player(player: Child, others: Sequence[Child], progress: Progress, 
     Raises:
         RunError: it, or one of the others, has failed; with its last words.
     """
-    rest = ""
     while True:
         ended = player.exit_code is not None  # asked before, so that nothing it says is missed
-        *lines, rest = (rest + player.read_output()).split("\n")
-        for line in lines:
+        for line in player.read_lines():
             if line.startswith(WAITING):
                 tell(line)
             elif line.startswith(TICK):

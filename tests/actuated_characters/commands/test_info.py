@@ -69,19 +69,14 @@ def pendulum() -> Made:
 # Files and topics
 
 
-def test_topics_have_counts_rates_and_largest_gaps(facts: BagFacts, fall: Eventful) -> None:
-    topic = {topic.name: topic for topic in facts.contents.topics}["/joint_states"]
+def test_the_bag_and_its_topics_are_described(facts: BagFacts, fall: Eventful) -> None:
+    contents = facts.contents
+    topic = {topic.name: topic for topic in contents.topics}["/joint_states"]
     times = np.array(fall.log_times_ns)
 
-    assert topic.type_name == "sensor_msgs/msg/JointState"
-    assert topic.count == TICKS + 1
+    assert (topic.type_name, topic.count) == ("sensor_msgs/msg/JointState", TICKS + 1)
     assert topic.rate_hz == pytest.approx(TICKS / ((times[-1] - times[0]) / 1e9))
     assert topic.largest_gap_ns == np.diff(times).max() == 2_004 * MS
-
-
-def test_the_bag_is_described(facts: BagFacts) -> None:
-    contents = facts.contents
-
     assert set(contents.files) == {"bag.mcap", "metadata.yaml"}
     assert contents.files["bag.mcap"] == (contents.bag / "bag.mcap").stat().st_size
     assert (contents.storage, contents.version) == ("mcap", 9)
@@ -89,7 +84,7 @@ def test_the_bag_is_described(facts: BagFacts) -> None:
 
 
 @pytest.mark.parametrize(
-    ("storage", "compression", "said"),
+    ("storage", "compression", "named"),
     [
         ("mcap", "none", "none"),
         ("mcap", "zstd", "zstd (chunks)"),
@@ -97,26 +92,18 @@ def test_the_bag_is_described(facts: BagFacts) -> None:
         ("sqlite3", "zstd", "zstd (message)"),
     ],
 )
-def test_storage_and_compression_are_named(
-    pendulum: Made, tmp_path: Path, storage: str, compression: str, said: str
+def test_storage_compression_and_a_topic_without_messages_are_named(
+    pendulum: Made, tmp_path: Path, storage: str, compression: str, named: str
 ) -> None:
     with BagWriter(tmp_path / "bag", storage=storage, compression=compression) as bag:
         add_to(bag, pendulum.messages())
+        bag.add_topic("/contacts", topics.CONTACTS.message_type, topics.CONTACTS.qos)
 
     contents = read_contents(tmp_path)
 
-    assert (contents.storage, contents.compression) == (storage, said)
-
-
-def test_a_topic_without_messages_is_listed(pendulum: Made, tmp_path: Path) -> None:
-    with BagWriter(tmp_path / "bag") as bag:
-        add_to(bag, pendulum.messages())
-        topic = topics.CONTACTS
-        bag.add_topic("/contacts", topic.message_type, topic.qos)
-
-    found = {topic.name: topic for topic in read_contents(tmp_path).topics}
-
-    assert found["/contacts"].count == 0 and found["/contacts"].rate_hz is None
+    assert (contents.storage, contents.compression) == (storage, named)
+    empty = {topic.name: topic for topic in contents.topics}["/contacts"]
+    assert empty.count == 0 and empty.rate_hz is None
 
 
 # A character
@@ -134,19 +121,13 @@ def test_a_character_is_described(facts: BagFacts, fall: Eventful) -> None:
     assert facts.lacks is None
 
 
-def test_episodes_and_resets_are_found(facts: BagFacts) -> None:
-    (run,) = facts.runs
+def test_episodes_resets_and_a_pause_by_the_wall_clock_are_found(facts: BagFacts) -> None:
+    (run,), (pause,) = facts.runs, facts.streams[0].pauses
 
     assert run.resets == 1
     assert [episode.start for episode in run.episodes] == pytest.approx([0.0, 31 / 240])
     assert [e.duration for e in run.episodes] == pytest.approx([30 / 240, 29 / 240])
-
-
-def test_a_pause_is_found_by_the_wall_clock(facts: BagFacts) -> None:
-    (pause,) = facts.streams[0].pauses
-
-    assert pause.start == pytest.approx(50 / 240)
-    assert pause.duration == pytest.approx(2.004)
+    assert (pause.start, pause.duration) == pytest.approx((50 / 240, 2.004))
 
 
 def test_pushes_have_their_link_time_and_impulse(facts: BagFacts) -> None:
@@ -199,27 +180,28 @@ def test_several_characters_are_described_each(pendulum: Made, tmp_path: Path) -
 # What is broken or foreign
 
 
-def test_missing_ticks_are_named_and_all_else_is_there(pendulum: Made, tmp_path: Path) -> None:
-    states = [state for row, state in enumerate(pendulum.states) if row not in (4, 5, 8)]
-    messages = [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)]
+def test_missing_ticks_are_named_and_states_that_came_again_count_once(
+    pendulum: Made, tmp_path: Path
+) -> None:
+    some = [state for row, state in enumerate(pendulum.states) if row not in (4, 5, 8)]
+    twice = [*pendulum.states[:3], *pendulum.states[1:]]
+    facts, others = (
+        look_at(
+            write_bag(
+                tmp_path / f"{len(states)}",
+                [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)],
+            )
+        )
+        for states in (some, twice)
+    )
 
-    facts = look_at(write_bag(tmp_path / "bag", messages))
-
-    (stream,) = facts.streams
+    (stream,), (again,) = facts.streams, others.streams
     assert stream.missing == [(5, 6), (9, 9)]  # ticks begin at 1
     assert stream.missing_count == 3
     assert stream.character == "pendulum"
     assert facts.runs == () and facts.lacks is not None and "5" in facts.lacks
-
-
-def test_states_that_were_published_again_count_once(pendulum: Made, tmp_path: Path) -> None:
-    states = [*pendulum.states[:3], *pendulum.states[1:]]
-    messages = [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)]
-
-    (stream,) = look_at(write_bag(tmp_path / "bag", messages)).streams
-
-    assert stream.repeated == 2
-    assert stream.missing == [] and stream.ticks == len(pendulum.states) - 1
+    assert again.repeated == 2
+    assert again.missing == [] and again.ticks == len(pendulum.states) - 1
 
 
 def test_a_bag_of_something_else_has_its_topics(
@@ -327,22 +309,24 @@ def test_the_tables_are_printed(
 # The wall clock
 
 
-def test_ticks_are_late_by_the_schedule() -> None:
-    period = 0.01
-    due = np.arange(8) * period
-    delay = np.array([0.0, 0.001, 0.0, 0.025, 0.015, 0.005, 0.0, 0.0])
-    published = START_NS + np.round(1e9 * (due + delay)).astype(np.intp)
+@pytest.mark.parametrize(
+    ("period", "times", "late"),
+    [
+        (
+            0.01,
+            np.arange(8) * 0.01 + [0.0, 0.001, 0.0, 0.025, 0.015, 0.005, 0.0, 0.0],
+            [0.0, 0.001, 0.0, 0.025, 0.015, 0.005, 0.0, 0.0],
+        ),
+        # after a long delay the schedule begins again
+        (0.05, [0.0, 0.05, 0.10, 0.35, 0.40, 0.45], [0.0, 0.0, 0.0, 0.2, 0.0, 0.0]),
+    ],
+)
+def test_ticks_are_late_by_the_schedule(
+    period: float, times: list[float], late: list[float]
+) -> None:
+    published = START_NS + np.round(1e9 * np.array(times)).astype(np.intp)
 
-    np.testing.assert_allclose(lateness(published, period), delay, atol=1e-9)
-
-
-def test_after_a_long_delay_the_schedule_begins_anew() -> None:
-    times = np.array([0.0, 0.05, 0.10, 0.35, 0.40, 0.45])  # 0.2 s late once
-    published = START_NS + np.round(1e9 * times).astype(np.intp)
-
-    late = lateness(published, 0.05)
-
-    np.testing.assert_allclose(late, [0.0, 0.0, 0.0, 0.2, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(lateness(published, period), late, atol=1e-9)
 
 
 @pytest.mark.parametrize("every", [12, 24, 48])

@@ -45,6 +45,8 @@ def test_a_study_leaves_pictures_and_a_table_and_no_runs(tmp_path: Path) -> None
     assert rows and all(len(row) == len(header) for row in rows)
     assert not (directory / "runs").exists()
     assert str(directory) in done.stdout.replace("\n", "")
+    progress = [line for line in done.stderr.splitlines() if line.startswith("equation: run ")]
+    assert progress[0].startswith("equation: run 1 of ") and len(progress) > 1
 
 
 def test_what_is_there_is_not_overwritten_unasked(tmp_path: Path) -> None:

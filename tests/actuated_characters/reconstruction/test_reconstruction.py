@@ -23,7 +23,7 @@ from actuated_characters.reconstruction.reconstruction import Job, Reconstructio
 from actuated_characters.reconstruction.search import Progress, Settings, result, search
 from actuated_characters.reconstruction.workers import Workers
 from actuated_characters.reconstruction.world import Branch, Grown, Place, TrialWorld
-from actuated_characters.runs.planned_wrenches import pushes_within
+from actuated_characters.runs.planned_wrenches import parse_pushes_within
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
 from tests.support.ros import wait_until
 
@@ -306,8 +306,8 @@ def test_pushes_that_it_was_found_with_come_again_unless_others_are_given(
 def test_pushes_that_would_begin_at_the_end_or_later_are_left_out() -> None:
     plan = Problem("humanoid", "kick", 0.2).plan()
 
-    assert not pushes_within(["root:1,0,0@0.199", "root:1,0,0@0.2", "root:1,0,0@9"], plan)
-    assert len(pushes_within(["root:1,0,0@0.197"], plan)) == 1
+    assert not parse_pushes_within(["root:1,0,0@0.199", "root:1,0,0@0.2", "root:1,0,0@9"], plan)
+    assert len(parse_pushes_within(["root:1,0,0@0.197"], plan)) == 1
 
 
 def test_no_push_goes_with_no_other(
@@ -388,6 +388,7 @@ def test_the_command_writes_a_file_and_a_table(
         (("--output", "walk.json", "--resume"), "cannot resume from"),
         (("--output", "walk.json", "--push", "root:1,2"), "write it as LINK:FX,FY,FZ@S"),
         (("--output", "walk.json", "--push", "root:9,0,0@9"), "time is 9.0 s; it must be 0 s to"),
+        (("--clip", "walk"), "reconstructions/humanoid-walk.json exists; --resume goes on"),
         ((*SET, "controller_node.law:=pd"), "'law' is pd"),
         ((*SET, "controller_node.law:=pd", "--workers", "2"), "'law' is pd"),
         ((*SET, "controller_node.planner:=none"), "reconstruct sets it itself"),
@@ -404,6 +405,8 @@ def test_a_mistake_is_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there.json").write_text("{}")
+    (tmp_path / "reconstructions").mkdir()
+    (tmp_path / "reconstructions" / "humanoid-walk.json").touch()
 
     code = main(["reconstruct", *options, *(() if "--workers" in options else ("--workers", "1"))])
 

@@ -1,8 +1,7 @@
 """Pushes that are planned before a run: sent in time, by a process that ends with the run."""
 
-import json
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,14 +10,15 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import Recording, read_recording
-from actuated_characters.runs.execution import run_in_process, run_over_topics
+from actuated_characters.runs.execution import run_in_process
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.planned_files import write_planned
+from actuated_characters.runs.planned_throws import PlannedThrow, read_throws
 from actuated_characters.runs.planned_wrenches import (
     PlannedPush,
-    planned_push,
+    plan_push,
     read_pushes,
-    write_pushes,
 )
 from actuated_characters.runs.run_directory import prepare_directory, read_figures
 from controller_node.parameters import make_controller
@@ -26,11 +26,13 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
+from msgs_config.messages.throw import ProjectileThrow
 from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import character
 from tests.support.ros import Processes
+from tests.support.runs import family, run_plan
 
 RATE = 240
 TICKS = 60
@@ -40,7 +42,6 @@ HUMANOID = character("humanoid")
 LINKS = [link.name for link in HUMANOID.links]
 BEYOND = CLOCK.stamp_ns(1000)  # after the run
 HAND = (0.01, -0.02, 0.03)  # m, in the link's frame
-_FAMILY = "ACTUATED_CHARACTERS_TEST"  # an environment variable that all of a run's processes have
 
 # which tick each begins with, in no order: the first one, one that overlaps another, the last one
 PUSHES: list[tuple[int, str, tuple[float, ...], tuple[float, float, float] | None]] = [
@@ -84,19 +85,6 @@ def states_without_ros(plan: Plan, pushes: Sequence[ExternalWrench]) -> list[Sta
     return states
 
 
-def living(mark: str) -> list[int]:
-    """Processes that were started with a mark in their environment, and live."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdecimal():
-            try:
-                if mark.encode() in (entry / "environ").read_bytes():
-                    found.append(int(entry.name))
-            except OSError:  # it has ended, or is somebody else's
-                continue
-    return found
-
-
 @dataclass(frozen=True)
 class Made:
     """A run with pushes over topics, and what it has left."""
@@ -105,26 +93,15 @@ class Made:
     recording: Recording
     summary: dict[str, Any]
     most_alive: int  # of its processes at once
-    left: list[int]  # of them, after it
+    left: int  # of them, after it
 
 
 @pytest.fixture(scope="module")
 def pushed(tmp_path_factory: pytest.TempPathFactory) -> Made:
     directory, mark = tmp_path_factory.mktemp("pushed") / "run", uuid.uuid4().hex
-    prepare_directory(directory, overwrite=False)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("ROS_DOMAIN_ID", raising=False)
-        patch.setenv(_FAMILY, mark)
-        alive: list[int] = []
-        run_over_topics(
-            plan_of(),
-            directory,
-            write_bag=True,
-            progress=lambda _: alive.append(len(living(mark))),
-            pushes=PLANNED,
-        )
+    most_alive = run_plan(plan_of(), directory, mark, pushes=PLANNED)
     summary, _ = read_figures(directory)
-    return Made(directory, read_recording(directory), summary, max(alive), living(mark))
+    return Made(directory, read_recording(directory), summary, most_alive, len(family(mark)))
 
 
 # A run with pushes
@@ -168,15 +145,6 @@ def test_the_states_are_those_of_one_process_with_the_same_pushes_to_the_bit(pus
 
 
 @pytest.mark.slow
-def test_the_states_are_those_without_pushes_until_the_first_one_acts(pushed: Made) -> None:
-    alone = states_without_ros(plan_of(), [])
-
-    first = pushed.recording.velocity[1] - alone[1].velocity
-    assert pushed.recording.position[0].tobytes() == alone[0].position.tobytes()
-    assert np.abs(first).max() > 0.01
-
-
-@pytest.mark.slow
 def test_a_run_in_one_process_takes_the_same_pushes(pushed: Made, tmp_path: Path) -> None:
     prepare_directory(tmp_path / "run", overwrite=False)
 
@@ -189,7 +157,7 @@ def test_a_run_in_one_process_takes_the_same_pushes(pushed: Made, tmp_path: Path
 @pytest.mark.slow
 def test_nothing_is_left_behind_but_what_was_planned(pushed: Made) -> None:
     assert pushed.most_alive == 4
-    assert pushed.left == []
+    assert pushed.left == 0
     assert_same(read_pushes(pushed.directory / "parameters" / "pushes.json"), PLANNED)
     assert (pushed.directory / "logs" / "pusher.log").read_text() == ""
 
@@ -213,27 +181,27 @@ def test_a_push_for_a_time_after_the_run_never_acts() -> None:
     [(0.0, 1), (0.1, 25), (0.1 + 1e-9, 25), (0.103, 26), (39 / RATE, 40), (0.2479, 60)],
 )
 def test_a_push_is_planned_for_the_tick_nearest_to_its_time(time: float, tick: int) -> None:
-    push = planned_push(plan_of(), "chest", (1.0, 2.0, 3.0), time)
+    push = plan_push(plan_of(), "chest", (1.0, 2.0, 3.0), time)
 
     expected = PlannedPush(CLOCK.stamp_ns(tick), "chest", (1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
     assert push == expected
 
 
-WRONG_PLANS: dict[str, tuple[str, tuple[float, float, float], float, list[str]]] = {
-    "unknown link": ("chset", (1.0, 0.0, 0.0), 0.0, ["'chset'", "did you mean 'chest'?"]),
-    "no finite force": ("chest", (1.0, np.nan, 0.0), 0.0, ["'chest'", "nan", "finite"]),
-    "before the run": ("chest", (1.0, 0.0, 0.0), -0.1, ["-0.1 s", "0.25 s"]),
-    "at its end": ("chest", (1.0, 0.0, 0.0), 0.25, ["less than 0.25 s"]),
-    "at no time": ("chest", (1.0, 0.0, 0.0), np.nan, ["nan s"]),
-}
-
-
-@pytest.mark.parametrize("wrong", WRONG_PLANS)
-def test_a_push_that_cannot_act_is_refused_in_a_line(wrong: str) -> None:
-    link, force, time, expected = WRONG_PLANS[wrong]
-
+@pytest.mark.parametrize(
+    ("link", "force", "time", "expected"),
+    [
+        ("chset", 1.0, 0.0, ["'chset'", "did you mean 'chest'?"]),
+        ("chest", np.nan, 0.0, ["'chest'", "nan", "finite"]),
+        ("chest", 1.0, -0.1, ["-0.1 s", "0.25 s"]),
+        ("chest", 1.0, 0.25, ["less than 0.25 s"]),
+        ("chest", 1.0, np.nan, ["nan s"]),
+    ],
+)
+def test_a_push_that_cannot_act_is_rejected_in_a_line(
+    link: str, force: float, time: float, expected: list[str]
+) -> None:
     with pytest.raises(ConfigurationError) as caught:
-        planned_push(plan_of(), link, force, time)
+        plan_push(plan_of(), link, (force, 0.0, 0.0), time)
 
     line = str(caught.value)
     assert "\n" not in line and all(part in line for part in expected)
@@ -242,12 +210,22 @@ def test_a_push_that_cannot_act_is_refused_in_a_line(wrong: str) -> None:
 # Its file
 
 
+EXACT = [
+    *PLANNED,
+    PlannedPush(2**53 + 1, "chest", (0.1, 1e-300, -1e300, 1 / 3, 0.0, -0.0), HAND),
+]
+A_BALL = ProjectileThrow(0.1, 1 / 3, (1e-300, -0.0, 1 / 7), (0.3, 0.0, -1.0))
+BALLS = [PlannedThrow(2**53 + 1, A_BALL), PlannedThrow(1, A_BALL)]
+
+
 def test_what_is_written_is_read_to_the_bit(tmp_path: Path) -> None:
-    exact = PlannedPush(2**53 + 1, "chest", (0.1, 1e-300, -1e300, 1 / 3, 0.0, -0.0), HAND)
+    write_planned(tmp_path / "pushes.json", EXACT)
+    write_planned(tmp_path / "throws.json", BALLS)
 
-    write_pushes(tmp_path / "pushes.json", [*PLANNED, exact])
-
-    assert_same(read_pushes(tmp_path / "pushes.json"), [*PLANNED, exact])
+    assert_same(read_pushes(tmp_path / "pushes.json"), EXACT)
+    found = read_throws(tmp_path / "throws.json")
+    assert [each.stamp_ns for each in found] == [1, 2**53 + 1]
+    assert found[1].throw.numbers().tobytes() == A_BALL.numbers().tobytes()
 
 
 def assert_same(pushes: Sequence[PlannedPush], others: Sequence[PlannedPush]) -> None:
@@ -259,27 +237,31 @@ def assert_same(pushes: Sequence[PlannedPush], others: Sequence[PlannedPush]) ->
         assert said.points.tobytes() == expected.points.tobytes()
 
 
-WRONG_FILES: dict[str, str | bytes] = {
-    "no JSON": "tomorrow",
-    "no list": json.dumps({"stamp_ns": 1}),
-    "a list of numbers": "[1, 2]",
-    "another key": json.dumps([{"stamp_ns": 1, "link": "chest", "force": [1, 2, 3]}]),
-    "a key less": json.dumps([{"stamp_ns": 1, "link": "chest"}]),
-    "no text": b"\xff\xfe\x00",
-}
+WRONG_FILES: list[tuple[Callable[[Path], object], str, bytes]] = [
+    (read_pushes, "pushes", b"tomorrow"),
+    (read_pushes, "pushes", b'{"stamp_ns": 1}'),
+    (read_pushes, "pushes", b"[1, 2]"),
+    (read_pushes, "pushes", b'[{"stamp_ns": 1, "link": "chest", "force": [1, 2, 3]}]'),
+    (read_pushes, "pushes", b'[{"stamp_ns": 1, "link": "chest"}]'),
+    (read_pushes, "pushes", b"\xff\xfe\x00"),
+    (read_throws, "throws", b"tomorrow"),
+    (read_throws, "throws", b"[1]"),
+    (read_throws, "throws", b'[{"stamp_ns": 1, "throw": {"mass": 2.0}}]'),
+]
 
 
-@pytest.mark.parametrize("wrong", WRONG_FILES)
-def test_a_file_that_holds_no_pushes_is_refused_in_a_line(tmp_path: Path, wrong: str) -> None:
-    content = WRONG_FILES[wrong]
-    file = tmp_path / "pushes.json"
-    file.write_bytes(content.encode() if isinstance(content, str) else content)
+@pytest.mark.parametrize(("read", "what", "content"), WRONG_FILES)
+def test_a_file_that_holds_something_else_is_rejected_in_a_line(
+    tmp_path: Path, read: Callable[[Path], object], what: str, content: bytes
+) -> None:
+    file = tmp_path / "planned.json"
+    file.write_bytes(content)
 
     with pytest.raises(RecordingError) as caught:
-        read_pushes(file)
+        read(file)
 
     line = str(caught.value)
-    assert line.startswith(f"{file} holds no pushes: ") and "\n" not in line
+    assert line.startswith(f"{file} holds no {what}: ") and "\n" not in line
 
 
 def test_a_pusher_without_its_file_ends_with_one_clear_line(

@@ -1,7 +1,8 @@
 """Balls that are thrown at a link in a run: they hit it when they should, and are replayed."""
 
-import json
+import re
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,30 +12,33 @@ import pytest
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
-from actuated_characters.runs.execution import run_in_process, run_over_topics
+from actuated_characters.runs.execution import run_in_process
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import Plan, make_plan
 from actuated_characters.runs.planned_throws import (
-    Aim,
     PlannedThrow,
+    ThrowRequest,
+    parse_throw,
+    plan_throw,
     plan_throws,
-    planned_throw,
-    read_aim,
-    read_throws,
-    write_throws,
 )
-from actuated_characters.runs.planned_wrenches import planned_push
+from actuated_characters.runs.planned_wrenches import plan_push
 from actuated_characters.runs.run_directory import prepare_directory, read_figures
-from controller_node.parameters import make_controller
+from actuated_characters.runs.throw_hits import (
+    States,
+    describe_hits,
+    find_hit,
+    read_states,
+    watch_states,
+)
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
-from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.sphere_sweep import find_impact
 from tests.support.physics import character
-from tests.support.ros import Processes
+from tests.support.runs import run_plan
 
 RATE = 240
 CLOCK = TickClock(RATE)
@@ -50,36 +54,28 @@ def plan_of(
     return make_plan("humanoid", seconds, reference or HELD, simulator, {})
 
 
-@dataclass(frozen=True)
-class Hit:
-    """What a ball does in a run of one."""
+def first_hit(plan: Plan, planned: PlannedThrow) -> tuple[int, tuple[str, ...], FloatArray]:
+    """Run a plan until a ball first touches the character, by the engine's own list.
 
-    tick: int  # of the state after the step in which it first touches
-    links: tuple[str, ...]  # that it touches then
-    before: FloatArray  # (13,) its motion in the state before
-    let_go: int  # the tick of the state in which it is let go
+    Returns the tick of the state after that step, the links that it touches, and its motion (13,)
+    in the state before. The command finds the same.
+    """
+    states: States = []
+    found: list[tuple[int, tuple[str, ...]]] = []
 
+    def watch(run: Simulation) -> None:
+        watch_states(states, run)
+        balls = run._world.balls._numbers
+        if balls and (links := _touching(run, balls[0])):
+            found.append((run.tick, links))
 
-def first_hit(plan: Plan, planned: PlannedThrow) -> Hit:
-    """Run a plan with a throw until the ball touches something."""
-    controller = make_controller(plan.character, plan.reference, plan.controller)
-    with Simulation(
-        [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
-    ) as run:
-        (actor,) = run.actors
-        start, let_go = run.stamp_ns, run.clock.first_tick_from(planned.stamp_ns)
-        motion = np.zeros(13)
-        for _ in range(plan.ticks):
-            effort, _ = controller.compute_effort(actor.state, start)
-            run.step([effort], None, [planned.throw] if run.tick == let_go else ())
-            touched = run._world.touched_links()
-            balls = run._world.balls._numbers
-            if balls and balls[0] in touched:
-                links = _touching(run, balls[0])
-                return Hit(run.tick, links, motion, let_go)
-            if balls:
-                motion = run.ball_motion()[0]
-    raise AssertionError("it has hit nothing")
+    for _ in ticks_in_process(plan, (), [planned], watch=watch):
+        if found:
+            break
+    (tick, links) = found[0]
+    time, link = find_hit(plan, planned, 0, states) or (0.0, "")
+    assert (round(time * RATE), link in links) == (tick - 1, True)
+    return tick, links, states[-2][1][0]
 
 
 def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
@@ -104,12 +100,12 @@ def test_a_ball_hits_its_target_at_its_time_from_its_side(
     plan = plan_of(1.0, reference)
     speed = 6.0 if reference is HELD else 12.0  # a walk is some centimetres from its reference
 
-    planned, before = planned_throw(plan, Aim(1.0, speed, 0.8, "neck", side, radius=0.06))
-    hit = first_hit(plan, planned)
+    planned, before = plan_throw(plan, ThrowRequest(1.0, speed, 0.8, "neck", side, radius=0.06))
+    tick, links, motion = first_hit(plan, planned)
 
-    assert before == () and hit.links == ("neck",)
-    assert abs((hit.tick - 1) - 0.8 * RATE) <= 2.0
-    came = -hit.before[7:10] / np.linalg.norm(hit.before[7:10])
+    assert before == () and links == ("neck",)
+    assert abs((tick - 1) - 0.8 * RATE) <= 2.0
+    came = -motion[7:10] / np.linalg.norm(motion[7:10])
     angle = {"front": 0.0, "left": 90.0, "back": 180.0, "right": 270.0}.get(side)
     expected = np.array((0.0, 0.0, 1.0))
     if side != "above":
@@ -133,10 +129,10 @@ def test_a_small_ball_from_far_away_is_aimed_at_the_surface(radius: float, dista
 
 def test_a_side_turns_with_the_character() -> None:
     turned = plan_of(placement=[1.0, 2.0, 0.0, np.pi / 2.0])
-    aim = Aim(1.0, 6.1, 0.8, "neck", "front", radius=0.06)
+    aim = ThrowRequest(1.0, 6.1, 0.8, "neck", "front", radius=0.06)
 
-    throw, _ = planned_throw(turned, aim)
-    plain, _ = planned_throw(plan_of(), aim)
+    throw, _ = plan_throw(turned, aim)
+    plain, _ = plan_throw(plan_of(), aim)
 
     x, y, z = plain.throw.position
     assert throw.throw.position == pytest.approx((1.0 - y, 2.0 + x, z), abs=1e-5)
@@ -150,13 +146,10 @@ def test_a_side_turns_with_the_character() -> None:
 def test_a_ball_flies_at_its_speed_and_upwards_as_gravity_takes_away(
     simulator: dict[str, object],
 ) -> None:
-    if "rate" in simulator:
-        plan = make_plan("humanoid", 1.0, HELD, simulator, {})
-    else:
-        plan = plan_of(**simulator)
+    plan = plan_of(**simulator)
     rate = plan.simulator.integer("rate")
 
-    planned, _ = planned_throw(plan, Aim(1.0, 5.0, 0.9, "neck", "right", 3.0, 0.06))
+    planned, _ = plan_throw(plan, ThrowRequest(1.0, 5.0, 0.9, "neck", "right", 3.0, 0.06))
 
     vx, vy, vz = planned.throw.velocity
     time = 0.9 - (TickClock(rate).first_tick_from(planned.stamp_ns) - 1) / rate
@@ -181,42 +174,42 @@ def test_what_is_in_the_way_is_said() -> None:
 
 
 def test_a_throw_is_read_as_it_is_written() -> None:
-    assert read_aim("mass=2 speed=8 at=2.0 from=left target=chest") == Aim(
+    assert parse_throw("mass=2 speed=8 at=2.0 from=left target=chest") == ThrowRequest(
         2.0, 8.0, 2.0, "chest", "left"
     )
-    assert read_aim("at=1,speed=3,target=neck,mass=1,distance=4,radius=0.1,from=-30") == Aim(
-        1.0, 3.0, 1.0, "neck", "-30", 4.0, 0.1
-    )
-    assert Aim(7.0, 1.0, 1.0, "neck").size == natural_radius(7.0)
+    assert parse_throw(
+        "at=1,speed=3,target=neck,mass=1,distance=4,radius=0.1,from=-30"
+    ) == ThrowRequest(1.0, 3.0, 1.0, "neck", "-30", 4.0, 0.1)
+    assert ThrowRequest(7.0, 1.0, 1.0, "neck").size == natural_radius(7.0)
 
 
 GOOD = ["mass=2", "speed=8", "at=0.9", "target=chest"]
-WRONG: dict[str, tuple[str, list[str]]] = {
-    "a link that is none": ("target=chset", ["'chset'", "did you mean 'chest'?"]),
-    "no speed": ("speed=0", ["speed is 0; it must be above 0"]),
-    "hardly moving": ("speed=1e-309", ["speed is 1e-309 m/s; it must be 0.001 m/s or more"]),
-    "from another country": ("distance=2e5", ["distance is 200000 m", "from 1969.49 m at most"]),
-    "from another world": ("distance=1e300", ["distance is 1e+300 m", "at most"]),
-    "backwards": ("speed=-3", ["speed is -3"]),
-    "no mass": ("mass=0", ["mass is 0"]),
-    "too heavy": ("mass=1e9 radius=0.1", ["mass is 1e+09; it must be 0.001 to 10000"]),
-    "too fast": ("speed=5e3", ["at most 1000 m/s"]),
-    "too early": ("at=0.1", ["at is 0.1 s", "the ball needs", "let it hit later"]),
-    "before the run": ("at=-1", ["at is -1 s; it must be 0 s to less than 1 s"]),
-    "after the run": ("at=1", ["at is 1 s"]),
-    "no time": ("at=nan", ["at is 'nan'"]),
-    "from nowhere": ("from=below", ["from is 'below'", "an angle in degrees, or one of front"]),
-    "no number": ("speed=fast", ["speed is 'fast'; it must be a number"]),
-    "another key": ("velocity=3", ["'velocity'", "speed"]),
-    "no pair": ("hard", ["'hard': write it as 'mass=2"]),
-    "inside it": ("distance=0.1", ["distance is 0.1 m", "nearer than the radius"]),
-    "in the ground": ("target=right_ankle", ["in the ground", "'radius'"]),
-}
+WRONG: list[tuple[str, ...]] = [  # in place of the good ones, and parts of the error
+    ("target=chset", "'chset'", "did you mean 'chest'?"),
+    ("speed=0", "speed is 0; it must be above 0"),
+    ("speed=1e-309", "speed is 1e-309 m/s; it must be 0.001 m/s or more"),
+    ("distance=2e5", "distance is 200000 m", "from 1969.49 m at most"),
+    ("distance=1e300", "distance is 1e+300 m", "at most"),
+    ("speed=-3", "speed is -3"),
+    ("mass=0", "mass is 0"),
+    ("mass=1e9 radius=0.1", "mass is 1e+09; it must be 0.001 to 10000"),
+    ("speed=5e3", "at most 1000 m/s"),
+    ("at=0.1", "at is 0.1 s", "the ball needs", "let it hit later"),
+    ("at=-1", "at is -1 s; it must be 0 s to less than 1 s"),
+    ("at=1", "at is 1 s"),
+    ("at=nan", "at is 'nan'"),
+    ("from=below", "from is 'below'", "an angle in degrees, or one of front"),
+    ("speed=fast", "speed is 'fast'; it must be a number"),
+    ("velocity=3", "'velocity'", "speed"),
+    ("hard", "'hard': write it as 'mass=2"),
+    ("distance=0.1", "distance is 0.1 m", "nearer than the radius"),
+    ("target=right_ankle", "in the ground", "'radius'"),
+]
 
 
-@pytest.mark.parametrize("wrong", WRONG)
-def test_a_throw_that_cannot_be_is_refused_in_a_line(wrong: str) -> None:
-    changed, expected = WRONG[wrong]
+@pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: wrong[0])
+def test_a_throw_that_cannot_be_is_rejected_in_a_line(wrong: tuple[str, ...]) -> None:
+    changed, *expected = wrong
     text = " ".join(part for part in GOOD if part.split("=")[0] + "=" not in changed)
 
     with pytest.raises(ConfigurationError) as caught:
@@ -232,43 +225,14 @@ def test_what_a_throw_needs_is_named(key: str) -> None:
     rest = [part for part in GOOD if not part.startswith(f"{key}=")]
 
     with pytest.raises(ConfigurationError, match=f"'{key}' is missing; write it as"):
-        read_aim(" ".join(rest))
+        parse_throw(" ".join(rest))
     with pytest.raises(ConfigurationError, match="'from' twice"):
-        read_aim("from=left from=right")
+        parse_throw("from=left from=right")
 
 
 def test_no_more_balls_than_an_episode_may_have() -> None:
     with pytest.raises(ConfigurationError, match="at most 100"):
         plan_throws(plan_of(), ["mass=2 speed=8 at=0.9 target=chest"] * 101)
-
-
-# Its file
-
-
-def test_what_is_written_is_read_to_the_bit(tmp_path: Path) -> None:
-    exact = PlannedThrow(
-        2**53 + 1, ProjectileThrow(0.1, 1 / 3, (1e-300, -0.0, 1 / 7), (0.3, 0.0, -1.0))
-    )
-    early = PlannedThrow(1, exact.throw)
-
-    write_throws(tmp_path / "throws.json", [exact, early])
-
-    found = read_throws(tmp_path / "throws.json")
-    assert [each.stamp_ns for each in found] == [1, 2**53 + 1]
-    assert found[1].throw.numbers().tobytes() == exact.throw.numbers().tobytes()
-
-
-@pytest.mark.parametrize(
-    "content", ["tomorrow", "[1]", json.dumps([{"stamp_ns": 1, "throw": {"mass": 2.0}}])]
-)
-def test_a_file_that_holds_no_throws_is_refused_in_a_line(tmp_path: Path, content: str) -> None:
-    file = tmp_path / "throws.json"
-    file.write_text(content)
-
-    with pytest.raises(RecordingError) as caught:
-        read_throws(file)
-
-    assert str(caught.value).startswith(f"{file} holds no throws: ")
 
 
 # A run
@@ -294,12 +258,9 @@ THROWN = [
 @pytest.fixture(scope="module")
 def thrown(tmp_path_factory: pytest.TempPathFactory) -> Made:
     directory = tmp_path_factory.mktemp("thrown") / "run"
-    prepare_directory(directory, overwrite=False)
     plan = make_plan("humanoid", 0.75, WALK, {"ball_lifetime": 0.25}, {"behaviour": "reactive"})
     throws, _ = plan_throws(plan, THROWN)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("ROS_DOMAIN_ID", raising=False)
-        run_over_topics(plan, directory, write_bag=True, progress=lambda _: None, throws=throws)
+    run_plan(plan, directory, throws=throws)
     summary, _ = read_figures(directory)
     return Made(plan, throws, directory, read_recording(directory), summary)
 
@@ -327,6 +288,38 @@ def test_a_run_in_one_process_takes_the_same_throws(thrown: Made, tmp_path: Path
 
     summary, _ = read_figures(tmp_path / "run")
     assert summary["state_hash"] == thrown.summary["state_hash"]
+
+
+@pytest.mark.slow
+def test_the_bag_says_whether_each_ball_hit_and_when(thrown: Made) -> None:
+    states = read_states(thrown.directory)
+    assert states is not None
+    seen: States = []
+    for _ in ticks_in_process(thrown.plan, (), thrown.throws, watch=partial(watch_states, seen)):
+        pass
+
+    words = describe_hits(thrown.plan, thrown.throws, states)
+
+    (first, at), (second, later) = (re.findall(r"'(\w+)' at ([\d.]+) s", each)[0] for each in words)
+    assert (first, second) == ("chest", "root")
+    assert (float(at), float(later)) == pytest.approx((0.5, 0.6), abs=0.02)
+    assert describe_hits(thrown.plan, thrown.throws, seen) == words
+    before = round(0.4 * RATE)  # s: neither has come by then
+    assert describe_hits(thrown.plan, thrown.throws, states[:before]) == ["missed", "missed"]
+    assert "not known" in describe_hits(thrown.plan, thrown.throws, None)[0]
+
+
+@pytest.mark.parametrize("aside", [0.0, 3.0])
+def test_a_ball_that_bounces_on_the_ground_has_missed(aside: float) -> None:
+    plan = plan_of(1.0)
+    ball = ProjectileThrow(1.0, 0.1, (0.05, aside, 2.5), (0.0, 0.0, -2.0))
+    throws, states = [PlannedThrow(CLOCK.stamp_ns(1), ball)], list[Any]()
+
+    for _ in ticks_in_process(plan, (), throws, watch=partial(watch_states, states)):
+        pass
+
+    (words,) = describe_hits(plan, throws, states)
+    assert words == "missed" if aside else words.startswith("hit ")
 
 
 @pytest.mark.slow
@@ -395,21 +388,11 @@ def test_a_recording_of_throws_alone_is_replayed_without_them_and_says_so(thrown
 @pytest.mark.slow
 def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path: Path) -> None:
     directory = tmp_path / "run"
-    prepare_directory(directory, overwrite=False)
     plan = plan_of(0.25)
     throws, _ = plan_throws(plan, ["mass=1 speed=10 at=0.2 distance=1 target=neck radius=0.05"])
-    pushes = [planned_push(plan, "chest", (10.0, 0.0, 0.0), 0.1)]
+    pushes = [plan_push(plan, "chest", (10.0, 0.0, 0.0), 0.1)]
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("ROS_DOMAIN_ID", raising=False)
-        run_over_topics(
-            plan,
-            directory,
-            write_bag=False,
-            progress=lambda _: None,
-            pushes=pushes,
-            throws=throws,
-        )
+    run_plan(plan, directory, write_bag=False, pushes=pushes, throws=throws)
 
     summary, _ = read_figures(directory)
     assert summary["ticks"] == 60
@@ -420,34 +403,3 @@ def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path
     run_in_process(plan, directory, progress=lambda _: None, pushes=pushes, throws=throws)
     again, _ = read_figures(directory)
     assert again["state_hash"] == summary["state_hash"]
-
-
-# The command
-
-
-REFUSED = [
-    (["--throw", "mass=2 speed=8 at=0.9 target=chset"], ["throw 'mass=2", "did you mean 'chest'"]),
-    (
-        ["--behaviour", "ragdoll", "--set", "controller_node.behaviour:=reactive"],
-        ["--behaviour is ragdoll", "reactive", "give one of them"],
-    ),
-    (
-        ["--behaviour", "reactive", "--set", "controller_node.hit.threshold:=50"],
-        ["'limp.threshold' is 30 N s", "50 N s"],
-    ),
-]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("arguments", "expected"), REFUSED)
-def test_the_command_refuses_in_a_line(
-    arguments: list[str], expected: list[str], tmp_path: Path, processes: Processes
-) -> None:
-    output = ["--output", str(tmp_path / "run"), "--duration", "1", "--in-process"]
-
-    run = processes.command("run", *arguments, *output)
-
-    assert run.wait() == 1
-    (line,) = run.stderr.splitlines()
-    assert line.startswith("error: ") and all(part in line for part in expected), line
-    assert not (tmp_path / "run").exists()

@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +22,7 @@ from msgs_config.messages.session import is_session
 from msgs_config.runtime.polling import DirectSubscription
 from tests.sim_node.interface.test_inbox import mutants
 from tests.support.ros import Client, Processes, joint_state, wait_until, wrench_message
+from tests.support.runs import summary_of
 
 pytestmark = pytest.mark.slow
 
@@ -49,10 +49,6 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> str:
         return str(summary_of(folder / "run")["state_hash"])
     finally:
         processes.end()
-
-
-def summary_of(directory: Path) -> dict[str, Any]:
-    return dict(json.loads((directory / "summary.json").read_text()))
 
 
 class Noise(Client):

@@ -16,8 +16,8 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.runs.ros_domain import own_domain
 from msgs_config.messages import topics
 from msgs_config.runtime.process import LEAVE_TIME
-from tests.actuated_characters.runs.test_execution import Run
 from tests.support.ros import PATIENCE, Process, Processes, SimulatorClient, wait_until
+from tests.support.runs import Run
 
 pytestmark = pytest.mark.slow
 
