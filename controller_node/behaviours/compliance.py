@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from controller_node.control_laws import GainArrays
-from controller_node.strength import limits_of
+from controller_node.control_laws import GainArrays, scale_limits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
@@ -47,7 +46,7 @@ class ComplianceProfile:
         Source: Zordan and Hodgins 2002, "Motion capture-driven simulations that hit and react".
         """
         entries = np.repeat(strengths, self._layout.vector_lengths)
-        limits = limits_of(gains.effort_limits, strengths)
+        limits = scale_limits(gains.effort_limits, strengths)
         if self._layout.has_floating_base:
             limits[:2] = np.minimum(limits[:2], (root_force, root_torque))
         return GainArrays(

@@ -39,6 +39,16 @@ class Knots:
     velocities: FloatArray | None = None  # (p, n), a rotation's in the child frame
     accelerations: FloatArray | None = None  # (p, n), their rates of change
 
+    def __getitem__(self, rows: slice) -> "Knots":
+        """Some of the knots, in order."""
+        whole = self.configurations
+        return Knots(
+            self.times[rows],
+            GeneralizedPosition(whole.position[rows], whole.orientations_xyzw[rows]),
+            None if self.velocities is None else self.velocities[rows],
+            None if self.accelerations is None else self.accelerations[rows],
+        )
+
 
 class Curve:
     """A motion through knots, at rest before the first and from the last one on.

@@ -356,8 +356,7 @@ class Stance:
         state, model, layout = self._run.state, self._model, self._run.layout
         model.update(state.position, state.velocity)
         posture = stable_pd_effort(
-            lambda force, added: model.solve(force, added, self._period),
-            model.bias_force(),
+            model,
             self._posture.stiffness,
             self._posture.damping,
             model.error_of(state.position, self.pose),

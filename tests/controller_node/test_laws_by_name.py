@@ -245,7 +245,7 @@ def test_the_same_state_twice_does_not_advance_the_integral() -> None:
 
 def moving_arm(name: str, by: Controller, rate: int) -> LoneSimulation:
     """An arm in the state that the controller's reference begins with."""
-    first = by._reference.sample(0.0)
+    first = by._own_reference.sample(0.0)
     return simulation(
         name,
         rate=rate,

@@ -51,12 +51,12 @@ def bring_parameters(
         ActuatedCharactersError: there is no such character or clip, or its file is malformed.
     """
     from actuated_characters.runs.plan import SHARED
-    from controller_node.references.files.reconstructed import read_found_with
+    from controller_node.references.files.reconstructed import SUFFIX, ReconstructedClip
     from msgs_config.character.loading import load_character
 
-    if clip is None:
+    if clip is None or not clip.endswith(SUFFIX):
         return None
-    found = read_found_with(load_character(character), clip)
+    found = ReconstructedClip(load_character(character), clip).found_with
     if found is None:
         return None
     taken = {name for name in SHARED if name in simulator or name in controller}

@@ -6,13 +6,12 @@ keeps its value of the keyframe before, at the first one that of the rest pose.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from controller_node.references.keyframes import Keyframes, overshoots
 from controller_node.references.limits import LARGEST_NUMBER, SHORTEST_TIME, JointLimits
 from msgs_config import files
 from msgs_config.arrays import FloatArray
@@ -25,6 +24,16 @@ _KEYS = ["interpolation", "loop", "period", "keyframes"]
 _KEYFRAME_KEYS = ["time", "pose"]
 _INTERPOLATIONS = ["smooth", "linear"]
 _SHOWN = 200  # characters
+
+
+@dataclass(frozen=True)
+class Keyframes:
+    """The keyframes of a file, in a character's layout and where it stands."""
+
+    times: FloatArray  # (p,) s, rising
+    configurations: GeneralizedPosition  # (p, n), (p, k, 4)
+    smooth: bool  # else linear
+    period: float | None = None  # s, of a loop
 
 
 def read_keyframes(character: Character, path: str) -> Keyframes:
@@ -51,13 +60,12 @@ def read_keyframes(character: Character, path: str) -> Keyframes:
             raise MotionError(f"{place} is {_shown(item)}; it must be a mapping with 'time'")
         _check_keys(place, item, _KEYFRAME_KEYS)
     times = _times(places, items)
-    keyframes = Keyframes(
+    return Keyframes(
         times=np.array(times),
         configurations=_configurations(character, _positions(character, places, items)),
         smooth=interpolation == "smooth",
         period=_period(file, content, times[-1]),
     )
-    return replace(keyframes, warnings=overshoots(character, keyframes))
 
 
 def _times(places: list[str], items: list[dict[str, Any]]) -> list[float]:

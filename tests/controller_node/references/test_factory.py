@@ -7,19 +7,14 @@ import pytest
 
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import Plan, make_plan
-from controller_node.references import factory as module
-from controller_node.references.base import Reference, ReferenceState
+from controller_node.references import keyframes as module
+from controller_node.references.base import Motion, Reference, ReferenceState
 from controller_node.references.clip import ClipReference
-from controller_node.references.factory import (
-    KEYFRAMES_DIRECTORY,
-    MOTION_PARAMETERS,
-    Motion,
-    make_motion,
-)
+from controller_node.references.factory import MOTION_PARAMETERS, make_motion
 from controller_node.references.files.clip import read_clip
 from controller_node.references.files.keyframes import read_keyframes
 from controller_node.references.hold import HoldReference
-from controller_node.references.keyframes import KeyframesReference
+from controller_node.references.keyframes import KEYFRAMES_DIRECTORY, KeyframesReference
 from controller_node.references.signals import SineReference, StepReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
@@ -160,8 +155,7 @@ def test_what_the_author_of_keyframes_may_have_overlooked_is_noted(tmp_path: Pat
 
     made = motion_of(PANDA, reference="keyframes", keyframes=str(file))
 
-    assert made.warnings == read_keyframes(PANDA, str(file)).warnings
-    assert any("panda_joint1" in warning for warning in made.warnings)
+    assert "panda_joint1" in made.warnings[0]
 
 
 def test_a_step_has_the_size_the_time_and_the_degrees_of_freedom_given() -> None:
