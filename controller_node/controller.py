@@ -138,7 +138,7 @@ class Controller:
 
     @property
     def outlook(self) -> Outlook | None:
-        """What a planner expects of its plan; None without one."""
+        """The expectation of the plan in force; None without a planner."""
         return None if self.planner is None else self.planner.outlook
 
     @property
@@ -256,7 +256,7 @@ class Controller:
     def _observe(
         self, state: StampedState, stamp_ns: int, contacts: FloatArray | None
     ) -> Observation:
-        """What the behaviour sees of a state, and of the stamp that it answers."""
+        """The behaviour's view of a state, for the answer to a stamp."""
         if contacts is None and self.needs_contacts:
             raise ConfigurationError("the behaviour needs the contacts of each state's tick")
         next_stamp = self.clock.stamp_ns(self.clock.tick(state.stamp_ns) + 1)
@@ -292,7 +292,7 @@ class Controller:
         return self._effective
 
     def _take(self, output: BehaviourOutput, stamp_ns: int) -> None:
-        """Take a behaviour's phase, and what it has tracked from now on."""
+        """Take a behaviour's phase and target from now on."""
         if self.mode is None or self.mode.phase is not output.phase:
             self.mode = ModeReport(output.phase, stamp_ns)
         if output.target is not self._tracked.target:
@@ -315,7 +315,7 @@ class Controller:
         return self.layout.clipped(effort, gains.effort_limits)
 
     def _offset(self, state: StampedState, gains: GainArrays) -> FloatArray | None:
-        """What a planner adds to the tracking errors (n,); None without."""
+        """The offset of a planner to the tracking errors (n,); None without."""
         if self.planner is None:
             return None
         if not gains.stiffness[6:].any():

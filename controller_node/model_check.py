@@ -1,4 +1,4 @@
-"""Whether the controller's model can be used, and is that of a simulator's character."""
+"""Checks of the controller's model: on its own, and against a simulator's probe."""
 
 import numpy as np
 

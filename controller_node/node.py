@@ -265,8 +265,8 @@ class ControllerNode(Node):
     def _episode_of(self, state: StampedState) -> int | None:
         """Stamp of the first state of the state's episode; None if it is not known yet.
 
-        The first state says so itself, and begins another episode even with the stamp of the one
-        before: the simulator may have been started again. A controller that joins later learns it
+        A first state, without effort, begins another episode even with the stamp of the one before:
+        the simulator may have been started again. A controller that joins later learns the stamp
         from the latched topic, once.
         """
         if state.effort is None:
@@ -288,7 +288,7 @@ class ControllerNode(Node):
             self._contacts.begin()
 
     def _report(self, *, at_once: bool = False) -> None:
-        """Publish the diagnostics if they are due and anybody listens."""
+        """Publish the diagnostics if they are due and there is a subscriber."""
         now = time.monotonic()
         if now < self._next_report and not at_once:
             return

@@ -1,4 +1,4 @@
-"""What can be chosen by name: control laws, references and behaviours."""
+"""Registries of control laws, references and behaviours by name."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar

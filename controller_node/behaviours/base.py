@@ -1,4 +1,4 @@
-"""What a behaviour sees in a tick, what it returns, and the behaviours by name."""
+"""Input and output of a behaviour in a tick, and the behaviours by name."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

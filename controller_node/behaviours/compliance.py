@@ -20,12 +20,8 @@ class ComplianceProfile:
         For a joint that is the inertia about its axes of all that it moves.
         """
         layout = character.layout
-        turning = [
-            joint
-            for joint in layout.joints
-            if joint.type in (JointType.REVOLUTE, JointType.SPHERICAL)
-        ]
-        self._starts = layout.vector_starts
+        types = JointType.REVOLUTE, JointType.SPHERICAL
+        turning = [joint for joint in layout.joints if joint.type in types]
         self._turning = layout.mask(joint.name for joint in turning)
         # one inertia a joint, so that a ball joint stays as firm in all directions
         self._inertias = np.ones(layout.size)
@@ -72,13 +68,12 @@ def softened(character: Character, struck: int, softness: float) -> FloatArray:
     """
     distances = _distances(character, struck)
     strengths: list[float] = []
-    for link in character.links:
-        if link.joint.type is JointType.FIXED:
-            continue
-        near = min(distances[character.links.index(link)], distances[max(link.parent, 0)])
-        share = softness + (1.0 - softness) * min(near / _REACH, 1.0)
-        vectors = character.layout.joint(link.joint.name).vectors
-        strengths += [1.0 if link.joint.type is JointType.FLOATING else share] * len(vectors)
+    for link, distance in zip(character.links, distances.tolist(), strict=True):
+        if link.joint.type is JointType.FLOATING:
+            strengths += [1.0, 1.0]
+        elif link.joint.type is not JointType.FIXED:
+            near = min(distance, float(distances[max(link.parent, 0)]))
+            strengths.append(softness + (1.0 - softness) * min(near / _REACH, 1.0))
     return np.array(strengths)
 
 

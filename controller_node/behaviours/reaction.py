@@ -4,7 +4,7 @@
     REACT, or TRACK -> LIMP -> SEARCH -> BLEND (getting up) -> TRACK
 
 Source: Zordan, Majkowska, Chiu and Fast 2005, "Dynamic Response for Motion Capture Animation".
-What the control law tracks is continuous throughout: at each change it goes on as it moves.
+The target of the control law is continuous in position and velocity at each change.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ _STILL_TIME, _LONGEST_LIMP = 0.4, 5.0  # s
 
 @dataclass(frozen=True)
 class ReactionKit:
-    """What all episodes of one controller have in common."""
+    """The parts that all episodes of one controller share."""
 
     character: Character
     settings: ReactionSettings

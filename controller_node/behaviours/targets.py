@@ -1,4 +1,4 @@
-"""What a reaction tracks in each phase; at a change an offset leads on from the target before."""
+"""Targets of a reaction's phases; at a change an offset leads on from the target before."""
 
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,4 +1,4 @@
-"""Which of the simulators that are heard the controller belongs to, and what those say."""
+"""The simulator that the controller is bound to, among all that publish."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ _ALONE_AFTER = 1.0  # s in which another simulator would have been discovered
 
 @dataclass
 class _Known:
-    """What one simulator has said of itself."""
+    """The configuration and episode that one simulator published."""
 
     configuration: RunConfiguration | None = None
     is_checked: bool = False
@@ -51,8 +51,8 @@ class _Known:
 class Simulators:
     """Takes `~/configuration` and `episode` of all simulators, and binds to one of them.
 
-    It binds to the session that is given, or else to the first whose state can be used. What the
-    others say is rejected, counted, and logged once for each.
+    It binds to the session that is given, or else to the first whose state can be used. Messages of
+    the others are rejected, counted, and logged once for each.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Simulators:
         self._episodes = DirectSubscription(node, topics.EPISODE.for_listener(depth))
         self._configurations = DirectSubscription(node, _CONFIGURATION.for_listener(depth))
         self.runs_on = False
-        """Whether the simulator waits for nobody."""
+        """Whether the simulator runs in real time, and waits for no answer."""
 
     @property
     def bound(self) -> str | None:
@@ -88,7 +88,7 @@ class Simulators:
 
     @property
     def counts(self) -> dict[str, int]:
-        """What was rejected, for the diagnostics."""
+        """Numbers of rejected messages, for the diagnostics."""
         counts = self._foreign.counts
         return {
             "foreign_states": counts[topics.JOINT_STATES.name],
@@ -98,7 +98,7 @@ class Simulators:
         }
 
     def look(self, now: float) -> None:
-        """Take what simulators have said of themselves; `now` in s of wall time.
+        """Take episodes and configurations of simulators; `now` in s of wall time.
 
         Raises:
             ActuatedCharactersError: the one that it is bound to, or the only one that there is,
@@ -135,9 +135,9 @@ class Simulators:
         return False
 
     def episode_before(self, stamp_ns: int) -> int | None:
-        """Stamp of the first state of the episode that goes on at a stamp, as the simulator says.
+        """Stamp of the first state of the episode that goes on at a stamp, from `episode`.
 
-        None if it does not, or not yet; after a while that is logged.
+        None if it is not known yet; after a while that is logged.
         """
         session = self._binding.bound
         known = None if session is None else self._known.get(session)
@@ -225,9 +225,9 @@ class Simulators:
 
         A second one may be running for long and only not be discovered yet.
         """
-        told = [known for known in self._known.values() if known.configuration is not None]
-        errors = [error for known in told if (error := self._checked(known)) is not None]
-        if not errors or len(errors) < len(told) or self._count_publishers() > 1:
+        configured = [known for known in self._known.values() if known.configuration is not None]
+        errors = [error for known in configured if (error := self._checked(known)) is not None]
+        if not errors or len(errors) < len(configured) or self._count_publishers() > 1:
             self._unusable_since = None
         elif self._unusable_since is None:
             self._unusable_since = self._now

@@ -1,4 +1,4 @@
-"""What every reference offers, and the references by name."""
+"""The interface of a reference, and the references by name."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -24,7 +24,7 @@ _DECAY = np.array(
 
 
 class InertializationOffset:
-    """What leads from one motion to another at a time, and decays from there on.
+    """The difference of two motions at a time, which decays from there on.
 
     It is added to coordinates, and turns rotations in their child frames: `q exp(d(t))`. With
     R the turn by d and w the angular velocity of d, that moves at `R' v + w` for a v of q.

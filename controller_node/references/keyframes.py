@@ -24,7 +24,7 @@ class KeyframesReference:
     """Keyframes in time.
 
     A loop goes on from the last keyframe to the first one of the next period, and is periodic from
-    time 0 on. Else the first keyframe is held until its time comes, and the last one ever after.
+    time 0 on. Else the first keyframe is held until its time comes, and the last one from then on.
     """
 
     def __init__(self, layout: JointLayout, keyframes: Keyframes) -> None:

@@ -200,7 +200,7 @@ class TrajectoryReference:
         return TrajectoryReference(self.character, kept, curve, waiting)
 
     def _until(self, start: float, now: float) -> tuple[Reference, int]:
-        """What holds until a trajectory's start, and how many are yet to begin then."""
+        """The reference until a trajectory's start, and how many are yet to begin then."""
         if self.curve is None or start <= self.curve.start:
             return self.before, 1
         if now < self.curve.start:
@@ -246,7 +246,7 @@ def _check_first(
 
 
 def _lead(layout: JointLayout, start: float, now: ReferenceState, knots: Knots) -> Knots:
-    """What leads from the state at `start` to how the motion through the knots begins."""
+    """The knots of the quintic from the state at `start` to the beginning of the motion."""
     begin = Curve(layout, knots).sample(float(knots.times[0]))  # at rest if there is one knot
     velocity = begin.velocity if knots.velocities is None else knots.velocities[0]
     acceleration = begin.acceleration if knots.accelerations is None else knots.accelerations[0]

@@ -8,7 +8,6 @@ import pytest
 from controller_node.actuation import describe_actuation, net_wrench
 from controller_node.parameters import PARAMETERS, character_parameters, commanded_joints
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
@@ -27,9 +26,7 @@ from tests.support.physics import (
     free_random_state,
     link_motions,
     momentum,
-    random_rotation_vector,
     random_state,
-    simulation,
     without_self_collision,
 )
 from tests.support.ros import ControllerClient, Processes, joint_state, stamp_ns
@@ -122,45 +119,6 @@ def test_otherwise_it_is_the_roots_force_and_its_torque_turned_to_the_world(name
     np.testing.assert_allclose(torque, axes @ effort[3:6], rtol=0.0, atol=1e-12)
     force[:] = 0.0  # it is the caller's own
     assert effort.tolist() == before.tolist()
-
-
-@pytest.mark.parametrize("assistance", [True, False])
-@floating_characters
-def test_it_is_what_changes_the_engines_momentum_over_a_tick_in_flight(
-    name: str, assistance: bool
-) -> None:
-    # Arrange: at rest, and so gently moved that the arm of the force hardly changes
-    whole = character(name)
-    rng = np.random.default_rng(3)
-    effort = random_effort(whole, rng, 1.0)
-    effort[:6] = assistance * np.append(rng.uniform(20.0, 50.0, 3), rng.uniform(2.0, 5.0, 3))
-    start = np.array(whole.rest_position)
-    start[3:6] = random_rotation_vector(rng)
-    joints = [ROOT] * assistance + whole.layout.actuated_joint_names
-    with simulation(
-        name,
-        rate=RATE,
-        substeps=SUBSTEPS,
-        terrain="none",
-        commanded_joints=joints,
-        initial_position=start.tolist(),
-    ) as run:
-        body, position = run.actor._body, run.state.position
-        (centre, spin_before), (linear_before, _) = spin(body, whole), momentum(body, whole)
-        force, torque = net_wrench(whole.layout, whole.layout.configuration(position), effort)
-
-        # Act
-        run.advance(effort)
-        linear, (_, spin_after) = momentum(body, whole)[0], spin(body, whole)
-        applied = run.state.effort
-
-    # Assert
-    assert applied is not None and applied.tolist() == effort.tolist()
-    moment = torque + np.cross(position[:3] - centre, force)
-    assert (np.abs(moment).max() > 1.0) == assistance
-    expected = whole.mass * GRAVITY + force
-    np.testing.assert_allclose(RATE * (linear - linear_before), expected, atol=5e-3)
-    np.testing.assert_allclose(RATE * (spin_after - spin_before), moment, atol=5e-3)
 
 
 @pytest.mark.parametrize("assistance", [True, False])

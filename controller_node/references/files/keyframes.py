@@ -96,7 +96,7 @@ def _period(file: Path, content: dict[str, Any], last: float) -> float | None:
 
 
 def _positions(character: Character, places: list[str], items: list[dict[str, Any]]) -> FloatArray:
-    """The poses (p, n) as the file says them, message form."""
+    """The poses (p, n) of the file, message form."""
     limits, layout = JointLimits(character), character.layout
     index_of = {name: index for index, name in enumerate(layout.dof_names)}
     position, rows = _rest_in_own_world(character), []

@@ -404,19 +404,6 @@ def test_strengths_and_gains_of_zero_count_while_it_gives_way() -> None:
     assert soft["right_knee"] > 0.0 and soft["right_shoulder"] > 0.0
 
 
-def test_a_joint_without_gains_does_not_count_in_their_mean() -> None:
-    model = DynamicsModel(HUMANOID)
-    model.update(np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size))
-    off = {"gains.left_knee.p": 0.0, "gains.left_knee.d": 0.0}
-    gains, ones = driver(off).settings.gains, np.ones(len(LAYOUT.vector_starts))
-
-    scaled = ComplianceProfile(HUMANOID, np.diag(model.mass_matrix())).gains(gains, ones, 1.0, 1.0)
-
-    heads = [joint.start for joint in LAYOUT.joints[1:] if joint.name != "left_knee"]
-    assert scaled.stiffness[LAYOUT.joint("left_knee").start] == 0.0
-    assert scaled.stiffness[heads].mean() == pytest.approx(gains.stiffness[heads].mean())
-
-
 def test_gains_by_inertia_keep_their_mean_and_make_all_joints_swing_alike() -> None:
     # Arrange
     model = DynamicsModel(HUMANOID)

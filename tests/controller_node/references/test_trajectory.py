@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.polynomial import Polynomial
 
 from controller_node.references.base import Reference
 from controller_node.references.curve import Curve
@@ -162,34 +161,6 @@ def test_at_the_points_it_moves_as_they_say(name: str, degree: int) -> None:
             if points.accelerations is not None and (number < 2 or at < time):
                 expected = points.accelerations[number]
                 np.testing.assert_allclose(state.acceleration, expected, atol=1e-3)
-
-
-@every_degree
-def test_after_the_first_point_a_polynomial_of_its_degree_is_met_exactly(degree: int) -> None:
-    # the last point is at rest, as it must be: degree 1 is a constant up to there
-    first = (
-        Polynomial([0.3, 0.1]) if degree == 1 else Polynomial([0.2, 0.3, -0.5, 0.1][: degree + 1])
-    )
-    if degree > 1:
-        stop = first.deriv(1)(TIMES[-1])
-        first = first - Polynomial([0.0, stop])
-    values = [first.deriv(order)(TIMES) if order else first(TIMES) for order in range(3)]
-    columns = [np.array(value)[:, np.newaxis] * [1.0, -1.0] for value in values]
-    points = TrajectoryPoints(
-        PAIR,
-        TIMES,
-        columns[0],
-        columns[1] if degree > 1 else None,
-        columns[2] if degree > 3 else None,
-    )
-    reference = TrajectoryReference(PANDA, HoldReference(PANDA)).replaced(points, START)
-
-    for time in np.linspace(TIMES[0], TIMES[-1] - 1e-6, 12).tolist():
-        state = reference.sample(START + time)
-        expected = np.array([first(time), -first(time)])
-        np.testing.assert_allclose(state.configuration.position[COLUMNS], expected, atol=1e-12)
-        slope = first.deriv(1)(time)
-        np.testing.assert_allclose(state.velocity[COLUMNS], [slope, -slope], atol=1e-11)
 
 
 @pytest.mark.parametrize("name", ["franka_panda", *FLOATING], ids=character_id)
