@@ -50,21 +50,6 @@ def pd_effort(
     return stiffness * error + damping * velocity_error
 
 
-def pid_effort(
-    stiffness: FloatArray,  # (n,) N m/rad or N/m
-    damping: FloatArray,  # (n,) N m s/rad or N s/m
-    integral_gain: FloatArray,  # (n,) N m/(rad s) or N/(m s)
-    error: FloatArray,  # (n,) reference against state
-    velocity_error: FloatArray,  # (n,) reference minus state
-    integral: FloatArray,  # (n,) of the error over time, rad s or m s
-) -> FloatArray:
-    """Proportional-integral-derivative control: PD, and `Ki` times the integral of the error.
-
-    It leaves no steady-state error. On a mass m it is stable for `0 < ki < kp kd / m`.
-    """
-    return pd_effort(stiffness, damping, error, velocity_error) + integral_gain * integral
-
-
 def anti_windup_mask(
     effort: FloatArray,  # (n,) that the integral takes part in, not clipped
     clipped: FloatArray,  # (n,) what the limits leave of it
@@ -264,7 +249,11 @@ def _implicit(
 
 
 class Pid:
-    """PID, the one law with a memory: its integral is zero at the beginning of an episode."""
+    """Proportional-integral-derivative control: PD, and `Ki` times the integral of the error.
+
+    It leaves no steady-state error. On a mass m it is stable for `0 < ki < kp kd / m`. It is the
+    one law with a memory: its integral is zero at the beginning of an episode.
+    """
 
     def __init__(self, context: LawContext) -> None:
         self._context = context
@@ -274,13 +263,13 @@ class Pid:
     def __call__(self, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
         """The effort (n,), with the error up to the present in its integral."""
         error, velocity_error = _errors(self._context, tracking)
-        fixed = gains.stiffness, gains.damping, gains.integral, error, velocity_error
+        direct = pd_effort(gains.stiffness, gains.damping, error, velocity_error)
         if self._last_time is not None:
             layout = self._context.layout
             grown = self._integral + (tracking.time - self._last_time) * error
-            effort = pid_effort(*fixed, grown)
+            effort = direct + gains.integral * grown
             clipped = layout.clipped(effort, gains.effort_limits)
             stays = anti_windup_mask(effort, clipped, error, layout)
             self._integral = np.where(stays, self._integral, grown)
         self._last_time = tracking.time
-        return pid_effort(*fixed, self._integral)
+        return direct + gains.integral * self._integral

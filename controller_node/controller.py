@@ -91,7 +91,6 @@ class Controller:
         """
         self.layout, self.clock = character.layout, TickClock(rate_hz)
         self.planner = planner
-        self.mode: ModeReport | None = None  # since which state which mode holds
         self._character = character
         self._model = DynamicsModel(character, gravity)
         check_inertia(self._model, character)
@@ -99,11 +98,12 @@ class Controller:
         self._balance = Balance(character, character.feet) if character.feet else None
         self.check(settings)
         self._settings = settings
-        self._choice = behaviour or BehaviourChoice()
+        choice = behaviour or BehaviourChoice()
+        self._make_behaviour = choice.make
+        self.needs_contacts = choice.needs_contacts  # of the tick before, to answer a state
         self._own_reference = reference
         self._no_contacts = np.zeros((len(character.links), 6))
-        self._episode_ns: int | None = None
-        self._forget_episode(0)
+        self.begin_episode(0)  # until a state says of which episode it is
 
     def _enter_episode(self, episode_ns: int) -> None:
         """Begin the episode of a stamp, unless it has begun."""
@@ -115,21 +115,18 @@ class Controller:
 
         A simulator that was started again begins with the same stamp as before.
         """
-        self._forget_episode(episode_ns)
         self._episode_ns = episode_ns
-        if self.planner is not None:
-            self.planner.begin_episode(self.clock.first_tick_from(episode_ns))
-
-    def _forget_episode(self, episode_ns: int) -> None:
-        self.mode = None
+        self.mode: ModeReport | None = None  # since which state which mode holds
         self._law: Law = make_law(self._settings.law, self._context)
-        self._behaviour = self._choice.make()
+        self._behaviour = self._make_behaviour()
         self._strengths = StrengthSchedule(self.layout)
         self._effective: _EffectiveGains | None = None
         self._tracked = TrackedReference(
             self._character, self._own_reference, self.clock, episode_ns
         )
         self._tracked.follows_velocity = self._settings.follows_velocity
+        if self.planner is not None:
+            self.planner.begin_episode(self.clock.first_tick_from(episode_ns))
 
     def while_planning(self, act: Callable[[], None]) -> None:
         """Call a function, which must not change this, repeatedly while waiting for a plan."""
@@ -140,11 +137,6 @@ class Controller:
     def outlook(self) -> Outlook | None:
         """The expectation of the plan in force; None without a planner."""
         return None if self.planner is None else self.planner.outlook
-
-    @property
-    def needs_contacts(self) -> bool:
-        """Whether the answer to a state depends on the contacts of the tick before."""
-        return self._choice.needs_contacts
 
     @property
     def settings(self) -> Settings:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from typing import Protocol, TypeAlias
 
 from controller_node.behaviours.targets import Target
@@ -87,29 +88,18 @@ class ModeReport:
 
 
 class Tracking:
-    """Follows the reference with the gains in force, whatever comes."""
+    """Follows the reference with the gains in force, whatever comes; one mode for the episode."""
 
-    def __init__(self) -> None:
+    def __init__(self, mode: Mode = Mode.TRACK) -> None:
+        """`LIMP` is the mode of a ragdoll, whose law is `zero`."""
         self.carry = PlanarTransform()
+        self._mode = mode
         self._output: BehaviourOutput | None = None
 
     def advance(self, seen: Observation) -> BehaviourOutput:
         """The reference and the gains as they are."""
         if self._output is None:
-            phase = Phase(Mode.TRACK, {"assistance": seen.assistance()})
-            self._output = BehaviourOutput(phase)
-        return self._output
-
-
-class Ragdoll:
-    """Follows nothing; the law beside it is `zero`."""
-
-    def __init__(self) -> None:
-        self.carry = PlanarTransform()
-        self._output = BehaviourOutput(Phase(Mode.LIMP, {"assistance": "none"}))
-
-    def advance(self, seen: Observation) -> BehaviourOutput:
-        """The reference as it is, which the law does not follow."""
+            self._output = BehaviourOutput(Phase(self._mode, {"assistance": seen.assistance()}))
         return self._output
 
 
@@ -133,4 +123,4 @@ def _tracking(character: Character, values: Values) -> BehaviourChoice:
 
 @BEHAVIOURS.offer("ragdoll")
 def _ragdoll(character: Character, values: Values) -> BehaviourChoice:
-    return BehaviourChoice(Ragdoll)
+    return BehaviourChoice(partial(Tracking, Mode.LIMP))

@@ -8,12 +8,12 @@ The target of the control law is continuous in position and velocity at each cha
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from controller_node.behaviours.base import BehaviourOutput, Mode, Observation, Phase
-from controller_node.behaviours.compliance import ComplianceProfile, softened
+from controller_node.behaviours.compliance import ReactionGains
 from controller_node.behaviours.hit_detection import WINDOW, Hit, HitDetector
 from controller_node.behaviours.motion_library import Match, MotionLibrary
 from controller_node.behaviours.posture import Posture
@@ -24,7 +24,7 @@ from controller_node.behaviours.targets import (
     ReferenceTarget,
     Target,
 )
-from controller_node.control_laws import GainArrays, scale_gains
+from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference
@@ -35,7 +35,6 @@ from msgs_config.geometry import rotations
 
 _SEVERE = 2.0 / 3.0  # of the threshold above which it goes limp: the full reaction
 _ONTO = 0.6  # of the blend's duration, until the motion that was found is reached
-_FIRM_AGAIN = 0.2  # s, in which the joints are as firm as before a hit
 _STILL_SPEED = 0.1  # m/s: it lies still with less kinetic energy than all of it at that speed
 _STILL_TIME, _LONGEST_LIMP = 0.4, 5.0  # s
 
@@ -65,10 +64,11 @@ class Reaction:
         self._layout = kit.character.layout
         self._settings = kit.settings
         self._detector = HitDetector(kit.character, kit.period)
+        self._phase_gains = ReactionGains(kit.character, kit.settings, kit.model.weight, kit.plans)
         self._own = ReferenceTarget(self._layout)
         self._target: Target = self._own
         self._hit = Hit(0, 0.0)  # the last one
-        self._begin(0.0, Mode.TRACK, self._begin_tracking, self._firm)
+        self._begin(0.0, Mode.TRACK, self._begin_tracking, self._phase_gains.firm)
 
     @property
     def carry(self) -> PlanarTransform:
@@ -86,14 +86,14 @@ class Reaction:
         still = np.zeros(self._layout.size)
         self._body = ReferenceState(self._layout.configuration(seen.position), seen.velocity, still)
         self._step(seen, hit)
-        return BehaviourOutput(self._phase, self._target, self._gains(seen))
+        return BehaviourOutput(self._phase, self._target, self._gains(seen, self._elapsed(seen)))
 
     def _begin(
         self,
         time: float,
         mode: Mode,
         step: _Step,
-        gains: Callable[[Observation], GainArrays],
+        gains: Callable[[Observation, float], GainArrays],
         **facts: object,
     ) -> None:
         """Begin a phase with the step that may end it and the gains that hold in it."""
@@ -111,7 +111,9 @@ class Reaction:
 
     def _begin_tracking(self, seen: Observation, hit: Hit | None) -> None:
         assistance = seen.assistance()
-        self._begin(seen.time, Mode.TRACK, self._track, self._firm, assistance=assistance)
+        self._begin(
+            seen.time, Mode.TRACK, self._track, self._phase_gains.firm, assistance=assistance
+        )
         self._track(seen, hit)
 
     def _track(self, seen: Observation, hit: Hit | None) -> None:
@@ -148,7 +150,7 @@ class Reaction:
             self._go_limp(seen, "fallen", self._hit)
         elif self._elapsed(seen) >= max(self._severity * self._settings.react_duration, WINDOW):
             facts = self._hit_facts(seen)
-            self._begin(seen.time, Mode.SEARCH, self._search, self._soft, **facts)
+            self._begin(seen.time, Mode.SEARCH, self._search, self._phase_gains.soft, **facts)
 
     def _search(self, seen: Observation, hit: Hit | None) -> None:
         """Go on with the motion that is nearest to what the present state leads to."""
@@ -158,7 +160,7 @@ class Reaction:
         match = library.nearest(library.predicted(self._led(seen), seen.velocity))
         self._follow_clip(library, match, seen, _ONTO * self._settings.blend_duration)
         facts = {"to": "clip", "assistance": seen.assistance(), **match.content()}
-        self._begin(seen.time, Mode.BLEND, self._follow, self._firmer, **facts)
+        self._begin(seen.time, Mode.BLEND, self._follow, self._phase_gains.firmer, **facts)
 
     def _lie(self, seen: Observation, hit: Hit | None) -> None:
         """Wait until the character lies still."""
@@ -170,7 +172,7 @@ class Reaction:
         still = seen.time - self._moved >= _STILL_TIME
         if still or self._elapsed(seen) >= _LONGEST_LIMP:
             facts = {"side": "faceup" if self._faces_up() else "facedown", "assistance": "none"}
-            self._begin(seen.time, Mode.SEARCH, self._find_get_up, self._limp, **facts)
+            self._begin(seen.time, Mode.SEARCH, self._find_get_up, self._phase_gains.limp, **facts)
 
     def _find_get_up(self, seen: Observation, hit: Hit | None) -> None:
         assert isinstance(self._target, CurrentStateTarget)
@@ -188,7 +190,7 @@ class Reaction:
             self._follow_clip(library, match, seen, duration)
             self._rise_until = seen.time + library.duration(clip) - match.time
             facts |= {"to": "clip", **match.content()}
-        self._begin(seen.time, Mode.BLEND, self._rise, self._rising, **facts)
+        self._begin(seen.time, Mode.BLEND, self._rise, self._phase_gains.rising, **facts)
 
     def _rise(self, seen: Observation, hit: Hit | None) -> None:
         if hit is not None and hit.impulse >= self._settings.limp_threshold:
@@ -203,15 +205,14 @@ class Reaction:
     # Changes
 
     def _react(self, seen: Observation, hit: Hit) -> None:
-        kit, settings = self._kit, self._settings
         self._hit = hit
         self._lead = self._layout.difference(
             self._body.configuration, self._desired(seen).configuration
         )
-        diagonal = np.diag(kit.model.mass_matrix())
-        self._compliance = ComplianceProfile(kit.character, diagonal)
-        self._softness = softened(kit.character, hit.link, settings.softness)
-        self._begin(seen.time, Mode.REACT, self._react_on, self._soft, **self._hit_facts(seen))
+        self._phase_gains.give_way(hit.link, np.diag(self._kit.model.mass_matrix()))
+        self._begin(
+            seen.time, Mode.REACT, self._react_on, self._phase_gains.soft, **self._hit_facts(seen)
+        )
 
     @property
     def _severity(self) -> float:
@@ -222,9 +223,12 @@ class Reaction:
         return min(self._hit.impulse / (_SEVERE * self._settings.limp_threshold), 1.0)
 
     def _hit_facts(self, seen: Observation) -> dict[str, object]:
-        name = self._kit.character.links[self._hit.link].name
         share = seen.assistance(self._settings.assistance)
-        return {"link": name, "impulse": self._hit.impulse, "assistance": share}
+        return {**self._facts_of(self._hit), "assistance": share}
+
+    def _facts_of(self, hit: Hit) -> dict[str, object]:
+        name = self._kit.character.links[hit.link].name
+        return {"link": name, "impulse": hit.impulse}
 
     def _go_limp(self, seen: Observation, why: str, hit: Hit | None) -> None:
         """Let everything go; the target comes to the body, which nothing draws to it."""
@@ -234,11 +238,16 @@ class Reaction:
         self._target = CurrentStateTarget(self._body, offset)
         self._moved = seen.time
         self._lead = np.zeros(self._layout.size)
-        facts: dict[str, object] = {"why": why}
-        if hit is not None:
-            name = self._kit.character.links[hit.link].name
-            facts |= {"link": name, "impulse": hit.impulse}
-        self._begin(seen.time, Mode.LIMP, self._lie, self._limp, assistance="none", **facts)
+        facts = {} if hit is None else self._facts_of(hit)
+        self._begin(
+            seen.time,
+            Mode.LIMP,
+            self._lie,
+            self._phase_gains.limp,
+            assistance="none",
+            why=why,
+            **facts,
+        )
 
     def _follow_clip(
         self, library: MotionLibrary, match: Match, seen: Observation, duration: float
@@ -259,48 +268,7 @@ class Reaction:
         offset = InertializationOffset(self._layout, own, self._desired(seen), seen.time, duration)
         self._target = self._own = ReferenceTarget(self._layout, carry, offset)
         facts = {"to": "reference", "assistance": seen.assistance()}
-        self._begin(seen.time, Mode.BLEND, self._return, self._firm, **facts)
-
-    # Gains
-
-    def _firm(self, seen: Observation) -> GainArrays:
-        """The gains in force; of an active ragdoll the root's torque is bounded."""
-        if self._settings.searches:
-            return seen.gains
-        limits = seen.gains.effort_limits.copy()
-        limits[1] = min(limits[1], self._settings.upright_torque)
-        return replace(seen.gains, effort_limits=limits)
-
-    def _soft(self, seen: Observation) -> GainArrays:
-        force = self._settings.assistance * self._kit.model.weight
-        arm = float(seen.now.configuration.position[2])  # of the root's force about the feet
-        strengths = self._softness * seen.strengths
-        return self._compliance.gains(seen.whole_gains, strengths, force, force * abs(arm))
-
-    def _firmer(self, seen: Observation) -> GainArrays:
-        """From the soft gains to those in force; the root's limits are lifted at once."""
-        share = min(self._elapsed(seen) / _FIRM_AGAIN, 1.0)
-        firm = self._firm(seen)
-        if share >= 1.0:
-            return firm
-        soft = self._soft(seen)
-        return replace(
-            firm,
-            stiffness=soft.stiffness + share * (firm.stiffness - soft.stiffness),
-            damping=soft.damping + share * (firm.damping - soft.damping),
-        )
-
-    def _limp(self, seen: Observation) -> GainArrays:
-        return self._weak(seen, 0.0)
-
-    def _rising(self, seen: Observation) -> GainArrays:
-        if self._kit.plans:
-            return self._firm(seen)
-        return self._weak(seen, min(self._elapsed(seen) / self._settings.recovery_duration, 1.0))
-
-    def _weak(self, seen: Observation, strength: float) -> GainArrays:
-        strengths = np.full(len(self._layout.vector_starts), strength)
-        return scale_gains(self._layout, self._firm(seen), strengths)
+        self._begin(seen.time, Mode.BLEND, self._return, self._phase_gains.firm, **facts)
 
     # Places
 

@@ -22,7 +22,6 @@ from msgs_config.geometry import rotations
 
 _KEYS = ["interpolation", "loop", "period", "keyframes"]
 _KEYFRAME_KEYS = ["time", "pose"]
-_INTERPOLATIONS = ["smooth", "linear"]
 _SHOWN = 200  # characters
 
 
@@ -48,8 +47,8 @@ def read_keyframes(character: Character, path: str) -> Keyframes:
     text = files.read_text(file, MotionError)
     content = files.parse_yaml_mapping(file, text, MotionError)
     _check_keys(f"{file}", content, _KEYS)
-    interpolation = content.get("interpolation", _INTERPOLATIONS[0])
-    if interpolation not in _INTERPOLATIONS:
+    interpolation = content.get("interpolation", "smooth")
+    if interpolation not in ("smooth", "linear"):
         raise _wrong(f"{file}: interpolation", interpolation, "'smooth' or 'linear'")
     items = content.get("keyframes")
     if not isinstance(items, list) or not items:
@@ -61,10 +60,10 @@ def read_keyframes(character: Character, path: str) -> Keyframes:
         _check_keys(place, item, _KEYFRAME_KEYS)
     times = _times(places, items)
     return Keyframes(
-        times=np.array(times),
-        configurations=_configurations(character, _positions(character, places, items)),
-        smooth=interpolation == "smooth",
-        period=_period(file, content, times[-1]),
+        np.array(times),
+        _configurations(character, _positions(character, places, items)),
+        interpolation == "smooth",
+        _period(file, content, times[-1]),
     )
 
 

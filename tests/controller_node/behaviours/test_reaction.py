@@ -89,14 +89,6 @@ def reports(whole: Run, mode: Mode) -> list[ModeReport]:
 # Before a hit
 
 
-def test_without_a_hit_it_is_plain_tracking_to_the_bit() -> None:
-    plain, reactive = unhit(), unhit("reactive")
-
-    assert reactive.efforts.tobytes() == plain.efforts.tobytes()
-    assert reactive.positions.tobytes() == plain.positions.tobytes()
-    assert reactive.mode_names() == ["TRACK"]
-
-
 def test_an_active_ragdoll_is_plain_tracking_to_the_bit_until_its_torque_is_bounded() -> None:
     plain, active = unhit(), unhit("active_ragdoll")
     torques = np.linalg.norm(plain.efforts[:, 3:6], axis=1)
@@ -219,17 +211,6 @@ def test_the_response_grows_with_the_impulse() -> None:
     assert peaks[0] > 0.005
     assert peaks == sorted(peaks)
     assert peaks[3] > 0.5
-
-
-def test_the_same_again_is_the_same_to_the_bit() -> None:
-    again = run(
-        {"clip": "walk", "behaviour": "reactive"},
-        3 * RATE_HZ,
-        (ProjectileThrow(SPEED, HIT, direction=FROM_FRONT),),
-        mass=2.0,
-    )
-
-    assert again.efforts.tobytes() == walk(20.0).efforts[: 3 * RATE_HZ].tobytes()
 
 
 # Limp, and up again

@@ -375,11 +375,6 @@ def test_a_rotation_vector_in_parts_is_refused(tmp_path: Path) -> None:
             read(tmp_path, at(0.0), at(1.0, **pose), whole=HUMANOID)
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(MotionError, match="No such file"):
-        read_keyframes(PANDA, str(tmp_path / "none.yaml"))
-
-
 def test_a_rest_pose_beyond_limits_is_not_the_files_fault(tmp_path: Path) -> None:
     # a URDF alone has its rest pose at zero, wherever the limits are
     lower, upper = PANDA.position_bounds()
