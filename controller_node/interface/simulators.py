@@ -43,7 +43,6 @@ class _Known:
     """The configuration and episode that one simulator published."""
 
     configuration: RunConfiguration | None = None
-    is_checked: bool = False
     error: ActuatedCharactersError | None = None  # why this controller is not made for it
     episode_ns: int | None = None
 
@@ -161,9 +160,10 @@ class Simulators:
         if not self._binding.admits(session):
             self._reject(topics.JOINT_STATES.name, session)
             return False
-        if self._binding.bound is None and (error := self._error_of(session)) is not None:
-            if self._unusable_since is None:  # else that is what this node ends with
-                self._once_logger.log_once(f"state ignored: {error}")
+        known = self._known.get(session)
+        if self._binding.bound is None and known is not None and known.error is not None:
+            if self._unusable_since is None:  # else this node ends with that error
+                self._once_logger.log_once(f"state ignored: {known.error}")
             return False
         return True
 
@@ -206,10 +206,10 @@ class Simulators:
             self._reject(_CONFIGURATION.name, found.session)
         known = self._known_of(found.session)
         is_first = known.configuration is None
-        known.configuration, known.is_checked, known.error = found, False, None
+        known.configuration, known.error = found, self._error_of(found)
         if self._binding.bound != found.session:
             return
-        if is_first and self._checked(known) is not None and self._binding.release():
+        if is_first and known.error is not None and self._binding.release():
             return  # its first state came before it, and another simulator may be there
         self._judge(known)
 
@@ -217,8 +217,8 @@ class Simulators:
         """Raise the error if the bound simulator is not what this controller was made for."""
         if known.configuration is not None:
             self.runs_on = known.configuration.parameters.get("mode") == "realtime"
-        if (error := self._checked(known)) is not None:
-            raise error
+        if known.error is not None:
+            raise known.error
 
     def _refuse_the_only_one(self) -> None:
         """Raise the error of the only simulator that there is, if it can never be bound to.
@@ -226,7 +226,7 @@ class Simulators:
         A second one may be running for long and only not be discovered yet.
         """
         configured = [known for known in self._known.values() if known.configuration is not None]
-        errors = [error for known in configured if (error := self._checked(known)) is not None]
+        errors = [known.error for known in configured if known.error is not None]
         if not errors or len(errors) < len(configured) or self._count_publishers() > 1:
             self._unusable_since = None
         elif self._unusable_since is None:
@@ -234,19 +234,13 @@ class Simulators:
         elif self._now > self._unusable_since + _ALONE_AFTER:
             raise errors[-1]
 
-    def _error_of(self, session: str) -> ActuatedCharactersError | None:
-        known = self._known.get(session)
-        return None if known is None else self._checked(known)
-
-    def _checked(self, known: _Known) -> ActuatedCharactersError | None:
-        """Why a simulator is not the one that this controller was made for; checked once."""
-        if known.configuration is not None and not known.is_checked:
-            known.is_checked = True
-            try:
-                self._check(known.configuration)
-            except ActuatedCharactersError as error:
-                known.error = error
-        return known.error
+    def _error_of(self, found: RunConfiguration) -> ActuatedCharactersError | None:
+        """Why a simulator is not the one that this controller was made for."""
+        try:
+            self._check(found)
+        except ActuatedCharactersError as error:
+            return error
+        return None
 
     def _known_of(self, session: str) -> _Known:
         if session not in self._known:

@@ -123,7 +123,7 @@ def test_stable_pd_is_stable_up_to_its_bound(damping: float) -> None:
     assert found == pytest.approx(bound, rel=0.05)
 
 
-def test_p_swings_for_ever() -> None:
+def test_p_swings_forever() -> None:
     track = heights(driver("p", 100.0, 20.0), 30.0)
 
     way = 1.0 - WEIGHT / 100.0
@@ -186,7 +186,7 @@ def state_at(stamp_ns: int, height: float) -> StampedState:
     return StampedState(stamp_ns, np.array([height]), np.zeros(1), None)
 
 
-def test_the_integral_begins_anew_with_an_episode() -> None:
+def test_the_integral_begins_at_zero_with_an_episode() -> None:
     by = driver("pid", 0.0, 0.0, 10.0)
     stamps = [by.clock.stamp_ns(tick) for tick in range(1, 20)]
     for stamp in stamps[:10]:
@@ -200,7 +200,7 @@ def test_the_integral_begins_anew_with_an_episode() -> None:
     assert second[0] == pytest.approx(10.0 * PERIOD, rel=1e-6)
 
 
-def test_the_integral_begins_anew_though_the_first_states_of_the_episode_were_not_seen() -> None:
+def test_the_integral_begins_at_zero_though_the_first_states_of_the_episode_were_not_seen() -> None:
     """As in real time, where some are overtaken."""
     driver = controller("pendulum", law="pid", **{"gains.hinge.i": 100.0})
     clock, rest = driver.clock, np.array(character("pendulum").rest_position)
