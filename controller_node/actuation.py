@@ -1,6 +1,4 @@
-"""What the controller's efforts can do, and what they do to the character as a whole."""
-
-from dataclasses import dataclass
+"""Which degrees of freedom efforts drive, and what efforts do to the character as a whole."""
 
 import numpy as np
 
@@ -9,25 +7,13 @@ from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.geometry import rotations
 
 
-@dataclass(frozen=True)
-class Actuation:
-    """How many degrees of freedom there are, and how many an actuator drives."""
-
-    actuators: int
-    degrees_of_freedom: int
-
-    @property
-    def is_full(self) -> bool:
-        """Whether there is an effort for any acceleration in any state."""
-        return self.actuators >= self.degrees_of_freedom
-
-    def content(self) -> dict[str, int | bool]:
-        """What JSON says of it."""
-        return {
-            "actuators": self.actuators,
-            "degrees_of_freedom": self.degrees_of_freedom,
-            "fully_actuated": self.is_full,
-        }
+def describe_actuation(actuators: int, degrees_of_freedom: int) -> dict[str, int | bool]:
+    """The numbers for JSON; fully actuated is what has an effort for any acceleration."""
+    return {
+        "actuators": actuators,
+        "degrees_of_freedom": degrees_of_freedom,
+        "fully_actuated": actuators >= degrees_of_freedom,
+    }
 
 
 def net_wrench(

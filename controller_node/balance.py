@@ -1,4 +1,4 @@
-"""Balance on two feet by joint efforts alone: what the ground is to do, through the Jacobians.
+"""Balance on two feet by joint efforts alone, which exert ground wrenches by the Jacobians.
 
 A virtual force draws the centre of mass over the middle of the feet. Only the ground can exert it,
 on the soles: each foot gets its part w, and the joints the efforts that press it so against the
@@ -32,19 +32,12 @@ class BalanceGains:
     friction: float = 0.3  # largest horizontal force, as a share of the vertical one
 
 
-@dataclass(frozen=True)
-class _Sole:
-    """The lower face of a foot's box, in the frame of its link."""
-
-    centre: FloatArray  # (3,) m
-    edges: FloatArray  # (3, 2) directions of the face's edges, as columns
-    half_lengths: FloatArray  # (2,) of the edges, m
-    normal: FloatArray  # (3,) away from the ground
+_Sole = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
 class GroundWrenches:
-    """What the ground is to exert on the two feet, world axes."""
+    """The wrenches that the ground is to exert on the two feet, world axes."""
 
     points: FloatArray  # (2, 3) the soles' middles, m
     forces: FloatArray  # (2, 3) N
@@ -82,10 +75,11 @@ class Balance:
         soles = [
             _sole(character, model, foot, turn) for foot, turn in zip(self._feet, axes, strict=True)
         ]
-        self._centres = np.array([sole.centre for sole in soles])
-        self._edges = np.array([sole.edges for sole in soles])
-        self._half_lengths = np.array([sole.half_lengths for sole in soles])
-        self._normals = np.array([sole.normal for sole in soles])
+        # of each sole in the frame of its link: the middle (3,), the directions of its edges as
+        # columns (3, 2), half their lengths (2,), m, and the normal (3,), away from the ground
+        self._centres, self._edges, self._half_lengths, self._normals = (
+            np.array(part) for part in zip(*soles, strict=True)
+        )
 
     def effort(
         self, model: DynamicsModel, gains: BalanceGains, *, with_bias: bool = True
@@ -115,8 +109,8 @@ class Balance:
     def ground_wrenches(self, model: DynamicsModel, gains: BalanceGains) -> GroundWrenches:
         """The virtual force, shared by the feet, and its moment as far as their soles bear it.
 
-        Where they do not bear it all, the force acts beside the centre of mass and turns the body:
-        so bends at the hips who cannot stand otherwise.
+        Where they do not bear it all, the force acts beside the centre of mass and turns the body,
+        which bends at the hips.
         """
         origins, axes = model.link_frames(self._feet)
         points = origins + fixed_order.apply(axes, self._centres)
@@ -160,7 +154,7 @@ def _shift(moment: FloatArray, across: FloatArray, load: float) -> float:
 
 
 def _bearable(moments: FloatArray, edges: FloatArray, limits: FloatArray) -> FloatArray:
-    """What soles bear of moments (2, 3): the parts about their edges (2, 2, 3), which are rows.
+    """The part of moments (2, 3) that soles bear about their edges (2, 2, 3), which are rows.
 
     With each at most its limit (2, 2) in N m, the load times half the other edge's length, the
     centre of pressure is inside the sole.
@@ -178,7 +172,10 @@ def _link(character: Character, name: str) -> int:
 
 
 def _sole(character: Character, model: DynamicsModel, foot: int, axes: FloatArray) -> _Sole:
-    """The lower face of a foot whose link frame has its axes (3, 3) so in the rest pose."""
+    """Middle, edges, half lengths and normal of the lower face of a foot's box.
+
+    `axes` (3, 3) are those of the link frame in the rest pose.
+    """
     link = character.links[foot]
     if not model.point_jacobian(foot, np.zeros(3))[:, _ROOT_ENTRIES:].any():
         raise CharacterError(f"{character.file}: no joint moves the foot '{link.name}'")
@@ -192,4 +189,4 @@ def _sole(character: Character, model: DynamicsModel, foot: int, axes: FloatArra
     up = np.copysign(1.0, heights[normal]) * turn[:, normal]
     others = [axis for axis in range(3) if axis != normal]
     centre = np.array(pose.position) - half[normal] * up
-    return _Sole(centre, turn[:, others], half[others], up)
+    return centre, turn[:, others], half[others], up

@@ -3,18 +3,19 @@
 Errors are those of `JointLayout.difference`: in rad or m, a rotation's as a rotation vector in the
 child frame. Efforts are in N m or N, in the frames of docs/design.md. A law without stiffness or
 integral gain is the one with those gains at zero. A new law is a function of `LawContext`,
-`TrackingInput` and `GainArrays`, and a line in `_MEMORYLESS`.
+`TrackingInput` and `GainArrays` under `@_LAWS.offer(NAME)`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from controller_node.effort_series import EffortSeries
 from controller_node.references.base import ReferenceState
+from controller_node.registry import Registry
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointLayout
@@ -22,8 +23,17 @@ from msgs_config.errors import ConfigurationError
 
 # Equations
 
-Solver: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
-"""`(force, added) -> a`: the acceleration (n,) of `(M + diag(added)) a = force`."""
+
+class Dynamics(Protocol):
+    """Mass matrix M and bias force C in the present state, as `DynamicsModel` has them."""
+
+    def solve(self, force: FloatArray, added: FloatArray, period: float) -> FloatArray:
+        """The acceleration (n,) of `(M + D h + diag(added)) a = force`, with passive damping D."""
+        ...
+
+    def bias_force(self) -> FloatArray:
+        """C (n,): Coriolis, centrifugal, gravity, and D v."""
+        ...
 
 
 def pd_effort(
@@ -38,21 +48,6 @@ def pd_effort(
     `kd = 2 sqrt(kp m)`, and at a control period h is stable for `kp h^2 + 2 kd h < 4 m`.
     """
     return stiffness * error + damping * velocity_error
-
-
-def pid_effort(
-    stiffness: FloatArray,  # (n,) N m/rad or N/m
-    damping: FloatArray,  # (n,) N m s/rad or N s/m
-    integral_gain: FloatArray,  # (n,) N m/(rad s) or N/(m s)
-    error: FloatArray,  # (n,) reference against state
-    velocity_error: FloatArray,  # (n,) reference minus state
-    integral: FloatArray,  # (n,) of the error over time, rad s or m s
-) -> FloatArray:
-    """Proportional-integral-derivative control: PD, and `Ki` times the integral of the error.
-
-    It leaves no steady-state error. On a mass m it is stable for `0 < ki < kp kd / m`.
-    """
-    return pd_effort(stiffness, damping, error, velocity_error) + integral_gain * integral
 
 
 def anti_windup_mask(
@@ -72,8 +67,7 @@ def anti_windup_mask(
 
 
 def stable_pd_effort(
-    solve: Solver,  # with passive damping D of M + D h
-    bias: FloatArray,  # (n,) Coriolis, centrifugal and gravity, and D v
+    model: Dynamics,
     stiffness: FloatArray,  # (n,)
     damping: FloatArray,  # (n,)
     next_error: FloatArray,  # (n,) reference at t + h against the state at t
@@ -97,11 +91,13 @@ def stable_pd_effort(
         + stiffness * (next_error - period * velocity)
         + damping * (reference_velocity - velocity)
     )
-    effort: FloatArray = known - implicit * solve(known - bias, implicit)
+    effort: FloatArray = known - implicit * model.solve(
+        known - model.bias_force(), implicit, period
+    )
     return effort
 
 
-# Laws by name
+# Gains
 
 
 @dataclass(frozen=True)
@@ -114,9 +110,35 @@ class GainArrays:
     effort_limits: FloatArray  # (b,) N m or N
 
 
+def scale_gains(layout: JointLayout, gains: GainArrays, strengths: FloatArray) -> GainArrays:
+    """Gains and limits times strengths (b,), 0 to 1, one a physical vector.
+
+    At strength 0 a vector has no effort, whatever the law adds to its gains. If all strengths are
+    1, the result is the same object.
+    """
+    if (strengths == 1.0).all():
+        return gains
+    entries = np.repeat(strengths, layout.vector_lengths)
+    return GainArrays(
+        gains.stiffness * entries,
+        gains.damping * entries,
+        gains.integral * entries,
+        scale_limits(gains.effort_limits, strengths),
+    )
+
+
+def scale_limits(limits: FloatArray, strengths: FloatArray) -> FloatArray:
+    """Effort limits (b,) scaled by strengths (b,); infinity times 0 is 0."""
+    weak = strengths > 0.0
+    return np.where(weak, limits * np.where(weak, strengths, 1.0), 0.0)
+
+
+# Laws by name
+
+
 @dataclass(frozen=True)
 class LawContext:
-    """What a law controls, and by which means."""
+    """The character that a law controls, and the model and series that the law computes with."""
 
     layout: JointLayout
     model: DynamicsModel
@@ -126,27 +148,29 @@ class LawContext:
 
 @dataclass(frozen=True)
 class TrackingInput:
-    """What a law looks at in one tick."""
+    """State and reference in one tick."""
 
     time: float  # s since the episode's first state
     position: FloatArray  # (n,)
     velocity: FloatArray  # (n,)
     now: ReferenceState
     upcoming: ReferenceState  # one tick later
-    response: FloatArray | None = None  # (n,) a planner's offset to the errors; None: without
+    offset: FloatArray | None = None  # (n,) of a planner, added to the errors
 
     def error(self, model: DynamicsModel, desired: ReferenceState) -> FloatArray:
-        """The error (n,) of the configuration against a desired state, with the response."""
+        """The error (n,) of the configuration against a desired state, with the offset."""
         error = model.error_of(self.position, desired.configuration.position)
-        return error if self.response is None else error + self.response
+        return error if self.offset is None else error + self.offset
 
 
 Law: TypeAlias = Callable[[TrackingInput, GainArrays], FloatArray]
 """The effort (n,) that answers a state, not clipped yet."""
 
+_LAWS = Registry[Callable[[LawContext, TrackingInput, GainArrays], FloatArray]]()
+
 
 def make_law(name: str, context: LawContext) -> Law:
-    """The law of that name, one of `LAWS`, at the beginning of its work.
+    """The law of that name, one of `LAWS`, at the beginning of an episode.
 
     Raises:
         ConfigurationError: it is `feedforward`, and there is no series.
@@ -155,42 +179,52 @@ def make_law(name: str, context: LawContext) -> Law:
         return Pid(context)
     if name == "feedforward" and context.series is None:
         raise ConfigurationError("law 'feedforward' needs the parameter 'feedforward': a CSV file")
-    return partial(_MEMORYLESS[name], context)
+    return partial(_LAWS[name], context)
 
 
-def _zero(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-    return np.zeros(context.layout.size)
-
-
-def _feedforward(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-    assert context.series is not None
-    return context.series.at(tracking.time)
-
-
-def _p(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-    error, velocity_error = _errors(context, tracking)
-    return pd_effort(gains.stiffness, np.zeros(context.layout.size), error, velocity_error)
-
-
-def _pd(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-    return pd_effort(gains.stiffness, gains.damping, *_errors(context, tracking))
-
-
-def _pd_gravity(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-    context.model.update(tracking.position, tracking.velocity)
-    return _pd(context, tracking, gains) + context.model.gravity_force()
-
-
+@_LAWS.offer("stable_pd")
 def _stable_pd(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     context.model.update(tracking.position, tracking.velocity)
     return _implicit(context, tracking, gains, 0.0)
 
 
+@_LAWS.offer("computed_torque")
 def _computed_torque(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     context.model.update(tracking.position, tracking.velocity)
-    return _implicit(
-        context, tracking, gains, context.model.inverse_dynamics(tracking.now.acceleration)
-    )
+    inverse_dynamics = context.model.inverse_dynamics(tracking.now.acceleration)
+    return _implicit(context, tracking, gains, inverse_dynamics)
+
+
+@_LAWS.offer("pd_gravity")
+def _pd_gravity(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
+    context.model.update(tracking.position, tracking.velocity)
+    return _pd(context, tracking, gains) + context.model.gravity_force()
+
+
+@_LAWS.offer("pd")
+def _pd(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
+    return pd_effort(gains.stiffness, gains.damping, *_errors(context, tracking))
+
+
+@_LAWS.offer("p")
+def _p(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
+    return pd_effort(gains.stiffness, np.zeros(context.layout.size), *_errors(context, tracking))
+
+
+@_LAWS.offer("feedforward")
+def _feedforward(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
+    assert context.series is not None
+    return context.series.at(tracking.time)
+
+
+@_LAWS.offer("zero")
+def _zero(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
+    return np.zeros(context.layout.size)
+
+
+LAWS = tuple(sorted((*_LAWS.names, "pid")))
+COMPENSATES_GRAVITY = ("computed_torque", "pd_gravity")
+"""Laws whose efforts hold the character against its weight."""
 
 
 def _errors(context: LawContext, tracking: TrackingInput) -> tuple[FloatArray, FloatArray]:
@@ -202,22 +236,24 @@ def _errors(context: LawContext, tracking: TrackingInput) -> tuple[FloatArray, F
 def _implicit(
     context: LawContext, tracking: TrackingInput, gains: GainArrays, feedforward: FloatArray | float
 ) -> FloatArray:
-    period, model = context.period, context.model
     return stable_pd_effort(
-        lambda force, added: model.solve(force, added, period),
-        model.bias_force(),
+        context.model,
         gains.stiffness,
         gains.damping,
-        tracking.error(model, tracking.upcoming),
+        tracking.error(context.model, tracking.upcoming),
         tracking.velocity,
         tracking.upcoming.velocity,
-        period,
+        context.period,
         feedforward,
     )
 
 
 class Pid:
-    """PID: the one law that remembers. One is made for each episode, its integral at zero."""
+    """Proportional-integral-derivative control: PD, and `Ki` times the integral of the error.
+
+    It leaves no steady-state error. On a mass m it is stable for `0 < ki < kp kd / m`. It is the
+    one law with a memory: its integral is zero at the beginning of an episode.
+    """
 
     def __init__(self, context: LawContext) -> None:
         self._context = context
@@ -227,39 +263,13 @@ class Pid:
     def __call__(self, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
         """The effort (n,), with the error up to the present in its integral."""
         error, velocity_error = _errors(self._context, tracking)
+        direct = pd_effort(gains.stiffness, gains.damping, error, velocity_error)
         if self._last_time is not None:
-            self._grow(tracking.time - self._last_time, error, velocity_error, gains)
+            layout = self._context.layout
+            grown = self._integral + (tracking.time - self._last_time) * error
+            effort = direct + gains.integral * grown
+            clipped = layout.clipped(effort, gains.effort_limits)
+            stays = anti_windup_mask(effort, clipped, error, layout)
+            self._integral = np.where(stays, self._integral, grown)
         self._last_time = tracking.time
-        return self._effort(error, velocity_error, self._integral, gains)
-
-    def _grow(
-        self, elapsed: float, error: FloatArray, velocity_error: FloatArray, gains: GainArrays
-    ) -> None:
-        """Add the error over the time elapsed (s), where that does not wind up."""
-        layout = self._context.layout
-        grown = self._integral + elapsed * error
-        effort = self._effort(error, velocity_error, grown, gains)
-        clipped = layout.clipped(effort, gains.effort_limits)
-        stays = anti_windup_mask(effort, clipped, error, layout)
-        self._integral = np.where(stays, self._integral, grown)
-
-    def _effort(
-        self, error: FloatArray, velocity_error: FloatArray, integral: FloatArray, gains: GainArrays
-    ) -> FloatArray:
-        return pid_effort(
-            gains.stiffness, gains.damping, gains.integral, error, velocity_error, integral
-        )
-
-
-_MEMORYLESS: dict[str, Callable[[LawContext, TrackingInput, GainArrays], FloatArray]] = {
-    "stable_pd": _stable_pd,
-    "computed_torque": _computed_torque,
-    "pd_gravity": _pd_gravity,
-    "pd": _pd,
-    "p": _p,
-    "feedforward": _feedforward,
-    "zero": _zero,
-}
-LAWS = (*_MEMORYLESS, "pid")
-COMPENSATES_GRAVITY = ("computed_torque", "pd_gravity")
-"""Laws whose efforts hold the character against its weight."""
+        return direct + gains.integral * self._integral

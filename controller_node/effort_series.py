@@ -50,9 +50,8 @@ def read_effort_series(layout: JointLayout, path: str) -> EffortSeries:
     """
     file = Path(path)
     text = read_text(file, EffortSeriesError).removeprefix("\ufeff").rstrip()
-    rows = csv.reader(StringIO(text))
     try:
-        return _parse(layout, file, rows)
+        return _parse(layout, file, csv.reader(StringIO(text)))
     except csv.Error as error:
         raise EffortSeriesError(f"{file}: not valid CSV: {error}") from error
 

@@ -3,37 +3,30 @@
 import time
 from collections import Counter
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 from rclpy.node import Node
 
-from controller_node.actuation import Actuation
+from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import ModeReport
 from controller_node.interface.contact_subscription import ContactSubscription
 from controller_node.interface.publishers import Answer, Publishers
-from controller_node.interface.simulators import Simulators
-from controller_node.interface.strengths_topic import StrengthTopic
-from controller_node.interface.trajectory_topic import Trajectories
+from controller_node.interface.simulators import Simulators, check_simulator
+from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.parameters import (
     PARAMETERS,
     character_parameters,
-    check_world,
     commanded_joints,
     make_controller,
     make_settings,
 )
 from controller_node.planner.outlook import Outlook
 from controller_node.references.factory import make_motion
+from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
-from msgs_config.errors import (
-    CharacterError,
-    ClockError,
-    ConfigurationError,
-    LayoutError,
-    MessageError,
-)
+from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
-from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.session import ANONYMOUS, given_session
 from msgs_config.messages.state import StampedState
@@ -63,9 +56,9 @@ class ControllerNode(Node):
         loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)))
         self._character = placed(loaded, given)
         self._layout = self._character.layout
-        self._declared = PARAMETERS + character_parameters(self._character, given)
-        self._values = resolve(self._declared, given)
-        declare(self, self._declared, self._values)
+        declared = PARAMETERS + character_parameters(self._character, given)
+        self._values = resolve(declared, given)
+        declare(self, declared, self._values)
         motion = make_motion(self._character, self._values)
         for warning in self._character.warnings + self._values.warnings + motion.warnings:
             self.get_logger().warning(warning)
@@ -81,36 +74,33 @@ class ControllerNode(Node):
         self._answer_times = Durations()
         self._open_topics()
         self._outputs.publish_initial_state(motion.first_state())
-        LiveParameters(
-            self, self._declared, self._values, self._take_parameters, self._check_parameters
-        )
+        LiveParameters(self, declared, self._values, self._take_parameters, self._check_parameters)
 
     def _open_topics(self) -> None:
+        controller, logger = self._controller, self._once_logger
         self._decoder = JointStateDecoder()
         self._simulators = Simulators(
             self,
             given_session(self._values),
-            self._controller.clock,
-            self._check_simulator,
-            self._once_logger,
+            controller.clock,
+            partial(check_simulator, controller, self._character, self._values),
+            logger,
         )
         self._contacts = (
-            ContactSubscription(self, self._character, self._simulators, self._once_logger)
-            if self._controller.needs_contacts
+            ContactSubscription(self, self._character, self._simulators, logger)
+            if controller.needs_contacts
             else None
         )
         self._waiting: bytes | None = None  # a state, for the contacts of its tick
-        self._told_mode: ModeReport | None = None
-        self._told_outlook: Outlook | None = None
+        self._published_mode: ModeReport | None = None
+        self._published_outlook: Outlook | None = None
         # after them: a simulator that has found this subscription has found the others as well
         self._states = DirectSubscription(self, topics.JOINT_STATES)
-        commanded = np.flatnonzero(
-            self._layout.mask(commanded_joints(self._character, self._values))
-        )
-        self._actuation = Actuation(len(commanded), self._layout.size)
+        joints = commanded_joints(self._character, self._values)
+        commanded = np.flatnonzero(self._layout.mask(joints))
+        self._actuation = describe_actuation(len(commanded), self._layout.size)
         self._outputs = Publishers(self, self._layout, commanded, self._simulators.bound)
-        self._trajectories = Trajectories(self, self._controller, self._outputs, self._once_logger)
-        self._strengths = StrengthTopic(self, self._controller, self._outputs, self._once_logger)
+        self._stamped_topics = StampedTopics(self, controller, self._outputs, logger)
         self._publish_configuration()
 
     def _publish_configuration(self) -> None:
@@ -118,7 +108,7 @@ class ControllerNode(Node):
         since_ns = None if self._answer is None else self._answer.state.stamp_ns
         self._outputs.publish_configuration(
             configuration.describe(
-                self._character, self._values, since_ns, actuation=self._actuation.content()
+                self._character, self._values, since_ns, actuation=self._actuation
             )
         )
 
@@ -129,25 +119,25 @@ class ControllerNode(Node):
             ActuatedCharactersError: the simulator simulates something else than this controller
                 was made for.
         """
-        spinner = PollingExecutor(self)
-        self._controller.while_planning(spinner.serve)
+        executor = PollingExecutor(self)
+        self._controller.while_planning(executor.serve)
         try:
             while not stop:
                 self._report()
                 self._simulators.look(time.monotonic())
                 raw = self._next_state()
                 if raw is not None:
-                    spinner.received()
-                    spinner.serve()  # a flood of states must not keep services waiting
+                    executor.received()
+                    executor.serve()  # a flood of states must not keep services waiting
                     self._take_state(raw)
-                elif self._waiting is not None:
+                    continue
+                if self._waiting is not None:
                     self._take_state(self._waiting)
-                if raw is None:
-                    spinner.rest()
+                executor.rest()
         finally:
             self._report(at_once=True)
             self._outputs.flush(_FLUSH_TIME)
-            spinner.close()
+            executor.close()
 
     def _next_state(self) -> bytes | None:
         """The next state; in real time the newest, for the others have been overtaken."""
@@ -168,29 +158,18 @@ class ControllerNode(Node):
         if self._is_answered(raw):
             return
         with suppress(MessageError, LayoutError, ClockError):
-            state = state_in_layout(self._layout, self._decoder.decode(raw))
-            self._controller.clock.tick(state.stamp_ns)  # it is one
+            state, _ = self._decode(raw)
             if state.effort is None:
                 self._begin_episode(state.stamp_ns)
 
-    def _check_simulator(self, simulator: RunConfiguration) -> None:
-        """Compare a simulator that says what it simulates with this controller."""
-        if simulator.probe is None:
-            return
-        if simulator.layout.dof_names != self._layout.dof_names:
-            raise CharacterError(
-                f"the simulator's character '{simulator.character}' has other degrees of freedom "
-                f"than '{self._character.name}'; set 'character' to the simulator's"
-            )
-        self._controller.check_agreement(simulator.probe)
-        check_world(self._values, simulator.parameters)
-        for name in ("rate", "placement"):
-            its, own = simulator.parameters.get(name), self._values[name]
-            if its != own:
-                raise ConfigurationError(
-                    f"the simulator's parameter '{name}' is {its}, the controller's is {own}; "
-                    "they must be the same"
-                )
+    def _decode(self, raw: bytes) -> tuple[StampedState, str]:
+        """The state in a message, whose stamp is a tick, and its `frame_id`."""
+        arrays = self._decoder.decode(raw)
+        state = state_in_layout(self._layout, arrays)
+        if not (np.isfinite(state.position).all() and np.isfinite(state.velocity).all()):
+            raise MessageError("it is not finite")
+        self._controller.clock.tick(state.stamp_ns)
+        return state, arrays.frame_id
 
     def _take_state(self, raw: bytes) -> None:
         if not self._is_heard():
@@ -201,28 +180,29 @@ class ControllerNode(Node):
             self._outputs.publish(self._answer)
             return
         try:
-            arrays = self._decoder.decode(raw)
-            state = state_in_layout(self._layout, arrays)
-            _check_finite(state)
-            self._controller.clock.tick(state.stamp_ns)  # it is one
-            self._bind(arrays.frame_id)
-            episode_ns = self._episode_of(state)
+            state, frame_id = self._decode(raw)
         except (MessageError, LayoutError, ClockError) as error:
             self._counts["ignored"] += 1
             self._once_logger.log_once(f"state ignored: {error}")
             return
+        self._bind(frame_id)
+        episode_ns = self._episode_of(state)
         if episode_ns is None:
             return  # the simulator publishes the state again
         contacts = None
         if self._contacts is not None:
             contacts = self._contacts.until(state.stamp_ns, episode_ns)
-        if self._contacts is not None and contacts is None:
-            self._waiting = raw
-            return  # the simulator publishes the contacts again, too
+            if contacts is None:
+                self._waiting = raw
+                return  # the simulator publishes the contacts again, too
         self._waiting = None
         self._check_rate(state)
-        self._trajectories.take(state.stamp_ns, episode_ns)
-        self._strengths.take(state.stamp_ns, episode_ns)
+        self._stamped_topics.take(state.stamp_ns, episode_ns)
+        self._answer_state(raw, state, episode_ns, contacts)
+
+    def _answer_state(
+        self, raw: bytes, state: StampedState, episode_ns: int, contacts: FloatArray | None
+    ) -> None:
         started = time.perf_counter()
         self._is_answering = True
         effort, reference = self._controller.compute_effort(state, episode_ns, contacts)
@@ -230,7 +210,7 @@ class ControllerNode(Node):
         self._answer = self._outputs.answer(raw, state, effort, reference)
         self._answer_times.add(time.perf_counter() - started)
         self._counts["answered"] += 1
-        self._tell_mode()
+        self._publish_mode_and_plan(state.stamp_ns)
         self._outputs.publish(self._answer)
         if self._upcoming is not None:
             self._take_parameters(self._upcoming)
@@ -245,50 +225,48 @@ class ControllerNode(Node):
         )
 
     def _bind(self, frame_id: str) -> None:
-        """Take up a simulator whose state can be used, if there is none; all of another is over."""
+        """Bind to the simulator of a usable state, if none is bound, and forget another one's."""
         if self._simulators.bind(frame_id):
             self._episode_ns = self._waiting = None
             self._outputs.bind(self._simulators.bound or ANONYMOUS)
             if self._contacts is not None:
                 self._contacts.restart()
 
-    def _tell_mode(self) -> None:
-        """Publish what it does and what it plans, if that is new."""
+    def _publish_mode_and_plan(self, stamp_ns: int) -> None:
+        """Publish the mode and the expectation of the plan, where they are new."""
         mode, outlook = self._controller.mode, self._controller.outlook
-        if outlook is not None and outlook is not self._told_outlook:
-            self._told_outlook = outlook
-            assert self._answer is not None
-            self._outputs.publish_plan(outlook, self._answer.state.stamp_ns)
-        if mode is not None and mode is not self._told_mode:
-            self._told_mode = mode
+        if outlook is not None and outlook is not self._published_outlook:
+            self._published_outlook = outlook
+            self._outputs.publish_plan(outlook, stamp_ns)
+        if mode is not None and mode is not self._published_mode:
+            self._published_mode = mode
             self._outputs.publish_mode(mode)
 
     def _is_heard(self) -> bool:
-        """Whether all who are to hear the first answer are there; later ones wait for nobody."""
+        """Whether all that are to hear the first answer are there; later ones wait for none."""
         if self._answer is not None:
             return True
         wanted = self._values.integer("wait_for_subscribers")
         return self._outputs.torque_subscribers >= wanted
 
     def _check_rate(self, state: StampedState) -> None:
-        """Say so if states come several ticks apart: their stamps fit any multiple of the rate."""
-        if self._answer is None or state.effort is None or self._simulators.runs_on:
-            return
-        if self._answer.session != self._simulators.bound:
+        """Log if states come several ticks apart: their stamps fit any multiple of the rate."""
+        answer = self._answer
+        if answer is None or state.effort is None or self._simulators.runs_on:
             return
         clock = self._controller.clock
-        apart = clock.tick(state.stamp_ns) - clock.tick(self._answer.state.stamp_ns)
-        if apart > 1:
-            rate = f"{clock.rate_hz} Hz"
+        apart = clock.tick(state.stamp_ns) - clock.tick(answer.state.stamp_ns)
+        if apart > 1 and answer.session == self._simulators.bound:
             self._once_logger.log_once(
-                f"states come {apart} ticks of {rate} apart; set 'rate' to the simulator's"
+                f"states come {apart} ticks of {clock.rate_hz} Hz apart; set 'rate' to the "
+                "simulator's"
             )
 
     def _episode_of(self, state: StampedState) -> int | None:
         """Stamp of the first state of the state's episode; None if it is not known yet.
 
-        The first state says so itself, and begins another episode even with the stamp of the one
-        before: the simulator may have been started again. A controller that joins later learns it
+        A first state, without effort, begins another episode even with the stamp of the one before:
+        the simulator may have been started again. A controller that joins later learns the stamp
         from the latched topic, once.
         """
         if state.effort is None:
@@ -305,40 +283,36 @@ class ControllerNode(Node):
         """Forget the episode before; a first state that waits for its contacts may do it again."""
         self._episode_ns = stamp_ns
         self._controller.begin_episode(stamp_ns)
-        self._told_mode = None
+        self._published_mode = None
         if self._contacts is not None:
             self._contacts.begin()
 
     def _report(self, *, at_once: bool = False) -> None:
-        """Publish the diagnostics if they are due and anybody listens."""
+        """Publish the diagnostics if they are due and there is a subscriber."""
         now = time.monotonic()
         if now < self._next_report and not at_once:
             return
         self._next_report = now + DIAGNOSTICS_PERIOD
         if self._diagnostics.is_heard:
-            times = self._answer_times.percentiles_us("answer", (50, 99))
-            refused = {
-                "refused_trajectories": self._trajectories.refused,
-                "refused_strengths": self._strengths.refused,
-                UNLOGGED: self._once_logger.unlogged,
-            }
-            counts = {**self._counts, **self._simulators.counts}
-            self._diagnostics.publish({**counts, **refused, **times})
+            self._diagnostics.publish(
+                {
+                    **self._counts,
+                    **self._simulators.counts,
+                    **self._stamped_topics.refused,
+                    UNLOGGED: self._once_logger.unlogged,
+                    **self._answer_times.percentiles_us("answer", (50, 99)),
+                }
+            )
 
     def _check_parameters(self, values: Values) -> None:
         self._controller.check(make_settings(self._character, values))
 
     def _take_parameters(self, values: Values) -> None:
         """Take changed settings, all at once; they count from the next state on."""
-        if self._is_answering:  # services are answered while it plans
+        if self._is_answering:  # services are answered while a plan is waited for
             self._upcoming = values
             return
         self._upcoming = None
         self._values = values
         self._controller.settings = make_settings(self._character, values)
         self._publish_configuration()
-
-
-def _check_finite(state: StampedState) -> None:
-    if not (np.isfinite(state.position).all() and np.isfinite(state.velocity).all()):
-        raise MessageError("it is not finite")

@@ -6,8 +6,8 @@ from types import MappingProxyType
 import numpy as np
 
 from controller_node.balance import BalanceGains
-from controller_node.behaviours import settings as behaviour_settings
-from controller_node.behaviours.factory import choose_behaviour
+from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS, choose_behaviour
+from controller_node.behaviours.settings import check_terrain
 from controller_node.control_laws import LAWS, GainArrays
 from controller_node.controller import Controller, Settings
 from controller_node.effort_series import read_effort_series
@@ -16,18 +16,13 @@ from controller_node.planner.factory import make_planner
 from controller_node.planner.settings import NO_PLANNER
 from controller_node.references.base import Reference
 from controller_node.references.factory import MOTION_PARAMETERS
-from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE, Character
 from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter, Values
-from msgs_config.shared_parameters import (
-    CHARACTER,
-    COMMAND_DELAY,
-    GRAVITY,
-    PLACEMENT,
-    RATE,
-)
+from msgs_config.shared_parameters import CHARACTER, COMMAND_DELAY, GRAVITY, PLACEMENT, RATE
+
+_ROOT_VECTORS = (ROOT, ROOT_TORQUE)
 
 PARAMETERS = [
     CHARACTER,
@@ -40,7 +35,7 @@ PARAMETERS = [
         "feedforward", "", "the law feedforward's CSV file: time_s and degrees of freedom's efforts"
     ),
     *MOTION_PARAMETERS,
-    *behaviour_settings.BEHAVIOUR_PARAMETERS,
+    *BEHAVIOUR_PARAMETERS,
     *planner_settings.PLANNER_PARAMETERS,
     Parameter(
         "root_assistance", True, "drive a floating base by the lecture's root force and torque"
@@ -69,11 +64,7 @@ PARAMETERS = [
         live=True,
     ),
     Parameter(
-        "balance.damping",
-        BalanceGains.damping,
-        "of the centre of mass",
-        unit="N s/m",
-        live=True,
+        "balance.damping", BalanceGains.damping, "of the centre of mass", unit="N s/m", live=True
     ),
     Parameter(
         "balance.friction",
@@ -87,6 +78,13 @@ PARAMETERS = [
 ]
 
 
+_GAINS = {  # the end of a parameter's name: the field of `Gains`, its description, its unit
+    "p": ("stiffness", "stiffness of '{}'", "N m/rad or N/m"),
+    "d": ("damping", "damping of '{}'", "N m s/rad or N s/m"),
+    "i": ("integral", "integral gain of '{}', for the law pid", "N m/(rad s) or N/(m s)"),
+}
+
+
 def character_parameters(
     character: Character, given: Mapping[str, object] = MappingProxyType({})
 ) -> list[Parameter]:
@@ -98,28 +96,14 @@ def character_parameters(
     planned = character.planning.gains if given.get("planner", NO_PLANNER) != NO_PLANNER else {}
     for name, limit in zip(character.vector_names, character.effort_limits(), strict=True):
         gains = planned.get(name, character.gains[name])
-        parameters += [
-            Parameter(
-                f"gains.{name}.p",
-                gains.stiffness,
-                f"stiffness of '{name}'",
-                unit="N m/rad or N/m",
-                live=True,
-            ),
-            Parameter(
-                f"gains.{name}.d",
-                gains.damping,
-                f"damping of '{name}'",
-                unit="N m s/rad or N s/m",
-                live=True,
-            ),
-            Parameter(
-                f"gains.{name}.i",
-                gains.integral,
-                f"integral gain of '{name}', for the law pid",
-                unit="N m/(rad s) or N/(m s)",
-                live=True,
-            ),
+        for kind, (field, description, unit) in _GAINS.items():
+            described = description.format(name)
+            parameters.append(
+                Parameter(
+                    f"gains.{name}.{kind}", getattr(gains, field), described, unit=unit, live=True
+                )
+            )
+        parameters.append(
             Parameter(
                 f"effort_limit.{name}",
                 float(limit),
@@ -127,9 +111,9 @@ def character_parameters(
                 unit="N m or N",
                 maximum=np.inf,
                 live=True,
-            ),
-        ]
-        if name not in (ROOT, ROOT_TORQUE):
+            )
+        )
+        if name not in _ROOT_VECTORS:
             parameters.append(
                 Parameter(
                     f"strength.{name}",
@@ -142,36 +126,43 @@ def character_parameters(
     return parameters
 
 
+def make_gains(character: Character, values: Values) -> GainArrays:
+    """The gains of the law, scaled, and the effort limits that the parameters' values say."""
+    names = character.vector_names
+    scales = {"p": values.number("gain_scale.p"), "d": values.number("gain_scale.d"), "i": 1.0}
+    root = float(_assists(values))
+    gains = {}
+    for kind, (field, _, _) in _GAINS.items():
+        scaled = [
+            (root if name in _ROOT_VECTORS else scales[kind])
+            * values.number(f"gains.{name}.{kind}")
+            for name in names
+        ]
+        gains[field] = np.repeat(np.array(scaled), character.layout.vector_lengths)
+    limits = [values.number(f"effort_limit.{name}") for name in names]
+    return GainArrays(**gains, effort_limits=np.array(limits))
+
+
 def make_settings(character: Character, values: Values) -> Settings:
     """Law, gains and limits that the parameters' values say."""
-    scales = {"p": values.number("gain_scale.p"), "d": values.number("gain_scale.d"), "i": 1.0}
-    lengths = character.layout.vector_lengths
-
-    def entries(kind: str) -> FloatArray:
-        gains = []
-        for name in character.vector_names:
-            assists = name in (ROOT, ROOT_TORQUE)
-            scale = float(_assists(values)) if assists else scales[kind]
-            gains.append(scale * values.number(f"gains.{name}.{kind}"))
-        return np.repeat(np.array(gains), lengths)
-
-    limits = [values.number(f"effort_limit.{name}") for name in character.vector_names]
-    gains = GainArrays(entries("p"), entries("d"), entries("i"), np.array(limits))
     strengths = [
-        1.0 if name in (ROOT, ROOT_TORQUE) else values.number(f"strength.{name}")
+        1.0 if name in _ROOT_VECTORS else values.number(f"strength.{name}")
         for name in character.vector_names
     ]
+    balance = None
+    if values.flag("balance.enabled") and not _is_ragdoll(values):
+        balance = BalanceGains(
+            stiffness=values.number("balance.stiffness"),
+            damping=values.number("balance.damping"),
+            friction=values.number("balance.friction"),
+        )
     return Settings(
         law="zero" if _is_ragdoll(values) else values.text("law"),
-        gains=gains,
+        gains=make_gains(character, values),
         follows_velocity=values.text("reference_velocity") == "clip",
-        balance=_balance_gains(values) if _balances(values) else None,
+        balance=balance,
         strengths=np.array(strengths),
     )
-
-
-def _balances(values: Values) -> bool:
-    return values.flag("balance.enabled") and not _is_ragdoll(values)
 
 
 def _is_ragdoll(values: Values) -> bool:
@@ -182,14 +173,6 @@ def _assists(values: Values) -> bool:
     """Whether the root is driven; a ragdoll's is not, nor that of planned joint torques."""
     plans = values.text("planner") != NO_PLANNER
     return values.flag("root_assistance") and not plans and not _is_ragdoll(values)
-
-
-def _balance_gains(values: Values) -> BalanceGains:
-    return BalanceGains(
-        stiffness=values.number("balance.stiffness"),
-        damping=values.number("balance.damping"),
-        friction=values.number("balance.friction"),
-    )
 
 
 def make_controller(character: Character, reference: Reference, values: Values) -> Controller:
@@ -216,7 +199,7 @@ def check_world(values: Values, simulator: Mapping[str, object]) -> None:
 
     A parameter that is not among the simulator's is taken as one that goes with them.
     """
-    behaviour_settings.check_terrain(values.text("behaviour"), simulator.get("terrain"))
+    check_terrain(values.text("behaviour"), simulator.get("terrain"))
     planner_settings.check_world(values, simulator)
 
 

@@ -7,8 +7,8 @@ from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import choose_behaviour
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
-from controller_node.references.base import Reference
-from controller_node.references.factory import Motion, make_motion
+from controller_node.references.base import Motion, Reference
+from controller_node.references.factory import make_motion
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character

@@ -1,1 +1,1 @@
-"""What a character does when it is hit: ragdoll, active ragdoll, reaction. Pure numpy, no ROS."""
+"""Behaviours beside tracking: ragdoll, active ragdoll, reactions to hits. No ROS."""

@@ -1,19 +1,23 @@
-"""What a behaviour sees in a tick, and what it has the controller do."""
+"""Input and output of a behaviour in a tick, and the behaviours by name."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from typing import Protocol, TypeAlias
 
-from controller_node.behaviours.targets import AS_IT_IS, Target
+from controller_node.behaviours.targets import Target
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.transformed import PlanarTransform
+from controller_node.registry import Registry
 from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Character
+from msgs_config.parameters import Values
 
 
 class Mode(Enum):
-    """What a character is doing, as `~/mode` says it."""
+    """The mode of a character, as published on `~/mode`."""
 
     TRACK = "TRACK"  # follows its own reference
     REACT = "REACT"  # was hit, and gives way
@@ -39,13 +43,13 @@ class Observation:
     assisted: bool  # whether the gains in force drive a floating base
 
     def assistance(self, unless_none: object = "full") -> object:
-        """What a report says of the assistance; of what has none, that it has none."""
+        """The assistance for a report: "none" where the gains drive no floating base."""
         return unless_none if self.assisted else "none"
 
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """A time in one mode, and what led to it: facts for JSON."""
+    """A time in one mode, and the facts, for JSON, that led to it."""
 
     mode: Mode
     facts: Mapping[str, object] = field(default_factory=dict)
@@ -53,11 +57,11 @@ class Phase:
 
 @dataclass(frozen=True)
 class BehaviourOutput:
-    """What to track in a tick, and how firmly."""
+    """Phase, target and gains of a tick."""
 
     phase: Phase  # the same object as long as it lasts
-    way: Target  # the same object as long as it leads on
-    gains: GainArrays
+    target: Target | None = None  # the same object as long as it leads on; None: the reference
+    gains: GainArrays | None = None  # None: those in force
 
 
 class Behaviour(Protocol):
@@ -66,11 +70,8 @@ class Behaviour(Protocol):
     carry: PlanarTransform  # of the own reference, to where the character goes on with it
 
     def advance(self, seen: Observation) -> BehaviourOutput:
-        """What to do in a tick; called once a tick, in order."""
+        """The output of a tick; called once a tick, in order."""
         ...
-
-
-BehaviourMaker: TypeAlias = Callable[[], Behaviour]
 
 
 @dataclass(frozen=True)
@@ -81,32 +82,45 @@ class ModeReport:
     stamp_ns: int
 
     def content(self) -> dict[str, object]:
-        """What JSON says of it."""
+        """The report as JSON has it."""
         mode = self.phase.mode.value
         return {"mode": mode, "stamp_ns": self.stamp_ns, **self.phase.facts}
 
 
 class Tracking:
-    """Follows the own reference, whatever comes."""
+    """Follows the reference with the gains in force, whatever comes; one mode for the episode."""
 
-    def __init__(self) -> None:
+    def __init__(self, mode: Mode = Mode.TRACK) -> None:
+        """`LIMP` is the mode of a ragdoll, whose law is `zero`."""
         self.carry = PlanarTransform()
-        self._phase: Phase | None = None
+        self._mode = mode
+        self._output: BehaviourOutput | None = None
 
     def advance(self, seen: Observation) -> BehaviourOutput:
         """The reference and the gains as they are."""
-        if self._phase is None:
-            self._phase = Phase(Mode.TRACK, {"assistance": seen.assistance()})
-        return BehaviourOutput(self._phase, AS_IT_IS, seen.gains)
+        if self._output is None:
+            self._output = BehaviourOutput(Phase(self._mode, {"assistance": seen.assistance()}))
+        return self._output
 
 
-class Ragdoll:
-    """Follows nothing; its law is to be `zero`."""
+@dataclass(frozen=True)
+class BehaviourChoice:
+    """A behaviour, of which each episode makes one."""
 
-    def __init__(self) -> None:
-        self.carry = PlanarTransform()
-        self._phase = Phase(Mode.LIMP, {"assistance": "none"})
+    make: Callable[[], Behaviour] = Tracking
+    needs_contacts: bool = False
 
-    def advance(self, seen: Observation) -> BehaviourOutput:
-        """The reference as it is, which nobody follows."""
-        return BehaviourOutput(self._phase, AS_IT_IS, seen.gains)
+
+BehaviourMaker: TypeAlias = Callable[[Character, Values], BehaviourChoice]
+
+BEHAVIOURS = Registry[BehaviourMaker]()
+
+
+@BEHAVIOURS.offer("tracking")
+def _tracking(character: Character, values: Values) -> BehaviourChoice:
+    return BehaviourChoice(Tracking)
+
+
+@BEHAVIOURS.offer("ragdoll")
+def _ragdoll(character: Character, values: Values) -> BehaviourChoice:
+    return BehaviourChoice(partial(Tracking, Mode.LIMP))

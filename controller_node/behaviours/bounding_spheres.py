@@ -26,7 +26,10 @@ class BoundingSpheres:
         self._radii = np.array(radii)
         self._owners: IntArray = np.array(owners, dtype=np.intp)
         self._links = len(character.links)
-        self._adjacent = _adjacent(character)
+        self._adjacent = np.zeros((self._links, self._links), dtype=np.bool_)
+        for number, link in enumerate(character.links):
+            if link.parent >= 0:
+                self._adjacent[number, link.parent] = self._adjacent[link.parent, number] = True
 
     def centres(self, origins: FloatArray, turns_xyzw: FloatArray) -> FloatArray:
         """Centres (s, 3) of the spheres, m, where link frames are at (links, 3) and (links, 4)."""
@@ -55,15 +58,6 @@ class BoundingSpheres:
                 near = near and not self._adjacent[links[one], links[other]]
                 reach[one, other] = reach[other, one] = near
         return reach
-
-
-def _adjacent(character: Character) -> BoolArray:
-    count = len(character.links)
-    adjacent = np.zeros((count, count), dtype=np.bool_)
-    for number, link in enumerate(character.links):
-        if link.parent >= 0:
-            adjacent[number, link.parent] = adjacent[link.parent, number] = True
-    return adjacent
 
 
 def _spheres(link: Link, shape: Shape) -> tuple[FloatArray, float]:

@@ -1,14 +1,18 @@
-"""How a character that was hit gives way: soft near the struck link, its gains by inertia."""
+"""The gains of a character that was hit: soft near the struck link, and by inertia."""
+
+from dataclasses import replace
 
 import numpy as np
 
-from controller_node.control_laws import GainArrays
-from controller_node.strength import limits_of
+from controller_node.behaviours.base import Observation
+from controller_node.behaviours.settings import ReactionSettings
+from controller_node.control_laws import GainArrays, scale_gains, scale_limits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
 
+_FIRM_AGAIN = 0.2  # s, in which the joints are as firm as before a hit
 _REACH = 3.0  # joints, from the struck link to those that are as firm as before
 
 
@@ -21,12 +25,8 @@ class ComplianceProfile:
         For a joint that is the inertia about its axes of all that it moves.
         """
         layout = character.layout
-        turning = [
-            joint
-            for joint in layout.joints
-            if joint.type in (JointType.REVOLUTE, JointType.SPHERICAL)
-        ]
-        self._starts = layout.vector_starts
+        types = JointType.REVOLUTE, JointType.SPHERICAL
+        turning = [joint for joint in layout.joints if joint.type in types]
         self._turning = layout.mask(joint.name for joint in turning)
         # one inertia a joint, so that a ball joint stays as firm in all directions
         self._inertias = np.ones(layout.size)
@@ -47,7 +47,7 @@ class ComplianceProfile:
         Source: Zordan and Hodgins 2002, "Motion capture-driven simulations that hit and react".
         """
         entries = np.repeat(strengths, self._layout.vector_lengths)
-        limits = limits_of(gains.effort_limits, strengths)
+        limits = scale_limits(gains.effort_limits, strengths)
         if self._layout.has_floating_base:
             limits[:2] = np.minimum(limits[:2], (root_force, root_torque))
         return GainArrays(
@@ -66,6 +66,66 @@ class ComplianceProfile:
         return np.where(self._turning & (gains > 0.0), by_inertia, gains)
 
 
+class ReactionGains:
+    """The gains in each phase of a reaction; `elapsed` is the time in s since the phase began."""
+
+    def __init__(
+        self, character: Character, settings: ReactionSettings, weight: float, plans: bool
+    ) -> None:
+        """`weight` is the character's, N; with `plans` a planner counts on the gains in force."""
+        self._character, self._settings = character, settings
+        self._root_force = settings.assistance * weight
+        self._plans = plans
+
+    def give_way(self, struck: int, mass_diagonal: FloatArray) -> None:
+        """Be soft near a struck link, an index of `Character.links`, in the present pose."""
+        self._profile = ComplianceProfile(self._character, mass_diagonal)
+        self._softness = softened(self._character, struck, self._settings.softness)
+
+    def firm(self, seen: Observation, elapsed: float) -> GainArrays:
+        """The gains in force; of an active ragdoll the root's torque is bounded."""
+        if self._settings.searches:
+            return seen.gains
+        limits = seen.gains.effort_limits.copy()
+        limits[1] = min(limits[1], self._settings.upright_torque)
+        return replace(seen.gains, effort_limits=limits)
+
+    def soft(self, seen: Observation, elapsed: float) -> GainArrays:
+        """Soft near the struck link, with a bounded force on the root."""
+        force = self._root_force
+        arm = float(seen.now.configuration.position[2])  # of the root's force about the feet
+        strengths = self._softness * seen.strengths
+        return self._profile.gains(seen.whole_gains, strengths, force, force * abs(arm))
+
+    def firmer(self, seen: Observation, elapsed: float) -> GainArrays:
+        """From the soft gains to those in force; the root's limits are lifted at once."""
+        share = min(elapsed / _FIRM_AGAIN, 1.0)
+        firm = self.firm(seen, elapsed)
+        if share >= 1.0:
+            return firm
+        soft = self.soft(seen, elapsed)
+        return replace(
+            firm,
+            stiffness=soft.stiffness + share * (firm.stiffness - soft.stiffness),
+            damping=soft.damping + share * (firm.damping - soft.damping),
+        )
+
+    def limp(self, seen: Observation, elapsed: float) -> GainArrays:
+        """No gains, and effort limits of zero."""
+        return self._weak(seen, 0.0)
+
+    def rising(self, seen: Observation, elapsed: float) -> GainArrays:
+        """Rising from none to those in force, unless a planner counts on them."""
+        if self._plans:
+            return self.firm(seen, elapsed)
+        return self._weak(seen, min(elapsed / self._settings.recovery_duration, 1.0))
+
+    def _weak(self, seen: Observation, strength: float) -> GainArrays:
+        layout = self._character.layout
+        strengths = np.full(len(layout.vector_starts), strength)
+        return scale_gains(layout, self.firm(seen, 0.0), strengths)
+
+
 def softened(character: Character, struck: int, softness: float) -> FloatArray:
     """Strengths (b,): `softness` of the joints at a link, rising to 1 a few joints away.
 
@@ -73,13 +133,12 @@ def softened(character: Character, struck: int, softness: float) -> FloatArray:
     """
     distances = _distances(character, struck)
     strengths: list[float] = []
-    for link in character.links:
-        if link.joint.type is JointType.FIXED:
-            continue
-        near = min(distances[character.links.index(link)], distances[max(link.parent, 0)])
-        share = softness + (1.0 - softness) * min(near / _REACH, 1.0)
-        vectors = character.layout.joint(link.joint.name).vectors
-        strengths += [1.0 if link.joint.type is JointType.FLOATING else share] * len(vectors)
+    for link, distance in zip(character.links, distances.tolist(), strict=True):
+        if link.joint.type is JointType.FLOATING:
+            strengths += [1.0, 1.0]
+        elif link.joint.type is not JointType.FIXED:
+            near = min(distance, float(distances[max(link.parent, 0)]))
+            strengths.append(softness + (1.0 - softness) * min(near / _REACH, 1.0))
     return np.array(strengths)
 
 

@@ -1,10 +1,10 @@
-"""Hits, told from a character's own contacts: what neither the ground nor itself can have done.
+"""Hits detected from contacts: the forces that neither ground nor self-contact explain.
 
-Of each link the net contact force during a tick is known, and not what it touched. So the touched
-links are gathered in groups that may touch each other; inside a group its forces cancel, action
-against reaction. What remains is the world's. The ground pushes, and only so far to the side as
-friction allows: what lies in that cone is taken for the ground's where a link of the group reaches
-it. The rest, over a short window, is a hit's impulse.
+Of each link the net contact force during a tick is known, but not which body it touched. So the
+touched links are gathered in groups that may touch each other; inside a group the forces cancel,
+action against reaction. The rest comes from outside. The ground pushes, and only so far to the side
+as friction allows: a force inside that cone is taken for the ground's where a link of the group
+reaches it. The remaining force, over a short window, is a hit's impulse.
 """
 
 from collections import deque
@@ -25,7 +25,7 @@ _FRICTION = 0.9  # of link against ground, no less than it is
 
 @dataclass(frozen=True)
 class Hit:
-    """The impulse of what struck, over the window."""
+    """The impulse of a hit over the window."""
 
     link: int  # an index of `Character.links`, the one struck hardest
     impulse: float  # N s
@@ -36,7 +36,7 @@ class HitDetector:
 
     def __init__(self, character: Character, period: float, window: float = WINDOW) -> None:
         """For ticks of `period`; impulses are added up over `window`; s."""
-        self._hull = BoundingSpheres(character)
+        self._spheres = BoundingSpheres(character)
         self._period = period
         self._recent: deque[FloatArray] = deque(maxlen=max(round(window / period), 1))
         self._before: FloatArray | None = None
@@ -54,7 +54,7 @@ class HitDetector:
         frames (links, 3), (links, 4) are those at its end. Where they were at its beginning, when
         the contacts were found, is known from the call before.
         """
-        centres = self._hull.centres(origins, turns_xyzw)
+        centres = self._spheres.centres(origins, turns_xyzw)
         where, self._before = centres if self._before is None else self._before, centres
         self._recent.append(self._period * self._unexplained(contacts[:, :3], where))
         impulses = fixed_order.norm(fixed_order.total(np.array(self._recent), axis=0))
@@ -62,17 +62,15 @@ class HitDetector:
         return Hit(int(impulses.argmax()), total) if total > 0.0 else None
 
     def _unexplained(self, forces: FloatArray, centres: FloatArray) -> FloatArray:
-        """Forces (links, 3) in N that are none of the ground's and none of its own."""
+        """Forces (links, 3) in N that neither the ground nor self-contact explains."""
         unexplained = np.zeros_like(forces)
         touched = np.flatnonzero(forces.any(axis=1))
         if not len(touched):
             return unexplained
-        grounded = self._hull.lowest(centres)[touched] < _GROUND_MARGIN
-        if grounded.all():
-            groups = [np.arange(len(touched))]
-        else:
-            reach = self._hull.within_reach(centres, touched, _TOUCH_MARGIN)
-            groups = _groups(reach)
+        grounded = self._spheres.lowest(centres)[touched] < _GROUND_MARGIN
+        groups = [np.arange(len(touched))]
+        if not grounded.all():
+            groups = _groups(self._spheres.within_reach(centres, touched, _TOUCH_MARGIN))
         for group in groups:
             links = touched[group]
             rest = fixed_order.total(forces[links], axis=0)
@@ -84,7 +82,7 @@ class HitDetector:
 
 
 def beyond_cone(force: FloatArray, friction: float) -> FloatArray:
-    """What is left of a force (3,) without its projection on the upright friction cone."""
+    """A force (3,) without its projection on the upright friction cone."""
     sideways, up = float(fixed_order.norm(force[:2])), float(force[2])
     if sideways <= friction * up:
         return np.zeros(3)

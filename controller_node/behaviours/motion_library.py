@@ -37,7 +37,7 @@ class Match:
     median: float  # m, of the distances of all moments that were compared
 
     def content(self) -> dict[str, object]:
-        """What JSON says of it."""
+        """The match as JSON has it."""
         return {
             "clip": self.clip,
             "clip_time": self.time,
@@ -85,12 +85,10 @@ class MotionLibrary:
             last = end - 1.0 / _RATE if frames.wraps else end - max(lasting, _WINDOW / _RATE)
             last = min(last, share * end)
             count = int(np.floor(last * _RATE + 1e-9)) + 1
-            if count < 1:
-                continue
-            moments = self._moments(self.references[name], count)
-            clips_of += [name] * count
-            times += [number / _RATE for number in range(count)]
-            windows.append(moments)
+            if count > 0:
+                clips_of += [name] * count
+                times += [number / _RATE for number in range(count)]
+                windows.append(self._moments(self.references[name], count))
         if not times:
             raise ConfigurationError(
                 f"parameter 'library': no clip of {', '.join(names)} lasts {lasting:g} s and more"
@@ -174,19 +172,11 @@ class MotionLibrary:
 
     def _moments(self, reference: Reference, count: int) -> Window:
         """The windows that begin at the first `count` samples of a clip."""
-        samples = [
-            reference.sample(number / _RATE).configuration.position
-            for number in range(count + _WINDOW - 1)
-        ]
-        origins, turns = self._links(np.array(samples))
-        windows = [
-            _from_below(origins[k : k + _WINDOW], turns[k : k + _WINDOW], samples[k])
-            for k in range(count)
-        ]
-        return Window(
-            np.array([window.positions for window in windows]),
-            np.array([window.turns_xyzw for window in windows]),
-        )
+        times = (number / _RATE for number in range(count + _WINDOW - 1))
+        samples = np.array([reference.sample(time).configuration.position for time in times])
+        origins, turns = self._links(samples)
+        rows = np.arange(count)[:, np.newaxis] + np.arange(_WINDOW)
+        return _from_below(origins[rows], turns[rows], samples[:count])
 
     def _links(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Origins (w, links, 3) and turns (w, links, 4) in the world at positions (w, n)."""
@@ -206,8 +196,9 @@ def _flat(windows: Sequence[FloatArray]) -> FloatArray:
 
 
 def _from_below(origins: FloatArray, turns_xyzw: FloatArray, root: FloatArray) -> Window:
-    """A window seen from the ground below a root's place."""
-    return Window(origins - np.array((root[0], root[1], 0.0)), turns_xyzw)
+    """Windows (..., w, links) seen from the ground below a root's place, of positions (..., n)."""
+    below = root[..., :3] * np.array((1.0, 1.0, 0.0))
+    return Window(origins - below[..., np.newaxis, np.newaxis, :], turns_xyzw)
 
 
 def _names(character: Character, clips: Sequence[str]) -> list[str]:

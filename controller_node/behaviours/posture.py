@@ -1,9 +1,10 @@
-"""Where a floating base stands, which way it faces, and on which side it lies."""
+"""Place, heading and side of a floating base."""
 
 import math
 
 import numpy as np
 
+from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
@@ -18,7 +19,7 @@ _FALLEN_DROP = 0.2  # of the rest pose's height, below the target's root: what l
 
 
 class Posture:
-    """What turns of the base mean, measured from the rest pose: upright, and facing along x."""
+    """Heading, tilt and side of the base, measured from the rest pose: upright, facing along x."""
 
     def __init__(self, character: Character) -> None:
         """From a character's rest pose. Raises ConfigurationError if its base is fixed."""
@@ -38,6 +39,15 @@ class Posture:
     def heading(self, root_xyzw: FloatArray) -> FloatArray:
         """Angle (...) in rad about z of the way that it faces; arbitrary where upside down."""
         return rotations.yaw(self._from_upright(root_xyzw))
+
+    def carry(self, start: GeneralizedPosition, end: GeneralizedPosition) -> PlanarTransform:
+        """The move from where one root is, and faces, to where another one is."""
+        return PlanarTransform.leading(
+            start.position[:3],
+            float(self.heading(start.orientations_xyzw[0])),
+            end.position[:3],
+            float(self.heading(end.orientations_xyzw[0])),
+        )
 
     def tilt(self, root_xyzw: FloatArray, reference_xyzw: FloatArray) -> float:
         """Angle in rad between its upward axis and that of a reference."""

@@ -4,7 +4,7 @@
     REACT, or TRACK -> LIMP -> SEARCH -> BLEND (getting up) -> TRACK
 
 Source: Zordan, Majkowska, Chiu and Fast 2005, "Dynamic Response for Motion Capture Animation".
-What the control law tracks is continuous throughout: at each change it goes on as it moves.
+The target of the control law is continuous in position and velocity at each change.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.behaviours.base import BehaviourOutput, Mode, Observation, Phase
-from controller_node.behaviours.compliance import ComplianceProfile, softened
+from controller_node.behaviours.compliance import ReactionGains
 from controller_node.behaviours.hit_detection import WINDOW, Hit, HitDetector
 from controller_node.behaviours.motion_library import Match, MotionLibrary
 from controller_node.behaviours.posture import Posture
@@ -26,9 +26,8 @@ from controller_node.behaviours.targets import (
 )
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
-from controller_node.references.inertialised import InertialisedReference, InertializationOffset
+from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference
-from controller_node.strength import weakened
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
@@ -36,14 +35,13 @@ from msgs_config.geometry import rotations
 
 _SEVERE = 2.0 / 3.0  # of the threshold above which it goes limp: the full reaction
 _ONTO = 0.6  # of the blend's duration, until the motion that was found is reached
-_FIRM_AGAIN = 0.2  # s, in which the joints are as firm as before a hit
 _STILL_SPEED = 0.1  # m/s: it lies still with less kinetic energy than all of it at that speed
 _STILL_TIME, _LONGEST_LIMP = 0.4, 5.0  # s
 
 
 @dataclass(frozen=True)
 class ReactionKit:
-    """What all episodes of one controller have in common."""
+    """The parts that all episodes of one controller share."""
 
     character: Character
     settings: ReactionSettings
@@ -66,10 +64,11 @@ class Reaction:
         self._layout = kit.character.layout
         self._settings = kit.settings
         self._detector = HitDetector(kit.character, kit.period)
+        self._phase_gains = ReactionGains(kit.character, kit.settings, kit.model.weight, kit.plans)
         self._own = ReferenceTarget(self._layout)
-        self._way: Target = self._own
+        self._target: Target = self._own
         self._hit = Hit(0, 0.0)  # the last one
-        self._begin(0.0, Mode.TRACK, self._begin_tracking, self._firm)
+        self._begin(0.0, Mode.TRACK, self._begin_tracking, self._phase_gains.firm)
 
     @property
     def carry(self) -> PlanarTransform:
@@ -81,41 +80,50 @@ class Reaction:
         self._own.carry = carry
 
     def advance(self, seen: Observation) -> BehaviourOutput:
-        """What to do in a tick: change the phase if it is time, and say what is tracked in it."""
+        """Change the phase if it is time, and return its target and gains."""
         self._kit.model.update(seen.position, seen.velocity)
         hit = self._detector.strongest(seen.contacts, *self._kit.model.link_poses())
+        still = np.zeros(self._layout.size)
+        self._body = ReferenceState(self._layout.configuration(seen.position), seen.velocity, still)
         self._step(seen, hit)
-        return BehaviourOutput(self._phase, self._way, self._gains(seen))
+        return BehaviourOutput(self._phase, self._target, self._gains(seen, self._elapsed(seen)))
 
     def _begin(
         self,
         time: float,
         mode: Mode,
         step: _Step,
-        gains: Callable[[Observation], GainArrays],
+        gains: Callable[[Observation, float], GainArrays],
         **facts: object,
     ) -> None:
-        """Begin a phase: what may end it, and which gains hold in it."""
+        """Begin a phase with the step that may end it and the gains that hold in it."""
         self._phase = Phase(mode, facts)
         self._since, self._step, self._gains = time, step, gains
 
     def _elapsed(self, seen: Observation) -> float:
         return seen.time - self._since
 
-    # What may end each phase
+    def _desired(self, seen: Observation) -> ReferenceState:
+        """The state that the present target has."""
+        return self._target.state_at(seen.time, seen.now)
+
+    # The step of each phase
 
     def _begin_tracking(self, seen: Observation, hit: Hit | None) -> None:
         assistance = seen.assistance()
-        self._begin(seen.time, Mode.TRACK, self._track, self._firm, assistance=assistance)
+        self._begin(
+            seen.time, Mode.TRACK, self._track, self._phase_gains.firm, assistance=assistance
+        )
         self._track(seen, hit)
 
     def _track(self, seen: Observation, hit: Hit | None) -> None:
         """Give way to a hit, or go limp by a hard one or having fallen."""
-        impulse = 0.0 if hit is None else hit.impulse
-        if hit is not None and impulse >= self._settings.limp_threshold:
+        if hit is not None and hit.impulse >= self._settings.limp_threshold:
             self._go_limp(seen, "hit", hit)
         elif (
-            hit is not None and impulse >= self._settings.hit_threshold and self._settings.searches
+            hit is not None
+            and hit.impulse >= self._settings.hit_threshold
+            and self._settings.searches
         ):
             self._react(seen, hit)
         elif self._has_fallen(seen):
@@ -123,7 +131,7 @@ class Reaction:
 
     def _return(self, seen: Observation, hit: Hit | None) -> None:
         if self._elapsed(seen) >= self._settings.blend_duration:
-            self._way = self._own = ReferenceTarget(self._layout, self._own.carry)
+            self._target = self._own = ReferenceTarget(self._layout, self._own.carry)
             self._begin_tracking(seen, hit)
         else:
             self._track(seen, hit)
@@ -142,74 +150,54 @@ class Reaction:
             self._go_limp(seen, "fallen", self._hit)
         elif self._elapsed(seen) >= max(self._severity * self._settings.react_duration, WINDOW):
             facts = self._hit_facts(seen)
-            self._begin(seen.time, Mode.SEARCH, self._search, self._soft, **facts)
+            self._begin(seen.time, Mode.SEARCH, self._search, self._phase_gains.soft, **facts)
 
     def _search(self, seen: Observation, hit: Hit | None) -> None:
         """Go on with the motion that is nearest to what the present state leads to."""
         library = self._kit.library
         assert library is not None
-        self._detector.forget()  # what it has reacted to
+        self._detector.forget()  # what was reacted to
         match = library.nearest(library.predicted(self._led(seen), seen.velocity))
         self._follow_clip(library, match, seen, _ONTO * self._settings.blend_duration)
-        self._begin(
-            seen.time,
-            Mode.BLEND,
-            self._follow,
-            self._firmer,
-            to="clip",
-            assistance=seen.assistance(),
-            **match.content(),
-        )
+        facts = {"to": "clip", "assistance": seen.assistance(), **match.content()}
+        self._begin(seen.time, Mode.BLEND, self._follow, self._phase_gains.firmer, **facts)
 
     def _lie(self, seen: Observation, hit: Hit | None) -> None:
-        """Wait until it lies still."""
-        assert isinstance(self._way, CurrentStateTarget)
-        self._way.state = self._body(seen)
+        """Wait until the character lies still."""
+        assert isinstance(self._target, CurrentStateTarget)
+        self._target.state = self._body
         still_energy = 0.5 * self._kit.character.mass * _STILL_SPEED * _STILL_SPEED
         if self._kit.model.kinetic_energy() > still_energy:
             self._moved = seen.time
         still = seen.time - self._moved >= _STILL_TIME
         if still or self._elapsed(seen) >= _LONGEST_LIMP:
-            side = "faceup" if self._faces_up(seen) else "facedown"
-            self._begin(
-                seen.time, Mode.SEARCH, self._find_get_up, self._limp, side=side, assistance="none"
-            )
+            facts = {"side": "faceup" if self._faces_up() else "facedown", "assistance": "none"}
+            self._begin(seen.time, Mode.SEARCH, self._find_get_up, self._phase_gains.limp, **facts)
 
     def _find_get_up(self, seen: Observation, hit: Hit | None) -> None:
-        assert isinstance(self._way, CurrentStateTarget)
+        assert isinstance(self._target, CurrentStateTarget)
         self._detector.forget()
-        self._way.state = self._body(seen)
-        rising = seen.assistance("rising")
-        self._rise_until = seen.time + self._settings.recovery_duration
-        if self._kit.get_ups is None:
-            carry = self._carry_to(seen.now, self._way.state)
-            self._come_back(seen, carry, self._settings.recovery_duration)
-            self._begin(
-                seen.time, Mode.BLEND, self._rise, self._rising, to="reference", assistance=rising
-            )
-            return
-        clip = self._settings.face_up if self._faces_up(seen) else self._settings.face_down
-        library = self._kit.get_ups
-        still = library.predicted(seen.position, np.zeros_like(seen.velocity))
-        match = library.nearest(still, among=clip)
-        self._follow_clip(library, match, seen, self._settings.recovery_duration)
-        self._rise_until = seen.time + library.duration(clip) - match.time
-        self._begin(
-            seen.time,
-            Mode.BLEND,
-            self._rise,
-            self._rising,
-            to="clip",
-            assistance=rising,
-            **match.content(),
-        )
+        self._target.state = self._body
+        library, duration = self._kit.get_ups, self._settings.recovery_duration
+        facts: dict[str, object] = {"to": "reference", "assistance": seen.assistance("rising")}
+        self._rise_until = seen.time + duration
+        if library is None:
+            self._come_back(seen, self._carry_to(seen, self._body), duration)
+        else:
+            clip = self._settings.face_up if self._faces_up() else self._settings.face_down
+            still = library.predicted(seen.position, np.zeros_like(seen.velocity))
+            match = library.nearest(still, among=clip)
+            self._follow_clip(library, match, seen, duration)
+            self._rise_until = seen.time + library.duration(clip) - match.time
+            facts |= {"to": "clip", **match.content()}
+        self._begin(seen.time, Mode.BLEND, self._rise, self._phase_gains.rising, **facts)
 
     def _rise(self, seen: Observation, hit: Hit | None) -> None:
         if hit is not None and hit.impulse >= self._settings.limp_threshold:
             self._go_limp(seen, "hit", hit)
         elif seen.time >= self._rise_until:
-            if isinstance(self._way, ClipTarget):
-                carry = self._carry_to(seen.now, self._way.target(seen.time, seen.now))
+            if isinstance(self._target, ClipTarget):
+                carry = self._carry_to(seen, self._desired(seen))
                 self._come_back(seen, carry, self._settings.blend_duration)
             else:
                 self._return(seen, hit)
@@ -217,14 +205,14 @@ class Reaction:
     # Changes
 
     def _react(self, seen: Observation, hit: Hit) -> None:
-        kit, settings = self._kit, self._settings
         self._hit = hit
-        target = self._way.target(seen.time, seen.now).configuration
-        self._lead = self._layout.difference(self._body(seen).configuration, target)
-        diagonal = np.diag(kit.model.mass_matrix())
-        self._give_way = ComplianceProfile(kit.character, diagonal)
-        self._softness = softened(kit.character, hit.link, settings.softness)
-        self._begin(seen.time, Mode.REACT, self._react_on, self._soft, **self._hit_facts(seen))
+        self._lead = self._layout.difference(
+            self._body.configuration, self._desired(seen).configuration
+        )
+        self._phase_gains.give_way(hit.link, np.diag(self._kit.model.mass_matrix()))
+        self._begin(
+            seen.time, Mode.REACT, self._react_on, self._phase_gains.soft, **self._hit_facts(seen)
+        )
 
     @property
     def _severity(self) -> float:
@@ -235,94 +223,54 @@ class Reaction:
         return min(self._hit.impulse / (_SEVERE * self._settings.limp_threshold), 1.0)
 
     def _hit_facts(self, seen: Observation) -> dict[str, object]:
-        name = self._kit.character.links[self._hit.link].name
         share = seen.assistance(self._settings.assistance)
-        return {"link": name, "impulse": self._hit.impulse, "assistance": share}
+        return {**self._facts_of(self._hit), "assistance": share}
+
+    def _facts_of(self, hit: Hit) -> dict[str, object]:
+        name = self._kit.character.links[hit.link].name
+        return {"link": name, "impulse": hit.impulse}
 
     def _go_limp(self, seen: Observation, why: str, hit: Hit | None) -> None:
         """Let everything go; the target comes to the body, which nothing draws to it."""
-        target, body = self._way.target(seen.time, seen.now), self._body(seen)
-        offset = InertializationOffset(self._layout, body, target, seen.time, _STILL_TIME)
-        self._way = CurrentStateTarget(offset, body)
+        offset = InertializationOffset(
+            self._layout, self._body, self._desired(seen), seen.time, _STILL_TIME
+        )
+        self._target = CurrentStateTarget(self._body, offset)
         self._moved = seen.time
         self._lead = np.zeros(self._layout.size)
-        facts: dict[str, object] = {"why": why}
-        if hit is not None:
-            name = self._kit.character.links[hit.link].name
-            facts |= {"link": name, "impulse": hit.impulse}
-        self._begin(seen.time, Mode.LIMP, self._lie, self._limp, assistance="none", **facts)
+        facts = {} if hit is None else self._facts_of(hit)
+        self._begin(
+            seen.time,
+            Mode.LIMP,
+            self._lie,
+            self._phase_gains.limp,
+            assistance="none",
+            why=why,
+            **facts,
+        )
 
     def _follow_clip(
         self, library: MotionLibrary, match: Match, seen: Observation, duration: float
     ) -> None:
         """Go over to a moment of a clip, carried to where the character is."""
         motion = library.references[match.clip]
-        there = self._led(seen)
         place = motion.sample(match.time).configuration.position
-        carry = PlanarTransform.leading(place, 0.0, there, match.turn)
+        carry = PlanarTransform.leading(place, 0.0, self._led(seen), match.turn)
         moved = TransformedReference(self._layout, motion, carry, seen.time, match.time)
-        wanted = self._way.target(seen.time, seen.now)
-        self._way = ClipTarget(
-            InertialisedReference(self._layout, moved, wanted, start=seen.time, duration=duration)
+        offset = InertializationOffset(
+            self._layout, moved.sample(seen.time), self._desired(seen), seen.time, duration
         )
+        self._target = ClipTarget(moved, offset)
 
     def _come_back(self, seen: Observation, carry: PlanarTransform, duration: float) -> None:
         """Go over to the own reference, carried."""
-        wanted = self._way.target(seen.time, seen.now)
         own = carry.moved(self._layout, seen.now)
-        offset = InertializationOffset(self._layout, own, wanted, seen.time, duration)
-        self._way = self._own = ReferenceTarget(self._layout, carry, offset)
+        offset = InertializationOffset(self._layout, own, self._desired(seen), seen.time, duration)
+        self._target = self._own = ReferenceTarget(self._layout, carry, offset)
         facts = {"to": "reference", "assistance": seen.assistance()}
-        self._begin(seen.time, Mode.BLEND, self._return, self._firm, **facts)
+        self._begin(seen.time, Mode.BLEND, self._return, self._phase_gains.firm, **facts)
 
-    # Gains
-
-    def _firm(self, seen: Observation) -> GainArrays:
-        """All as it is; of an active ragdoll the root's torque is bounded."""
-        if self._settings.searches:
-            return seen.gains
-        limits = seen.gains.effort_limits.copy()
-        limits[1] = min(limits[1], self._settings.upright_torque)
-        gains = seen.gains
-        return GainArrays(gains.stiffness, gains.damping, gains.integral, limits)
-
-    def _soft(self, seen: Observation) -> GainArrays:
-        force = self._settings.assistance * self._kit.model.weight
-        arm = float(seen.now.configuration.position[2])  # of the root's force about the feet
-        strengths = self._softness * seen.strengths
-        return self._give_way.gains(seen.whole_gains, strengths, force, force * abs(arm))
-
-    def _firmer(self, seen: Observation) -> GainArrays:
-        """From as soft as in the phase before to as it is; the root's limits are lifted at once."""
-        share = min(self._elapsed(seen) / _FIRM_AGAIN, 1.0)
-        firm = self._firm(seen)
-        if share >= 1.0:
-            return firm
-        soft = self._soft(seen)
-        return GainArrays(
-            soft.stiffness + share * (firm.stiffness - soft.stiffness),
-            soft.damping + share * (firm.damping - soft.damping),
-            firm.integral,
-            firm.effort_limits,
-        )
-
-    def _limp(self, seen: Observation) -> GainArrays:
-        return self._weak(seen, 0.0)
-
-    def _rising(self, seen: Observation) -> GainArrays:
-        if self._kit.plans:
-            return self._firm(seen)
-        return self._weak(seen, min(self._elapsed(seen) / self._settings.recovery_duration, 1.0))
-
-    def _weak(self, seen: Observation, strength: float) -> GainArrays:
-        strengths = np.full(len(self._layout.vector_starts), strength)
-        return weakened(self._layout, self._firm(seen), strengths)
-
-    # What is
-
-    def _body(self, seen: Observation) -> ReferenceState:
-        still = np.zeros(self._layout.size)
-        return ReferenceState(self._layout.configuration(seen.position), seen.velocity, still)
+    # Places
 
     def _led(self, seen: Observation) -> FloatArray:
         """The position (n,), led by as much as the target led it when it was struck.
@@ -330,27 +278,20 @@ class Reaction:
         A body lags behind what it tracks. Without that, a motion found by the body's own state
         would be one that it lags behind once more.
         """
-        turns = self._body(seen).configuration.orientations_xyzw
         entries = self._layout.rotation_entries
         position = seen.position + self._lead
+        turns = self._body.configuration.orientations_xyzw
         turned = rotations.multiply(turns, rotations.exp(self._lead[entries]))
         position[entries] = rotations.log(turned)
         return position
 
-    def _carry_to(self, motion: ReferenceState, there: ReferenceState) -> PlanarTransform:
-        """What leads from where a motion's root is, and faces, to where another one's is."""
-        one, other = motion.configuration, there.configuration
-        heading = self._kit.posture.heading
-        return PlanarTransform.leading(
-            one.position[:3],
-            float(heading(one.orientations_xyzw[0])),
-            other.position[:3],
-            float(heading(other.orientations_xyzw[0])),
-        )
+    def _carry_to(self, seen: Observation, there: ReferenceState) -> PlanarTransform:
+        """The move from the root of the reference to that of a state."""
+        return self._kit.posture.carry(seen.now.configuration, there.configuration)
 
-    def _faces_up(self, seen: Observation) -> bool:
-        return self._kit.posture.faces_up(self._body(seen).configuration.orientations_xyzw[0])
+    def _faces_up(self) -> bool:
+        return self._kit.posture.faces_up(self._body.configuration.orientations_xyzw[0])
 
     def _has_fallen(self, seen: Observation) -> bool:
-        target = self._way.target(seen.time, seen.now).configuration
-        return self._kit.posture.has_fallen(self._body(seen).configuration, target)
+        desired = self._desired(seen).configuration
+        return self._kit.posture.has_fallen(self._body.configuration, desired)

@@ -1,4 +1,4 @@
-"""The parameters of the behaviours, checked."""
+"""The parameters of the behaviours that react to hits, checked."""
 
 from dataclasses import dataclass
 
@@ -8,17 +8,9 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.parameters import Parameter, Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
 
-BEHAVIOURS = ("tracking", "ragdoll", "active_ragdoll", "reactive")
 _TELLS_HITS = ("active_ragdoll", "reactive")
 
-BEHAVIOUR_PARAMETERS = [
-    Parameter(
-        "behaviour",
-        "tracking",
-        "track whatever comes; be limp; track, and go limp on a hard hit; or track, and react to "
-        "a hit",
-        choices=BEHAVIOURS,
-    ),
+REACTION_PARAMETERS = [
     Parameter("hit.threshold", 3.0, "impulse of contacts that counts as a hit", unit="N s"),
     Parameter("limp.threshold", 30.0, "impulse of a hit that makes it limp", unit="N s"),
     Parameter(
@@ -68,7 +60,7 @@ BEHAVIOUR_PARAMETERS = [
 
 @dataclass(frozen=True)
 class ReactionSettings:
-    """What `active_ragdoll` and `reactive` depend on."""
+    """The settings of `active_ragdoll` and `reactive`."""
 
     searches: bool  # reactive
     hit_threshold: float  # N s

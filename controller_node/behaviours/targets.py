@@ -1,72 +1,57 @@
-"""What is tracked in each phase of a reaction: ways that lead on from one another."""
+"""Targets of a reaction's phases; at a change an offset leads on from the target before."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
-from controller_node.references.base import Reference, ReferenceState
+from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertializationOffset
-from controller_node.references.transformed import PlanarTransform
+from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.character.layout import JointLayout
 
 _NO_CARRY = PlanarTransform()
 
 
 class Target(Protocol):
-    """What is tracked; its state at a time in s may depend on that of the own reference."""
+    """The state to track over time, which may depend on the reference's own."""
 
-    def target(self, time: float, own: ReferenceState) -> ReferenceState:
-        """The state to track at a time."""
+    def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
+        """The state to track at a time in s, where the reference has the state `own`."""
         ...
 
 
-class _AsItIs:
-    """The own reference."""
-
-    def target(self, time: float, own: ReferenceState) -> ReferenceState:
-        """The own reference's state."""
-        return own
-
-
-AS_IT_IS: Target = _AsItIs()
-
-
+@dataclass(eq=False)
 class ReferenceTarget:
-    """The own reference, where the character has been carried to, and the way onto it."""
+    """The reference, carried to where the character goes on with it."""
 
-    def __init__(
-        self,
-        layout: JointLayout,
-        carry: PlanarTransform = _NO_CARRY,
-        offset: InertializationOffset | None = None,
-    ) -> None:
-        self._layout = layout
-        self.carry = carry
-        self._offset = offset
+    layout: JointLayout
+    carry: PlanarTransform = _NO_CARRY
+    offset: InertializationOffset | None = None
 
-    def target(self, time: float, own: ReferenceState) -> ReferenceState:
-        """The own reference's state, carried, with what is left of the offset."""
-        carried = self.carry.moved(self._layout, own)
-        return carried if self._offset is None else self._offset.applied(carried, time)
+    def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
+        """The reference's state, carried, with the rest of the offset."""
+        carried = self.carry.moved(self.layout, own)
+        return carried if self.offset is None else self.offset.applied(carried, time)
 
 
+@dataclass(eq=False)
 class ClipTarget:
-    """A motion that was found."""
+    """A motion of the library."""
 
-    def __init__(self, reference: Reference) -> None:
-        self._reference = reference
+    motion: TransformedReference
+    offset: InertializationOffset
 
-    def target(self, time: float, own: ReferenceState) -> ReferenceState:
-        """The motion's state."""
-        return self._reference.sample(time)
+    def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
+        """The motion's state, with the rest of the offset."""
+        return self.offset.applied(self.motion.sample(time), time)
 
 
+@dataclass(eq=False)
 class CurrentStateTarget:
-    """The body itself: nothing is tracked, and the target comes to the state that there is."""
+    """The character's present state, to which the target comes: nothing draws the character."""
 
-    def __init__(self, offset: InertializationOffset, state: ReferenceState) -> None:
-        """From what `offset` leads to; `state` is the present one, to be kept up to date."""
-        self._offset = offset
-        self.state = state
+    state: ReferenceState  # kept up to date by its owner
+    offset: InertializationOffset
 
-    def target(self, time: float, own: ReferenceState) -> ReferenceState:
-        """The present state, with what is left of the offset."""
-        return self._offset.applied(self.state, time)
+    def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
+        """The present state, with the rest of the offset."""
+        return self.offset.applied(self.state, time)

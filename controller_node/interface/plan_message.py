@@ -1,4 +1,4 @@
-"""What is expected of a plan as `sensor_msgs/PointCloud2`: the path of the centre of mass."""
+"""The expectation of a plan as `sensor_msgs/PointCloud2`: the path of the centre of mass."""
 
 import sys
 

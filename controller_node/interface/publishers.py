@@ -1,4 +1,4 @@
-"""What the controller publishes."""
+"""The publishers of the controller, and its answers to states."""
 
 import json
 from collections.abc import Iterator
@@ -38,7 +38,7 @@ class Answer:
 
 
 class Publishers:
-    """The publishers of a controller. A topic that nobody listens to costs nothing."""
+    """The publishers of a controller. A topic without subscribers costs nothing."""
 
     def __init__(
         self, node: Node, layout: JointLayout, commanded: IntArray, session: str | None
@@ -96,7 +96,7 @@ class Publishers:
         topics.publish_together(self._beside_torques(answer))
 
     def _beside_torques(self, answer: Answer) -> Iterator[Outgoing]:
-        """What the simulator does not wait for, if anybody listens."""
+        """The messages that the simulator does not wait for, where there are subscribers."""
         if self._references.get_subscription_count():
             reference = answer.reference
             yield (
@@ -129,11 +129,11 @@ class Publishers:
         self._strengths.publish(message)
 
     def publish_mode(self, report: ModeReport) -> None:
-        """Publish what it does, since when and why, as JSON."""
+        """Publish the mode, since when and why it holds, as JSON."""
         self._modes.publish(String(data=json.dumps(report.content(), allow_nan=False)))
 
     def publish_plan(self, outlook: Outlook, stamp_ns: int) -> None:
-        """Publish what is expected of a plan that was made in the state of a stamp."""
+        """Publish the expectation of a plan that was made in the state of a stamp."""
         if self._plans.get_subscription_count():
             self._plans.publish(plan_message(outlook, stamp_ns))
 

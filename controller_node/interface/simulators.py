@@ -1,4 +1,4 @@
-"""Which of the simulators that are heard the controller belongs to, and what those say."""
+"""The simulator that the controller is bound to, among all that publish."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,16 @@ from dataclasses import dataclass
 from rclpy.node import Node
 from std_msgs.msg import Header, String
 
-from msgs_config.errors import ActuatedCharactersError, ClockError, MessageError
+from controller_node.controller import Controller
+from controller_node.parameters import check_world
+from msgs_config.character.model import Character
+from msgs_config.errors import (
+    ActuatedCharactersError,
+    CharacterError,
+    ClockError,
+    ConfigurationError,
+    MessageError,
+)
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.configuration import RunConfiguration
@@ -18,6 +27,7 @@ from msgs_config.messages.session import (
     named,
     session_of,
 )
+from msgs_config.parameters import Values
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
@@ -30,10 +40,9 @@ _ALONE_AFTER = 1.0  # s in which another simulator would have been discovered
 
 @dataclass
 class _Known:
-    """What one simulator has said of itself."""
+    """The configuration and episode that one simulator published."""
 
     configuration: RunConfiguration | None = None
-    is_checked: bool = False
     error: ActuatedCharactersError | None = None  # why this controller is not made for it
     episode_ns: int | None = None
 
@@ -41,8 +50,8 @@ class _Known:
 class Simulators:
     """Takes `~/configuration` and `episode` of all simulators, and binds to one of them.
 
-    It binds to the session that is given, or else to the first whose state can be used. What the
-    others say is rejected, counted, and logged once for each.
+    It binds to the session that is given, or else to the first whose state can be used. Messages of
+    the others are rejected, counted, and logged once for each.
     """
 
     def __init__(
@@ -69,7 +78,7 @@ class Simulators:
         self._episodes = DirectSubscription(node, topics.EPISODE.for_listener(depth))
         self._configurations = DirectSubscription(node, _CONFIGURATION.for_listener(depth))
         self.runs_on = False
-        """Whether the simulator waits for nobody."""
+        """Whether the simulator runs in real time, and waits for no answer."""
 
     @property
     def bound(self) -> str | None:
@@ -78,7 +87,7 @@ class Simulators:
 
     @property
     def counts(self) -> dict[str, int]:
-        """What was rejected, for the diagnostics."""
+        """Numbers of rejected messages, for the diagnostics."""
         counts = self._foreign.counts
         return {
             "foreign_states": counts[topics.JOINT_STATES.name],
@@ -88,7 +97,7 @@ class Simulators:
         }
 
     def look(self, now: float) -> None:
-        """Take what simulators have said of themselves; `now` in s of wall time.
+        """Take episodes and configurations of simulators; `now` in s of wall time.
 
         Raises:
             ActuatedCharactersError: the one that it is bound to, or the only one that there is,
@@ -125,9 +134,9 @@ class Simulators:
         return False
 
     def episode_before(self, stamp_ns: int) -> int | None:
-        """Stamp of the first state of the episode that goes on at a stamp, as the simulator says.
+        """Stamp of the first state of the episode that goes on at a stamp, from `episode`.
 
-        None if it does not, or not yet; after a while that is logged.
+        None if it is not known yet; after a while that is logged.
         """
         session = self._binding.bound
         known = None if session is None else self._known.get(session)
@@ -151,9 +160,10 @@ class Simulators:
         if not self._binding.admits(session):
             self._reject(topics.JOINT_STATES.name, session)
             return False
-        if self._binding.bound is None and (error := self._error_of(session)) is not None:
-            if self._unusable_since is None:  # else that is what this node ends with
-                self._once_logger.log_once(f"state ignored: {error}")
+        known = self._known.get(session)
+        if self._binding.bound is None and known is not None and known.error is not None:
+            if self._unusable_since is None:  # else this node ends with that error
+                self._once_logger.log_once(f"state ignored: {known.error}")
             return False
         return True
 
@@ -196,10 +206,10 @@ class Simulators:
             self._reject(_CONFIGURATION.name, found.session)
         known = self._known_of(found.session)
         is_first = known.configuration is None
-        known.configuration, known.is_checked, known.error = found, False, None
+        known.configuration, known.error = found, self._error_of(found)
         if self._binding.bound != found.session:
             return
-        if is_first and self._checked(known) is not None and self._binding.release():
+        if is_first and known.error is not None and self._binding.release():
             return  # its first state came before it, and another simulator may be there
         self._judge(known)
 
@@ -207,36 +217,30 @@ class Simulators:
         """Raise the error if the bound simulator is not what this controller was made for."""
         if known.configuration is not None:
             self.runs_on = known.configuration.parameters.get("mode") == "realtime"
-        if (error := self._checked(known)) is not None:
-            raise error
+        if known.error is not None:
+            raise known.error
 
     def _refuse_the_only_one(self) -> None:
         """Raise the error of the only simulator that there is, if it can never be bound to.
 
         A second one may be running for long and only not be discovered yet.
         """
-        told = [known for known in self._known.values() if known.configuration is not None]
-        errors = [error for known in told if (error := self._checked(known)) is not None]
-        if not errors or len(errors) < len(told) or self._count_publishers() > 1:
+        configured = [known for known in self._known.values() if known.configuration is not None]
+        errors = [known.error for known in configured if known.error is not None]
+        if not errors or len(errors) < len(configured) or self._count_publishers() > 1:
             self._unusable_since = None
         elif self._unusable_since is None:
             self._unusable_since = self._now
         elif self._now > self._unusable_since + _ALONE_AFTER:
             raise errors[-1]
 
-    def _error_of(self, session: str) -> ActuatedCharactersError | None:
-        known = self._known.get(session)
-        return None if known is None else self._checked(known)
-
-    def _checked(self, known: _Known) -> ActuatedCharactersError | None:
-        """Why a simulator is not the one that this controller was made for; checked once."""
-        if known.configuration is not None and not known.is_checked:
-            known.is_checked = True
-            try:
-                self._check(known.configuration)
-            except ActuatedCharactersError as error:
-                known.error = error
-        return known.error
+    def _error_of(self, found: RunConfiguration) -> ActuatedCharactersError | None:
+        """Why a simulator is not the one that this controller was made for."""
+        try:
+            self._check(found)
+        except ActuatedCharactersError as error:
+            return error
+        return None
 
     def _known_of(self, session: str) -> _Known:
         if session not in self._known:
@@ -245,3 +249,25 @@ class Simulators:
                 del self._known[next(others)]
             self._known[session] = _Known()
         return self._known[session]
+
+
+def check_simulator(
+    controller: Controller, character: Character, values: Values, simulator: RunConfiguration
+) -> None:
+    """Raise an error if a simulator simulates something else than a controller was made for."""
+    if simulator.probe is None:
+        return
+    if simulator.layout.dof_names != character.layout.dof_names:
+        raise CharacterError(
+            f"the simulator's character '{simulator.character}' has other degrees of freedom "
+            f"than '{character.name}'; set 'character' to the simulator's"
+        )
+    controller.check_agreement(simulator.probe)
+    check_world(values, simulator.parameters)
+    for name in ("rate", "placement"):
+        its, own = simulator.parameters.get(name), values[name]
+        if its != own:
+            raise ConfigurationError(
+                f"the simulator's parameter '{name}' is {its}, the controller's is {own}; "
+                "they must be the same"
+            )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from controller_node.planner.base import Planner
 from controller_node.planner.recorded import RecordedPlanner
 from controller_node.planner.settings import NO_PLANNER, RECORDED, check_planner, make_settings
-from controller_node.references.files.reconstructed import read_plan
+from controller_node.references.files.reconstructed import ReconstructedClip
 from controller_node.references.offsets import RecordedPlan
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
@@ -55,7 +55,7 @@ def make_planner(character: Character, values: Values) -> Planner | None:
 def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
     """The plan in a clip's file, at this controller's rate."""
     clip, rate = values.text("clip"), values.integer("rate")
-    plan = read_plan(character, clip) if values.text("reference") == "clip" else None
+    plan = ReconstructedClip(character, clip).plan if values.text("reference") == "clip" else None
     if plan is None:
         raise ConfigurationError(
             f"planner '{RECORDED}' plays the plan in a file of `reconstruct`; the clip '{clip}' "

@@ -1,1 +1,1 @@
-"""What the character is to do: the desired state as a function of time."""
+"""References: the desired state as a function of time."""

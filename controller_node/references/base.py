@@ -1,10 +1,15 @@
-"""What every reference offers."""
+"""The interface of a reference, and the references by name."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
+from controller_node.registry import Registry
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.character.model import Character
+from msgs_config.messages.state import StampedState
+from msgs_config.parameters import Values
 
 
 @dataclass(frozen=True)
@@ -22,3 +27,21 @@ class Reference(Protocol):
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the episode's first state."""
         ...
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A reference, and warnings about it for the user."""
+
+    reference: Reference
+    warnings: tuple[str, ...] = ()
+
+    def first_state(self) -> StampedState:
+        """The state in which a character is to begin, so that it is where the reference is."""
+        first = self.reference.sample(0.0)
+        return StampedState(0, first.configuration.position, first.velocity, None)
+
+
+MotionMaker: TypeAlias = Callable[[Character, Values], Motion]
+
+REFERENCES = Registry[MotionMaker]()

@@ -6,11 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from controller_node.references.base import ReferenceState
-from controller_node.references.files.clip import ClipFrames
+from controller_node.references.base import REFERENCES, Motion, ReferenceState
+from controller_node.references.files.clip import ClipFrames, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
+from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
+from msgs_config.parameters import Parameter, Values
 
 _BLEND_TIME = 0.15  # s before the wrap, over which the gap to the first frame is closed
 
@@ -46,9 +48,11 @@ class ClipReference:
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the clip's first frame."""
-        cycle, time_in_cycle = self._cycle(time)
         if not self._wraps and time >= self._period:
-            return self._last_frame()
+            still = np.zeros(self._layout.size)
+            return self._state(self._positions[-1].copy(), self._orientations[-1], still)
+        cycle = int(time // self._period) if self._wraps else 0
+        time_in_cycle = time - cycle * self._period
         frame = min(bisect_right(self._frame_times, time_in_cycle), len(self._frame_times) - 1) - 1
         since_frame = time_in_cycle - self._frame_times[frame]
         velocity = self._velocities[frame].copy()
@@ -58,16 +62,6 @@ class ClipReference:
         if cycle and self._moves:
             self._continue_root(cycle, position, orientations, velocity)
         return self._state(position, orientations, velocity)
-
-    def _cycle(self, time: float) -> tuple[int, float]:
-        if not self._wraps:
-            return 0, time
-        cycle = int(time // self._period)
-        return cycle, time - cycle * self._period
-
-    def _last_frame(self) -> ReferenceState:
-        velocity = np.zeros(self._layout.size)
-        return self._state(self._positions[-1].copy(), self._orientations[-1], velocity)
 
     def _state(
         self, position: FloatArray, orientations_xyzw: FloatArray, velocity: FloatArray
@@ -133,3 +127,14 @@ class ClipReference:
 def _cycle_turn(root_xyzw: FloatArray) -> FloatArray:
     """Turn in rad about z from the first frame to the last."""
     return rotations.yaw(rotations.multiply(root_xyzw[-1], rotations.conjugate(root_xyzw[0])))
+
+
+@REFERENCES.offer(
+    "clip",
+    Parameter("clip", "walk", "name of a clip of the character, or path of a .txt or .json file"),
+)
+def _clip(character: Character, values: Values) -> Motion:
+    frames = read_clip(character, values.text("clip"))
+    names = ", ".join(frames.clamped)
+    kept = (f"kept within joint limits: {names}",) if names else ()
+    return Motion(ClipReference(character.layout, frames), kept)

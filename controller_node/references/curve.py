@@ -28,7 +28,7 @@ _DEGREE = len(_QUINTIC)
 
 @dataclass(frozen=True)
 class Knots:
-    """What a curve goes through: p configurations at rising times, and how fast if that is set.
+    """The p configurations of a curve at rising times, with velocities and accelerations if set.
 
     Without velocities the curve between them is linear, with velocities cubic, with accelerations
     too it is quintic.
@@ -38,6 +38,16 @@ class Knots:
     configurations: GeneralizedPosition  # (p, n), (p, k, 4)
     velocities: FloatArray | None = None  # (p, n), a rotation's in the child frame
     accelerations: FloatArray | None = None  # (p, n), their rates of change
+
+    def __getitem__(self, rows: slice) -> "Knots":
+        """Some of the knots, in order."""
+        whole = self.configurations
+        return Knots(
+            self.times[rows],
+            GeneralizedPosition(whole.position[rows], whole.orientations_xyzw[rows]),
+            None if self.velocities is None else self.velocities[rows],
+            None if self.accelerations is None else self.accelerations[rows],
+        )
 
 
 class Curve:
@@ -50,7 +60,7 @@ class Curve:
     """
 
     def __init__(self, layout: JointLayout, *parts: Knots) -> None:
-        """Join parts, each of a degree of its own; one begins with the last knot of the other."""
+        """Join parts of any degrees; each begins with the last knot of the one before."""
         self._layout = layout
         first, *others = parts
         later = [part.times[1:] for part in others]
@@ -99,7 +109,7 @@ class Curve:
         return begins + durations * shares, self._positions[:, entry, np.newaxis] + moved
 
     def _polynomials(self, segment: int, time: float) -> FloatArray:
-        """What the segment's polynomials and their first two derivatives are, (3, n)."""
+        """The segment's polynomials and their first two derivatives, (3, n)."""
         begin = self._knot_times[segment]
         rate = 1.0 / (self._knot_times[segment + 1] - begin)
         u = (time - begin) * rate
@@ -123,7 +133,7 @@ class Curve:
 
 
 def segment_offsets(layout: JointLayout, configurations: GeneralizedPosition) -> FloatArray:
-    """What leads from each configuration (p, n) to the next, (p - 1, n): rad and m."""
+    """The difference from each configuration (p, n) to the next, (p - 1, n): rad and m."""
     position, orientations = configurations.position, configurations.orientations_xyzw
     return layout.difference(
         GeneralizedPosition(position[:-1], orientations[:-1]),

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from controller_node.references.base import ReferenceState
+from controller_node.references.base import REFERENCES, Motion, ReferenceState
 from msgs_config.character.model import Character
+from msgs_config.parameters import Values
 
 
 class HoldReference:
@@ -17,3 +18,8 @@ class HoldReference:
     def sample(self, time: float) -> ReferenceState:
         """The rest pose at zero velocity, at whatever time."""
         return self._state
+
+
+@REFERENCES.offer("hold")
+def _hold(character: Character, values: Values) -> Motion:
+    return Motion(HoldReference(character))

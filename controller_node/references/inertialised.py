@@ -7,7 +7,7 @@ rotation vector do, so that the velocity is continuous whatever its direction.
 
 import numpy as np
 
-from controller_node.references.base import Reference, ReferenceState
+from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.geometry import fixed_order, rotations
@@ -24,7 +24,7 @@ _DECAY = np.array(
 
 
 class InertializationOffset:
-    """What leads from one motion to another at a time, and decays from there on.
+    """The difference of two motions at a time, which decays from there on.
 
     It is added to coordinates, and turns rotations in their child frames: `q exp(d(t))`. With
     R the turn by d and w the angular velocity of d, that moves at `R' v + w` for a v of q.
@@ -60,13 +60,9 @@ class InertializationOffset:
             )
         self._initial = np.array([apart, duration * rate, duration * duration * second_rate])
 
-    def is_over(self, time: float) -> bool:
-        """Whether the offset is gone at a time in s."""
-        return time >= self._start + self._duration
-
     def applied(self, motion: ReferenceState, time: float) -> ReferenceState:
         """The state of the motion at a time in s, not before the start, with the offset."""
-        if self.is_over(time):
+        if time >= self._start + self._duration:
             return motion
         added, rate, second_rate = self._at(time)
         position = motion.configuration.position + added
@@ -110,24 +106,3 @@ def _turned_back(
         rotations.rotate(back, motion.velocity[entries]),
         rotations.rotate(back, motion.acceleration[entries]),
     )
-
-
-class InertialisedReference:
-    """A reference that goes over from another motion: as the other at `start`, then ever less."""
-
-    def __init__(
-        self,
-        layout: JointLayout,
-        motion: Reference,
-        wanted: ReferenceState,
-        *,
-        start: float,
-        duration: float,
-    ) -> None:
-        """Go over to `motion` from the state `wanted` at `start`, within `duration`; s."""
-        self._motion = motion
-        self._offset = InertializationOffset(layout, motion.sample(start), wanted, start, duration)
-
-    def sample(self, time: float) -> ReferenceState:
-        """The desired state at a time in s, not before the start."""
-        return self._offset.applied(self._motion.sample(time), time)

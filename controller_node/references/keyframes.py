@@ -1,36 +1,30 @@
 """Keyframes as a reference: poses at times, and the path between them."""
 
-from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from controller_node.references.base import ReferenceState
+from controller_node.references.base import REFERENCES, Motion, ReferenceState
 from controller_node.references.curve import Curve, Knots, segment_offsets
+from controller_node.references.files.keyframes import Keyframes, read_keyframes
 from controller_node.references.limits import JointLimits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
+from msgs_config.errors import MotionError, one_of
+from msgs_config.parameters import Parameter, Values
+
+KEYFRAMES_DIRECTORY = Path(__file__).parent / "data"
 
 _SHARES = np.linspace(0.0, 1.0, 65)  # of a segment, where its path is compared with the limits
 _NOTICED = 1e-6  # rad or m
-
-
-@dataclass(frozen=True)
-class Keyframes:
-    """The keyframes of a file, in a character's layout and where it stands."""
-
-    times: FloatArray  # (p,) s, rising
-    configurations: GeneralizedPosition  # (p, n), (p, k, 4)
-    smooth: bool  # else linear
-    period: float | None = None  # s, of a loop
-    warnings: tuple[str, ...] = ()  # what their author may have overlooked
 
 
 class KeyframesReference:
     """Keyframes in time.
 
     A loop goes on from the last keyframe to the first one of the next period, and is periodic from
-    time 0 on. Else the first keyframe is held until its time comes, and the last one ever after.
+    time 0 on. Else the first keyframe is held until its time comes, and the last one from then on.
     """
 
     def __init__(self, layout: JointLayout, keyframes: Keyframes) -> None:
@@ -96,7 +90,7 @@ def _parabolas(
 
 
 def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
-    """What to say of each joint that the path leads out of its limits between two keyframes."""
+    """A warning of each joint that the path leads out of its limits between two keyframes."""
     if len(keyframes.times) == 1:
         return ()
     limits, curve = JointLimits(character), curve_through(character.layout, keyframes)
@@ -117,3 +111,21 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
                 "more keyframe there, or 'interpolation: linear', keeps it within"
             )
     return tuple(warnings)
+
+
+@REFERENCES.offer(
+    "keyframes", Parameter("keyframes", "", "name of shipped keyframes, or path of a .yaml file")
+)
+def _keyframes(character: Character, values: Values) -> Motion:
+    keyframes = read_keyframes(character, str(_path(values.text("keyframes"))))
+    reference = KeyframesReference(character.layout, keyframes)
+    return Motion(reference, overshoots(character, keyframes))
+
+
+def _path(name_or_path: str) -> Path:
+    if name_or_path.endswith((".yaml", ".yml")):
+        return Path(name_or_path)
+    shipped = sorted(path.stem for path in KEYFRAMES_DIRECTORY.glob("*.yaml"))
+    if name_or_path not in shipped:
+        raise MotionError(f"{one_of('keyframes', name_or_path, shipped)}, or the path of a .yaml")
+    return KEYFRAMES_DIRECTORY / f"{name_or_path}.yaml"

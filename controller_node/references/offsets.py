@@ -32,7 +32,7 @@ class Offsets:
         return offset
 
     def during(self, first: int, ticks: int) -> "Offsets":
-        """What is needed of them for so many ticks from one on."""
+        """The part of them for a number of ticks from one on."""
         begin, _ = knot_before(first, self.knot_ticks)
         end, _ = knot_before(first + ticks - 1, self.knot_ticks)
         rows = self.rows[begin - self.first_knot : end + 2 - self.first_knot]

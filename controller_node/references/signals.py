@@ -5,13 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from controller_node.references.base import ReferenceState
+from controller_node.references.base import REFERENCES, Motion, ReferenceState
 from controller_node.references.limits import LARGEST_NUMBER, JointLimits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import MotionError, one_of
 from msgs_config.geometry import rotations
+from msgs_config.parameters import Parameter, Values
 
 
 class StepReference:
@@ -32,8 +33,7 @@ class StepReference:
         """
         _check_number("the step's size", size)
         _check_number("the step's time", time, minimum=0.0)
-        chosen = _chosen(character.layout, dof_names)
-        _check_limits(character, chosen, [size], "step")
+        chosen = _chosen(character, dof_names, [size], "step")
         rest = character.layout.configuration(np.array(character.rest_position))
         still = np.zeros(character.layout.size)
         away = _moved(character.layout, rest, size * chosen)
@@ -54,11 +54,7 @@ class SineReference:
     """
 
     def __init__(
-        self,
-        character: Character,
-        dof_names: Sequence[str],
-        amplitude: float,
-        frequency_hz: float,
+        self, character: Character, dof_names: Sequence[str], amplitude: float, frequency_hz: float
     ) -> None:
         """An oscillation of each degree of freedom named; `amplitude` in rad or m.
 
@@ -68,8 +64,7 @@ class SineReference:
         """
         _check_number("the sine's amplitude", amplitude)
         _check_number("the sine's frequency", frequency_hz, minimum=0.0)
-        chosen = _chosen(character.layout, dof_names)
-        _check_limits(character, chosen, [amplitude, -amplitude], "sine")
+        chosen = _chosen(character, dof_names, [amplitude, -amplitude], "sine")
         self._layout = character.layout
         self._rest = character.layout.configuration(np.array(character.rest_position))
         self._amplitudes = amplitude * chosen
@@ -86,6 +81,58 @@ class SineReference:
         )
 
 
+_DOFS = Parameter(
+    "signal.dofs",
+    [],
+    "degrees of freedom that step or sine moves; none named: all that have a motor and may",
+    texts=True,
+)
+
+
+@REFERENCES.offer(
+    "step",
+    Parameter("step.size", 0.1, "how far the step goes", unit="rad or m", minimum=-1e6),
+    Parameter("step.time", 0.5, "when, since the episode began", unit="s"),
+)
+def _step(character: Character, values: Values) -> Motion:
+    size, time = values.number("step.size"), values.number("step.time")
+    dofs, warnings = _signal_dofs(character, values, [size])
+    return Motion(StepReference(character, dofs, size, time), warnings)
+
+
+@REFERENCES.offer(
+    "sine",
+    _DOFS,
+    Parameter("sine.amplitude", 0.1, "how far the sine goes", unit="rad or m", minimum=-1e6),
+    Parameter("sine.frequency", 0.5, "how often a second", unit="Hz"),
+)
+def _sine(character: Character, values: Values) -> Motion:
+    amplitude, frequency = values.number("sine.amplitude"), values.number("sine.frequency")
+    dofs, warnings = _signal_dofs(character, values, [amplitude, -amplitude])
+    return Motion(SineReference(character, dofs, amplitude, frequency), warnings)
+
+
+def _signal_dofs(
+    character: Character, values: Values, offsets: Sequence[float]
+) -> tuple[Sequence[str], tuple[str, ...]]:
+    """The degrees of freedom that a signal moves, and a warning of those that it cannot move.
+
+    If none are named: all that have a motor, except those whose limits an offset would leave.
+    """
+    named = values.texts("signal.dofs")
+    if named:
+        return named, ()
+    layout, rest = character.layout, np.array(character.rest_position)
+    lower, upper = character.position_bounds()
+    reached = [rest + offset for offset in offsets]
+    free = np.all([(lower <= there) & (there <= upper) for there in reached], axis=0)
+    actuated = layout.mask(layout.actuated_joint_names)
+    chosen = [layout.dof_names[index] for index in np.flatnonzero(actuated & free)]
+    fixed = [layout.dof_names[index] for index in np.flatnonzero(actuated & ~free)]
+    warnings = (f"kept still within their limits: {', '.join(fixed)}",) if fixed else ()
+    return chosen, warnings
+
+
 def _moved(
     layout: JointLayout, rest: GeneralizedPosition, offset: FloatArray
 ) -> GeneralizedPosition:
@@ -96,18 +143,21 @@ def _moved(
     return GeneralizedPosition(position, turned)
 
 
-def _chosen(layout: JointLayout, dof_names: Sequence[str]) -> FloatArray:
-    """One (n,) at each degree of freedom named, zero elsewhere."""
+def _chosen(
+    character: Character, dof_names: Sequence[str], sizes: list[float], signal: str
+) -> FloatArray:
+    """One (n,) at each degree of freedom named, zero elsewhere; the sizes must be within limits."""
+    names = character.layout.dof_names
     if not dof_names:
         raise MotionError("no degree of freedom is named; there must be one or more")
-    chosen = np.zeros(layout.size)
+    chosen = np.zeros(len(names))
     for name in dof_names:
-        if name not in layout.dof_names:
-            raise MotionError(one_of("degree of freedom", name, list(layout.dof_names)))
-        index = layout.dof_names.index(name)
-        if chosen[index]:
+        if name not in names:
+            raise MotionError(one_of("degree of freedom", name, list(names)))
+        if chosen[names.index(name)]:
             raise MotionError(f"degree of freedom '{name}' is named twice; once is enough")
-        chosen[index] = 1.0
+        chosen[names.index(name)] = 1.0
+    _check_limits(character, chosen, sizes, signal)
     return chosen
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.curve import Curve, Knots
 from controller_node.references.limits import LARGEST_NUMBER, SHORTEST_TIME, JointLimits
-from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import LayoutError, MotionError
@@ -75,46 +75,34 @@ def _rows(what: str, lists: Sequence[Sequence[float]], width: int) -> FloatArray
     return np.array(lists, dtype=float)
 
 
-def checked(character: Character, points: TrajectoryPoints) -> TrajectoryPoints:
-    """The points as they are, if the character can follow them.
-
-    Raises:
-        MotionError: says which point (counted from 1), which degree of freedom, and what would be
-            right.
-    """
-    if not points.dof_names:
-        raise MotionError("trajectory: it names no degree of freedom")
+def _check(character: Character, points: TrajectoryPoints) -> None:
+    """Raise MotionError if the character cannot follow the points; they are counted from 1."""
     if not points.times.size:
         raise MotionError("trajectory: it has no points; it must have one or more")
     if points.times.size > _MOST_POINTS:
         raise MotionError(
             f"trajectory: it has {points.times.size} points; it must have {_MOST_POINTS} or fewer"
         )
-    indices = _indices(character.layout, points)
-    _check_arrays(points)
+    try:
+        indices = character.layout.indices(points.dof_names)
+    except LayoutError as error:
+        raise MotionError(f"trajectory: {error}") from error
+    _check_numbers(points)
     _check_times(points.times)
     positions = np.zeros((len(points.times), character.layout.size))
     positions[:, indices] = points.positions
     limits = JointLimits(character)
     for row, column in np.argwhere(limits.excess(positions)[:, indices] > 0.0)[:1].tolist():
-        index = int(indices[column])
-        raise MotionError(
-            f"trajectory: point {row + 1}: position of '{points.dof_names[column]}' is "
-            f"{points.positions[row, column]:g}; it must be within the joint's limits, "
-            f"{limits.text(index)}"
+        raise _wrong(
+            points,
+            (row, column),
+            "position",
+            points.positions,
+            f"within the joint's limits, {limits.text(int(indices[column]))}",
         )
-    return points
 
 
-def _indices(layout: JointLayout, points: TrajectoryPoints) -> IntArray:
-    try:
-        return layout.indices(points.dof_names)
-    except LayoutError as error:
-        raise MotionError(f"trajectory: {error}") from error
-
-
-def _check_arrays(points: TrajectoryPoints) -> None:
-    shape = len(points.times), len(points.dof_names)
+def _check_numbers(points: TrajectoryPoints) -> None:
     if points.velocities is None and points.accelerations is not None:
         raise MotionError("trajectory: it has accelerations without velocities; it must have both")
     for what, array in (
@@ -122,19 +110,10 @@ def _check_arrays(points: TrajectoryPoints) -> None:
         ("velocity", points.velocities),
         ("acceleration", points.accelerations),
     ):
-        if array is None:
-            continue
-        if array.shape != shape:
-            raise MotionError(
-                f"trajectory: its array of {what} is {array.shape}; it must be {shape}, one "
-                "number for each point and degree of freedom"
-            )
-        for row, column in np.argwhere(~(np.abs(array) <= LARGEST_NUMBER))[:1].tolist():
-            raise MotionError(
-                f"trajectory: point {row + 1}: {what} of '{points.dof_names[column]}' is "
-                f"{array[row, column]:g}; it must be from {-LARGEST_NUMBER:g} to "
-                f"{LARGEST_NUMBER:g}"
-            )
+        if array is not None:
+            for row, column in np.argwhere(~(np.abs(array) <= LARGEST_NUMBER))[:1].tolist():
+                right = f"from {-LARGEST_NUMBER:g} to {LARGEST_NUMBER:g}"
+                raise _wrong(points, (row, column), what, array, right)
     if points.velocities is not None:
         for (column,) in np.argwhere(np.abs(points.velocities[-1]) > _STOPPED)[:1].tolist():
             raise MotionError(
@@ -143,9 +122,17 @@ def _check_arrays(points: TrajectoryPoints) -> None:
             )
 
 
+def _wrong(
+    points: TrajectoryPoints, place: tuple[int, int], what: str, array: FloatArray, right: str
+) -> MotionError:
+    row, column = place
+    return MotionError(
+        f"trajectory: point {row + 1}: {what} of '{points.dof_names[column]}' is "
+        f"{array[row, column]:g}; it must be {right}"
+    )
+
+
 def _check_times(times: FloatArray) -> None:
-    if times.ndim != 1:
-        raise MotionError(f"trajectory: its times are {times.shape}; they must be one a point")
     for number, time in enumerate(times.tolist(), start=1):
         if not 0.0 <= time <= LARGEST_NUMBER:
             raise MotionError(
@@ -200,12 +187,12 @@ class TrajectoryReference:
             MotionError: the character cannot follow the points, the first one, at time 0, is not
                 where the reference is, or too many trajectories are yet to begin.
         """
-        checked(self.character, points)
+        _check(self.character, points)
         layout, there = self.character.layout, self.sample(start)
         knots = _knots(layout, points, start, there)
         if points.times[0] < SHORTEST_TIME:
             _check_first(self.character, points, knots, there)
-            knots = _without_first(knots)
+            knots = knots[1:]
         curve = Curve(layout, _lead(layout, start, there, knots), knots)
         kept, waiting = self._until(start, start if now is None else now)
         if waiting > _MOST_WAITING:
@@ -213,7 +200,7 @@ class TrajectoryReference:
         return TrajectoryReference(self.character, kept, curve, waiting)
 
     def _until(self, start: float, now: float) -> tuple[Reference, int]:
-        """What holds until a trajectory's start, and how many are yet to begin then."""
+        """The reference until a trajectory's start, and how many are yet to begin then."""
         if self.curve is None or start <= self.curve.start:
             return self.before, 1
         if now < self.curve.start:
@@ -245,9 +232,10 @@ def _check_first(
 ) -> None:
     """A first point at time 0 must be where the reference is."""
     layout, unit = character.layout, JointLimits(character).unit
-    apart = layout.difference(now.configuration, _configuration(knots, 0))
     indices = layout.indices(points.dof_names)
-    away = np.abs(apart[indices])
+    whole = knots.configurations
+    first = GeneralizedPosition(whole.position[0], whole.orientations_xyzw[0])
+    away = np.abs(layout.difference(now.configuration, first)[indices])
     if away.max() > _SAME:
         column = int(away.argmax())
         raise MotionError(
@@ -257,32 +245,17 @@ def _check_first(
         )
 
 
-def _configuration(knots: Knots, number: int) -> GeneralizedPosition:
-    whole = knots.configurations
-    return GeneralizedPosition(whole.position[number], whole.orientations_xyzw[number])
-
-
-def _without_first(knots: Knots) -> Knots:
-    whole = knots.configurations
-    return Knots(
-        knots.times[1:],
-        GeneralizedPosition(whole.position[1:], whole.orientations_xyzw[1:]),
-        None if knots.velocities is None else knots.velocities[1:],
-        None if knots.accelerations is None else knots.accelerations[1:],
-    )
-
-
 def _lead(layout: JointLayout, start: float, now: ReferenceState, knots: Knots) -> Knots:
-    """What leads from the state at `start` to how the motion through the knots begins."""
+    """The knots of the quintic from the state at `start` to the beginning of the motion."""
     begin = Curve(layout, knots).sample(float(knots.times[0]))  # at rest if there is one knot
     velocity = begin.velocity if knots.velocities is None else knots.velocities[0]
     acceleration = begin.acceleration if knots.accelerations is None else knots.accelerations[0]
-    present, first = now.configuration, _configuration(knots, 0)
+    present, first = now.configuration, knots.configurations
     return Knots(
         np.array([start, knots.times[0]]),
         GeneralizedPosition(
-            np.array([present.position, first.position]),
-            np.array([present.orientations_xyzw, first.orientations_xyzw]),
+            np.array([present.position, first.position[0]]),
+            np.array([present.orientations_xyzw, first.orientations_xyzw[0]]),
         ),
         np.array([now.velocity, velocity]),
         np.array([now.acceleration, acceleration]),

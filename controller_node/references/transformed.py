@@ -23,7 +23,7 @@ class PlanarTransform:
     def leading(
         cls, from_place: FloatArray, from_heading: float, to_place: FloatArray, to_heading: float
     ) -> "PlanarTransform":
-        """What leads from one place (3,) in m and heading in rad to others; heights do not count.
+        """The move from one place (3,) in m and heading in rad to others; heights do not count.
 
         The turn is the shorter one.
         """

@@ -5,10 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from controller_node.actuation import Actuation, net_wrench
+from controller_node.actuation import describe_actuation, net_wrench
 from controller_node.parameters import PARAMETERS, character_parameters, commanded_joints
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
@@ -27,9 +26,7 @@ from tests.support.physics import (
     free_random_state,
     link_motions,
     momentum,
-    random_rotation_vector,
     random_state,
-    simulation,
     without_self_collision,
 )
 from tests.support.ros import ControllerClient, Processes, joint_state, stamp_ns
@@ -58,13 +55,11 @@ every_character = pytest.mark.parametrize("name", EVERY_CHARACTER, ids=character
 floating_characters = pytest.mark.parametrize("name", FLOATING_CHARACTERS, ids=character_id)
 
 
-def actuation_of(whole: Character, assistance: bool) -> Actuation:
-    values = resolve(
-        PARAMETERS + character_parameters(whole),
-        {"character": whole.name, "root_assistance": assistance},
-    )
-    commanded = whole.layout.mask(commanded_joints(whole, values))
-    return Actuation(int(commanded.sum()), whole.layout.size)
+def actuators(whole: Character, assistance: bool) -> int:
+    """How many degrees of freedom the controller commands."""
+    given = {"character": whole.name, "root_assistance": assistance}
+    values = resolve(PARAMETERS + character_parameters(whole), given)
+    return int(whole.layout.mask(commanded_joints(whole, values)).sum())
 
 
 def random_effort(whole: Character, rng: np.random.Generator, largest: float) -> FloatArray:
@@ -86,26 +81,11 @@ def spin(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
 def test_a_fixed_base_is_fully_actuated_and_a_floating_one_only_with_assistance(name: str) -> None:
     whole, (motors, size) = character(name), COUNTS[character_id(name)]
 
-    alone, assisted = (actuation_of(whole, assistance) for assistance in (False, True))
+    alone, assisted = (actuators(whole, assistance) for assistance in (False, True))
 
-    assert (alone.actuators, alone.degrees_of_freedom) == (motors, size)
-    assert (assisted.actuators, assisted.degrees_of_freedom) == (size, size)
-    assert alone.is_full == (motors == size)
-    assert assisted.is_full
-
-
-@pytest.mark.parametrize(("actuators", "full"), [(28, False), (34, True), (40, True)])
-def test_it_says_how_many_actuators_there_are_and_whether_they_are_enough(
-    actuators: int, full: bool
-) -> None:
-    actuation = Actuation(actuators, 34)
-
-    assert actuation.content() == {
-        "actuators": actuators,
-        "degrees_of_freedom": 34,
-        "fully_actuated": full,
-    }
-    assert json.loads(json.dumps(actuation.content())) == actuation.content()
+    assert (alone, assisted, whole.layout.size) == (motors, size, size)
+    assert describe_actuation(alone, size)["fully_actuated"] == (motors == size)
+    assert describe_actuation(assisted, size)["fully_actuated"]
 
 
 # What efforts do to the character as a whole
@@ -139,45 +119,6 @@ def test_otherwise_it_is_the_roots_force_and_its_torque_turned_to_the_world(name
     np.testing.assert_allclose(torque, axes @ effort[3:6], rtol=0.0, atol=1e-12)
     force[:] = 0.0  # it is the caller's own
     assert effort.tolist() == before.tolist()
-
-
-@pytest.mark.parametrize("assistance", [True, False])
-@floating_characters
-def test_it_is_what_changes_the_engines_momentum_over_a_tick_in_flight(
-    name: str, assistance: bool
-) -> None:
-    # Arrange: at rest, and so gently moved that the arm of the force hardly changes
-    whole = character(name)
-    rng = np.random.default_rng(3)
-    effort = random_effort(whole, rng, 1.0)
-    effort[:6] = assistance * np.append(rng.uniform(20.0, 50.0, 3), rng.uniform(2.0, 5.0, 3))
-    start = np.array(whole.rest_position)
-    start[3:6] = random_rotation_vector(rng)
-    joints = [ROOT] * assistance + whole.layout.actuated_joint_names
-    with simulation(
-        name,
-        rate=RATE,
-        substeps=SUBSTEPS,
-        terrain="none",
-        commanded_joints=joints,
-        initial_position=start.tolist(),
-    ) as run:
-        body, position = run.actor._body, run.state.position
-        (centre, spin_before), (linear_before, _) = spin(body, whole), momentum(body, whole)
-        force, torque = net_wrench(whole.layout, whole.layout.configuration(position), effort)
-
-        # Act
-        run.advance(effort)
-        linear, (_, spin_after) = momentum(body, whole)[0], spin(body, whole)
-        applied = run.state.effort
-
-    # Assert
-    assert applied is not None and applied.tolist() == effort.tolist()
-    moment = torque + np.cross(position[:3] - centre, force)
-    assert (np.abs(moment).max() > 1.0) == assistance
-    expected = whole.mass * GRAVITY + force
-    np.testing.assert_allclose(RATE * (linear - linear_before), expected, atol=5e-3)
-    np.testing.assert_allclose(RATE * (spin_after - spin_before), moment, atol=5e-3)
 
 
 @pytest.mark.parametrize("assistance", [True, False])

@@ -21,7 +21,6 @@ from tests.support.physics import (
     controller,
     link_motions,
     link_poses,
-    momentum,
     random_state,
     simulation,
     still_world,
@@ -150,25 +149,6 @@ def test_a_points_jacobian_is_the_derivative_of_where_it_moves(name: str) -> Non
     turned = rotations.log(rotations.multiply(turn_ahead, rotations.conjugate(turn_behind)))
     moving = np.concatenate((ahead - behind, turned)) / (2.0 * STEP)
     assert jacobian @ velocity == pytest.approx(moving, abs=1e-7)
-
-
-@every_character
-def test_mass_times_jacobian_times_velocity_is_the_engines_momentum(name: str) -> None:
-    # Arrange
-    whole, rng = character(name), np.random.default_rng(4)
-    position, velocity = random_state(whole, rng)
-    model = model_at(whole, position, velocity)
-    with still_world(whole) as world:
-        world.body.set_state(position, velocity)
-        linear, _ = momentum(world.body, whole)
-
-    # Act
-    by_jacobian = whole.mass * model.centre_of_mass_jacobian() @ velocity
-
-    # Assert
-    assert by_jacobian == pytest.approx(linear, abs=1e-9 * whole.mass)
-    by_model = whole.mass * model.centre_of_mass_velocity()
-    assert by_model == pytest.approx(linear, abs=1e-9 * whole.mass)
 
 
 def test_the_weight_is_what_gravity_does_to_the_root(humanoid: Character) -> None:
@@ -356,8 +336,7 @@ class Stance:
         state, model, layout = self._run.state, self._model, self._run.layout
         model.update(state.position, state.velocity)
         posture = stable_pd_effort(
-            lambda force, added: model.solve(force, added, self._period),
-            model.bias_force(),
+            model,
             self._posture.stiffness,
             self._posture.damping,
             model.error_of(state.position, self.pose),
@@ -468,25 +447,6 @@ def test_once_it_lies_nothing_is_added(
     effort = balance.effort(still(humanoid, position), BalanceGains())
 
     assert effort.tolist() == [0.0] * humanoid.layout.size
-
-
-def test_a_push_that_is_too_large_is_one(humanoid: Character) -> None:
-    stance = Stance(humanoid, BalanceGains())
-
-    stance.push((30.0, 0.0))
-    stance.hold(2.0)
-
-    assert not stance.stands
-
-
-def test_the_same_push_has_the_same_states_to_the_bit(humanoid: Character) -> None:
-    def states() -> bytes:
-        stance = Stance(humanoid, BalanceGains())
-        stance.push((8.0, 5.0))
-        stance.hold(2.0)
-        return stance.states
-
-    assert states() == states()
 
 
 # Mistakes

@@ -14,9 +14,6 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from tests.support.physics import (
     FLOATING_TURNED_FRAMES,
     character,
-    controller,
-    run_together,
-    simulation,
 )
 
 LAYOUT = character(FLOATING_TURNED_FRAMES).layout
@@ -105,53 +102,35 @@ def test_lines_may_end_as_on_any_system(tmp_path: Path, end: str) -> None:
     assert [series.at(time)[0] for time in (0.0, 0.1)] == [1.5, -2.0]
 
 
-def test_efforts_cannot_be_written_where_no_file_can_be(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="nowhere"):
-        write_effort_series(tmp_path / "nowhere" / "efforts.csv", LAYOUT, TIMES, EFFORTS)
-
-
 # Which effort acts
 
+ACTS = {  # times in s, and the row that acts then; None: nothing
+    "from its time until the next one": ((0.5, 0), (0.599, 0), (0.6, 1), (0.8999, 1), (0.95, 2)),
+    "not before the first": ((-1.0, None), (0.0, None), (0.4999, None)),
+    "the last as long as the one before": ((1.0, 3), (1.0999, 3), (1.1, None), (1e9, None)),
+    "hardly too early": (
+        (0.6 - 0.9 * SLACK, 1),
+        (0.6 - 1.1 * SLACK, 0),
+        (0.5 - 0.9 * SLACK, 0),
+        (0.5 - 1.1 * SLACK, None),
+        (1.1 - 0.9 * SLACK, None),
+    ),
+}
 
-def test_each_effort_acts_from_its_time_until_the_next_one(tmp_path: Path) -> None:
+
+@pytest.mark.parametrize("case", ACTS)
+def test_an_effort_acts_when_its_time_has_come(tmp_path: Path, case: str) -> None:
     series = made(tmp_path)
 
-    for time, row in ((0.5, 0), (0.599, 0), (0.6, 1), (0.75, 1), (0.8999, 1), (0.9, 2), (0.95, 2)):
-        assert_acts(series, time, EFFORTS[row])
+    for time, row in ACTS[case]:
+        assert_acts(series, time, NOTHING if row is None else EFFORTS[row])
 
 
-def test_before_the_first_one_nothing_acts(tmp_path: Path) -> None:
-    series = made(tmp_path)
-
-    for time in (-1.0, 0.0, 0.4999):
-        assert_acts(series, time, NOTHING)
-
-
-def test_the_last_one_acts_as_long_as_the_one_before_it_and_then_nothing(tmp_path: Path) -> None:
-    series = made(tmp_path)
-
-    for time in (1.0, 1.05, 1.0999):
-        assert_acts(series, time, EFFORTS[3])
-    for time in (1.1, 2.0, 1e9):
-        assert_acts(series, time, NOTHING)
-
-
-def test_a_single_one_acts_for_ever(tmp_path: Path) -> None:
+def test_a_single_one_acts_forever(tmp_path: Path) -> None:
     series = made(tmp_path, TIMES[:1], EFFORTS[:1])
 
     assert_acts(series, 0.4999, NOTHING)
-    for time in (0.5, 1.0, 1e9):
-        assert_acts(series, time, EFFORTS[0])
-
-
-def test_a_time_that_is_hardly_too_early_is_as_good(tmp_path: Path) -> None:
-    series = made(tmp_path)
-
-    assert_acts(series, 0.6 - 0.9 * SLACK, EFFORTS[1])
-    assert_acts(series, 0.6 - 1.1 * SLACK, EFFORTS[0])
-    assert_acts(series, 0.5 - 0.9 * SLACK, EFFORTS[0])
-    assert_acts(series, 0.5 - 1.1 * SLACK, NOTHING)
-    assert_acts(series, 1.1 - 0.9 * SLACK, NOTHING)
+    assert_acts(series, 1e9, EFFORTS[0])
 
 
 @given(
@@ -190,31 +169,6 @@ def test_an_effort_is_the_callers_own(tmp_path: Path) -> None:
     for time, effort in ((0.5, EFFORTS[0]), (0.0, NOTHING)):
         series.at(time)[:] = 99.0
         assert_acts(series, time, effort)
-
-
-def test_the_efforts_of_a_run_lead_through_the_same_states_to_the_bit(tmp_path: Path) -> None:
-    # Arrange
-    start = np.array(character("franka_panda").rest_position) - 0.01
-    begins: dict[str, object] = {"rate": RATE, "initial_position": start.tolist()}
-    ticks = 2 * RATE
-    with simulation("franka_panda", **begins) as run:
-        states = [s for s, _, _ in run_together(run, controller("franka_panda"), ticks)]
-    efforts = np.array([state.effort for state in states[1:]])
-    times = np.arange(len(efforts)) / RATE
-    write_effort_series(tmp_path / "efforts.csv", PANDA, times, efforts)
-
-    # Act
-    driver = controller(
-        "franka_panda", law="feedforward", feedforward=str(tmp_path / "efforts.csv")
-    )
-    with simulation("franka_panda", **begins) as run:
-        replayed = [state for state, _, _ in run_together(run, driver, ticks)]
-
-    # Assert
-    assert np.ptp(efforts, axis=0).min() > 1e-3
-    for state, again in zip(states, replayed, strict=True):
-        assert again.position.tobytes() == state.position.tobytes()
-        assert again.velocity.tobytes() == state.velocity.tobytes()
 
 
 # Files that are refused

@@ -101,7 +101,7 @@ def test_other_gains_leave_the_integral_that_has_grown(series: str) -> None:
     assert found.tobytes() != answers(walker("pid", series, **stronger), 3, 4).tobytes()
 
 
-def test_the_integral_begins_anew_when_the_law_was_another_one_meanwhile(series: str) -> None:
+def test_the_integral_begins_at_zero_when_the_law_was_another_one_meanwhile(series: str) -> None:
     driver = walker("pid", series)
     pid, pd = driver.settings, walker("pd", series).settings
     answers(driver, 1, 2)

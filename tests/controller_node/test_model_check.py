@@ -265,15 +265,3 @@ def test_a_controller_works_with_a_simulator_that_says_nothing_of_itself(
 
     simulator.ask(joint_state(4_166_666, ["hinge"], [0.5], [0.0]))  # of tick 1 at 240 Hz
     assert node.exit_code is None
-
-
-def test_a_controller_under_another_gravity_than_the_simulator_ends_with_the_reason(
-    processes: Processes,
-) -> None:
-    processes.simulator("pendulum", gravity=1.62)
-    node = processes.controller("pendulum")
-
-    assert node.wait() == 1
-    (line,) = node.stderr.splitlines()
-    assert line.startswith("error: the simulator's character is not the controller's: ")
-    assert "'gravity'" in line

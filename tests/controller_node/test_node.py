@@ -97,27 +97,19 @@ def test_a_state_that_comes_again_gets_the_same_answer_again(
     assert len(set(simulator.references.raw)) == 1
 
 
-@pytest.mark.parametrize("assistance", [True, False])
-def test_the_root_is_commanded_with_assistance_alone(
-    processes: Processes, simulator: ControllerClient, assistance: bool
+@pytest.mark.parametrize(
+    ("name", "assistance", "first"),
+    [("humanoid", True, 0), ("humanoid", False, 6), ("lift", True, 0)],
+)
+def test_all_joints_are_commanded_and_the_root_with_assistance_alone(
+    processes: Processes, simulator: ControllerClient, name: str, assistance: bool, first: int
 ) -> None:
-    processes.controller("humanoid", root_assistance=assistance)
+    processes.controller(name, root_assistance=assistance)
 
-    torques = simulator.ask(as_message("humanoid", some_state("humanoid")))
+    torques = simulator.ask(as_message(name, some_state(name)))
 
-    names = character("humanoid").layout.dof_names
-    assert tuple(torques.name) == (names if assistance else names[6:])
+    assert tuple(torques.name) == character(name).layout.dof_names[first:]
     assert len(torques.effort) == len(torques.name)
-
-
-def test_a_character_with_a_fixed_base_has_all_its_joints_commanded(
-    processes: Processes, simulator: ControllerClient
-) -> None:
-    processes.controller("lift")
-
-    torques = simulator.ask(as_message("lift", some_state("lift")))
-
-    assert list(torques.name) == ["height"]
 
 
 def test_names_in_another_order_get_the_same_torques(
@@ -192,24 +184,6 @@ def test_a_state_of_an_episode_that_it_does_not_know_waits_for_the_episode(
 
 
 # Gains that change while it runs
-
-
-def test_a_gain_that_is_set_while_it_runs_counts_from_the_next_state_on(
-    processes: Processes, simulator: ControllerClient
-) -> None:
-    processes.controller("pendulum")
-    before, after = some_state("pendulum", 1), some_state("pendulum", 2, first=False)
-    simulator.ask(as_message("pendulum", before))
-
-    taken, _ = simulator.set_parameter("controller_node", "gains.hinge.p", 200.0)
-    torques = simulator.ask(as_message("pendulum", after))
-
-    assert taken
-    assert simulator.get_parameters("controller_node", ["gains.hinge.p"]) == [200.0]
-    old, _ = expected_answer("pendulum", after, before.stamp_ns)
-    new, _ = expected_answer("pendulum", after, before.stamp_ns, **{"gains.hinge.p": 200.0})
-    assert old.tolist() != new.tolist()
-    assert list(torques.effort) == new.tolist()
 
 
 REFUSED: dict[str, tuple[str, Any]] = {

@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from controller_node.control_laws import scale_gains
 from controller_node.controller import Controller
-from controller_node.strength import Strengths, StrengthSchedule, strengths_of, weakened
+from controller_node.strength import Strengths, StrengthSchedule, strengths_of
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError, MotionError
 from msgs_config.messages.clock import TickClock
@@ -74,7 +75,7 @@ def test_all_strengths_at_one_change_no_bit() -> None:
     driver = controller("humanoid")
     gains = driver.settings.gains
 
-    assert weakened(LAYOUT, gains, np.ones(len(LAYOUT.vector_starts))) is gains
+    assert scale_gains(LAYOUT, gains, np.ones(len(LAYOUT.vector_starts))) is gains
     assert effort({}, of(chest=1.0)).tobytes() == effort({}).tobytes()
 
 

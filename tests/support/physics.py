@@ -99,6 +99,22 @@ def free_random_state(
     raise AssertionError("no state without contact was found")
 
 
+@dataclass(frozen=True)
+class DenseDynamics:
+    """A mass matrix (n, n) and a bias force (n,), solved by numpy; no passive damping."""
+
+    mass_matrix: FloatArray
+    bias: FloatArray
+
+    def solve(self, force: FloatArray, added: FloatArray, period: float) -> FloatArray:
+        """The acceleration (n,) of `(M + diag(added)) a = force`."""
+        return np.array(np.linalg.solve(self.mass_matrix + np.diag(added), force))
+
+    def bias_force(self) -> FloatArray:
+        """The bias force (n,)."""
+        return self.bias
+
+
 class LoneWorld(World):
     """A world of one character."""
 

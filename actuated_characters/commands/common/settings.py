@@ -98,9 +98,11 @@ def bring_parameters(
         ActuatedCharactersError: there is no such clip, or its file is malformed.
     """
     from actuated_characters.runs.plan import SHARED
-    from controller_node.references.files.reconstructed import read_found_with
+    from controller_node.references.files.reconstructed import SUFFIX, ReconstructedClip
 
-    found = None if clip is None else read_found_with(character, clip)
+    if clip is None or not clip.endswith(SUFFIX):
+        return None
+    found = ReconstructedClip(character, clip).found_with
     if found is None:
         return None
     taken = {name for name in SHARED if name in simulator or name in controller}

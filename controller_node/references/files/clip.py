@@ -7,7 +7,9 @@ character's file may say otherwise of quaternions, of the base's axes, and of an
 
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -46,15 +48,56 @@ def available_clips(character: Character) -> list[str]:
     return sorted(path.name.removeprefix(prefix).removesuffix(suffix) for path in found)
 
 
+class ClipFile:
+    """The content of a clip's file, which is read once."""
+
+    def __init__(self, character: Character, name_or_path: str) -> None:
+        """Read a clip by name, or by the path of a `.txt` or `.json` file.
+
+        Raises:
+            ClipError: there is no such clip, or it is no JSON object.
+        """
+        self.character = character
+        self.path = clip_path(character, name_or_path)
+        try:
+            content = json.loads(read_text(self.path, ClipError))
+        except (ValueError, RecursionError) as error:
+            raise self._malformed() from error
+        if not isinstance(content, dict):
+            raise self._malformed()
+        self.content: dict[str, Any] = content
+
+    @cached_property
+    def frames(self) -> ClipFrames:
+        """The motion. Raises ClipError if it is malformed, or does not fit the character."""
+        try:
+            loop, frames = self.content["Loop"], np.array(self.content["Frames"], dtype=float)
+        except (ValueError, KeyError, TypeError, OverflowError) as error:
+            raise self._malformed() from error
+        if _OF_BEFORE in self.content:
+            raise ClipError(
+                f"{self.path}: found by `reconstruct` of version 0.2, whose corrections are not "
+                "played any more; reconstruct the clip again"
+            )
+        if loop not in ("wrap", "none"):
+            raise ClipError(f"{self.path}: Loop is {loop!r}; it must be 'wrap' or 'none'")
+        _check_frames(self.path, frames)
+        return _in_layout(self.character, self.path, loop, frames)
+
+    def _malformed(self) -> ClipError:
+        return ClipError(
+            f"{self.path}: not a motion clip; it must be JSON with 'Loop' and with 'Frames' of "
+            "equal length"
+        )
+
+
 def read_clip(character: Character, name_or_path: str) -> ClipFrames:
-    """Read a clip by name, or by the path of a `.txt` or `.json` file.
+    """The motion of a clip, by name, or by the path of a `.txt` or `.json` file.
 
     Raises:
         ClipError: there is no such clip, it is malformed, or it does not fit the character.
     """
-    path = clip_path(character, name_or_path)
-    loop, frames = _parse(path, read_text(path, ClipError))
-    return _in_layout(character, path, loop, frames)
+    return ClipFile(character, name_or_path).frames
 
 
 def clip_path(character: Character, name_or_path: str) -> Path:
@@ -69,22 +112,7 @@ def clip_path(character: Character, name_or_path: str) -> Path:
     return Path(character.clips.pattern.replace("*", name_or_path))
 
 
-def _parse(path: Path, text: str) -> tuple[str, FloatArray]:
-    try:
-        content = json.loads(text)
-        loop, frames = content["Loop"], np.array(content["Frames"], dtype=float)
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
-        raise ClipError(
-            f"{path}: not a motion clip; it must be JSON with 'Loop' and with 'Frames' of equal "
-            "length"
-        ) from error
-    if _OF_BEFORE in content:
-        raise ClipError(
-            f"{path}: found by `reconstruct` of version 0.2, whose corrections are not played any "
-            "more; reconstruct the clip again"
-        )
-    if loop not in ("wrap", "none"):
-        raise ClipError(f"{path}: Loop is {loop!r}; it must be 'wrap' or 'none'")
+def _check_frames(path: Path, frames: FloatArray) -> None:
     if frames.ndim != 2 or len(frames) < 2:
         raise ClipError(f"{path}: needs two frames or more")
     sound = np.abs(frames) <= _LARGEST_NUMBER  # NaN is not
@@ -94,7 +122,6 @@ def _parse(path: Path, text: str) -> tuple[str, FloatArray]:
     if not (frames[:-1, 0] > 0.0).all():
         bad = int(np.argmax(frames[:-1, 0] <= 0.0))
         raise ClipError(f"{path}: frame {bad} lasts {frames[bad, 0]} s; it must last some time")
-    return loop, frames
 
 
 def _in_layout(character: Character, path: Path, loop: str, frames: FloatArray) -> ClipFrames:
@@ -121,11 +148,12 @@ def _in_layout(character: Character, path: Path, loop: str, frames: FloatArray) 
         else:
             signs, offsets = character.clips.signs, character.clips.offsets
             positions[:, joint.start] = signs.get(name, 1.0) * values[:, 0] + offsets.get(name, 0.0)
-    positions, clamped = _within_limits(character, positions)
+    bounds = character.position_bounds()
+    within = np.clip(positions, *bounds)
+    beyond = np.any(within != positions, axis=0)
+    clamped = tuple(layout.dof_names[index] for index in np.flatnonzero(beyond))
     times = np.concatenate(([0.0], np.cumsum(frames[:-1, 0])))
-    return ClipFrames(
-        times, positions, orientations, loop == "wrap", character.position_bounds(), clamped
-    )
+    return ClipFrames(times, within, orientations, loop == "wrap", bounds, clamped)
 
 
 def _width(character: Character) -> int:
@@ -158,13 +186,3 @@ def _quaternions(character: Character, path: Path, joint: str, values: FloatArra
     if character.clips.quaternion == "wxyz":
         values = rotations.xyzw_from_wxyz(values)
     return rotations.normalised(values)
-
-
-def _within_limits(
-    character: Character, positions: FloatArray
-) -> tuple[FloatArray, tuple[str, ...]]:
-    lower, upper = character.position_bounds()
-    within = np.clip(positions, lower, upper)
-    beyond = np.any(within != positions, axis=0)
-    names = character.layout.dof_names
-    return within, tuple(name for name, is_beyond in zip(names, beyond, strict=True) if is_beyond)

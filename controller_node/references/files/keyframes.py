@@ -6,13 +6,12 @@ keeps its value of the keyframe before, at the first one that of the rest pose.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from controller_node.references.keyframes import Keyframes, overshoots
 from controller_node.references.limits import LARGEST_NUMBER, SHORTEST_TIME, JointLimits
 from msgs_config import files
 from msgs_config.arrays import FloatArray
@@ -23,8 +22,17 @@ from msgs_config.geometry import rotations
 
 _KEYS = ["interpolation", "loop", "period", "keyframes"]
 _KEYFRAME_KEYS = ["time", "pose"]
-_INTERPOLATIONS = ["smooth", "linear"]
 _SHOWN = 200  # characters
+
+
+@dataclass(frozen=True)
+class Keyframes:
+    """The keyframes of a file, in a character's layout and where it stands."""
+
+    times: FloatArray  # (p,) s, rising
+    configurations: GeneralizedPosition  # (p, n), (p, k, 4)
+    smooth: bool  # else linear
+    period: float | None = None  # s, of a loop
 
 
 def read_keyframes(character: Character, path: str) -> Keyframes:
@@ -39,8 +47,8 @@ def read_keyframes(character: Character, path: str) -> Keyframes:
     text = files.read_text(file, MotionError)
     content = files.parse_yaml_mapping(file, text, MotionError)
     _check_keys(f"{file}", content, _KEYS)
-    interpolation = content.get("interpolation", _INTERPOLATIONS[0])
-    if interpolation not in _INTERPOLATIONS:
+    interpolation = content.get("interpolation", "smooth")
+    if interpolation not in ("smooth", "linear"):
         raise _wrong(f"{file}: interpolation", interpolation, "'smooth' or 'linear'")
     items = content.get("keyframes")
     if not isinstance(items, list) or not items:
@@ -51,13 +59,12 @@ def read_keyframes(character: Character, path: str) -> Keyframes:
             raise MotionError(f"{place} is {_shown(item)}; it must be a mapping with 'time'")
         _check_keys(place, item, _KEYFRAME_KEYS)
     times = _times(places, items)
-    keyframes = Keyframes(
-        times=np.array(times),
-        configurations=_configurations(character, _positions(character, places, items)),
-        smooth=interpolation == "smooth",
-        period=_period(file, content, times[-1]),
+    return Keyframes(
+        np.array(times),
+        _configurations(character, _positions(character, places, items)),
+        interpolation == "smooth",
+        _period(file, content, times[-1]),
     )
-    return replace(keyframes, warnings=overshoots(character, keyframes))
 
 
 def _times(places: list[str], items: list[dict[str, Any]]) -> list[float]:
@@ -88,7 +95,7 @@ def _period(file: Path, content: dict[str, Any], last: float) -> float | None:
 
 
 def _positions(character: Character, places: list[str], items: list[dict[str, Any]]) -> FloatArray:
-    """The poses (p, n) as the file says them, message form."""
+    """The poses (p, n) of the file, message form."""
     limits, layout = JointLimits(character), character.layout
     index_of = {name: index for index, name in enumerate(layout.dof_names)}
     position, rows = _rest_in_own_world(character), []

@@ -1,47 +1,30 @@
 """The project's own format for a reconstructed motion: a clip with the plan that keeps it, as JSON.
 
-`Loop` and `Frames` are those of the clip (`clip_file.py`), so that whatever reads clips reads the
+`Loop` and `Frames` are those of the clip (`clip.py`), so that whatever reads clips reads the
 motion. `Plan` has the control rate in Hz (`rate`), the ticks that it lasts (`ticks`) and from one
 knot to the next (`knot_ticks`), the degrees of freedom (`dofs`), and `parts`: from a tick on
 (`tick`), offsets at knots, the first of a number (`knot`), rad or m (`offsets`). What made the file
 stands in `Reconstruction`; a run takes its length, its parameters and its pushes from there.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from controller_node.references.files.clip import clip_path
+from controller_node.references.files.clip import ClipFile
 from controller_node.references.offsets import Offsets, RecordedPlan, knot_before
 from msgs_config.character.layout import JointLayout
-from msgs_config.character.model import Character
 from msgs_config.errors import ClipError
-from msgs_config.files import read_text
 
 PLAN, RECONSTRUCTION = "Plan", "Reconstruction"
 SUFFIX = ".json"
 
 _LARGEST_OFFSET = 1e3  # rad or m; more is a mistake
 _MALFORMED = (ValueError, KeyError, TypeError, OverflowError)
-
-
-def read_plan(character: Character, name_or_path: str) -> RecordedPlan | None:
-    """The plan in a clip's file, None if it has none.
-
-    Raises:
-        ClipError: there is no such clip, or its plan is malformed or of other joints.
-    """
-    if not name_or_path.endswith(SUFFIX):
-        return None
-    path = clip_path(character, name_or_path)
-    content = _content(path)
-    if PLAN not in content:
-        return None
-    return _plan(path, character.layout, content[PLAN])
 
 
 @dataclass(frozen=True)
@@ -54,44 +37,41 @@ class FoundWith:
     pushes: tuple[str, ...]  # LINK:FX,FY,FZ@S, which came in the search, too
 
 
-def read_found_with(character: Character, name_or_path: str) -> FoundWith | None:
-    """The run that a clip's file was found with, None if it does not say.
+class ReconstructedClip(ClipFile):
+    """A clip's file with the plan that keeps its motion, and the run that it was found in.
 
-    Raises:
-        ClipError: there is no such clip, or what it says is malformed.
+    Each part is checked when it is asked for, and raises ClipError if it is malformed, or does not
+    fit the character.
     """
-    if not name_or_path.endswith(SUFFIX):
-        return None
-    path = clip_path(character, name_or_path)
-    content = _content(path)
-    made = content.get(RECONSTRUCTION)
-    if made is None:
-        return None
-    try:
-        sides = made["parameters"]
-        duration = float(made["duration"])
-        pushes = made.get("pushes", [])
-        if not isinstance(pushes, list) or not all(isinstance(push, str) for push in pushes):
-            raise TypeError
-        found = FoundWith(
-            duration, dict(sides["sim_node"]), dict(sides["controller_node"]), tuple(pushes)
-        )
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise ClipError(
-            f"{path}: {RECONSTRUCTION} must have 'duration', 'parameters' of sim_node and of "
-            "controller_node, and 'pushes' as texts, if any"
-        ) from error
-    return found
 
+    @cached_property
+    def plan(self) -> RecordedPlan | None:
+        """The plan that keeps the motion; None if the file has none."""
+        if PLAN not in self.content:
+            return None
+        return _plan(self.path, self.character.layout, self.content[PLAN])
 
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(read_text(path, ClipError))
-    except (ValueError, RecursionError) as error:
-        raise ClipError(f"{path}: not a motion clip; it must be JSON") from error
-    if not isinstance(content, dict):
-        raise ClipError(f"{path}: not a motion clip; it must be a JSON object")
-    return content
+    @cached_property
+    def found_with(self) -> FoundWith | None:
+        """The run that the motion was found in; None if the file does not say."""
+        made = self.content.get(RECONSTRUCTION)
+        if made is None:
+            return None
+        try:
+            sides, pushes = made["parameters"], made.get("pushes", [])
+            if not isinstance(pushes, list) or not all(isinstance(push, str) for push in pushes):
+                raise TypeError
+            return FoundWith(
+                float(made["duration"]),
+                dict(sides["sim_node"]),
+                dict(sides["controller_node"]),
+                tuple(pushes),
+            )
+        except _MALFORMED as error:
+            raise ClipError(
+                f"{self.path}: {RECONSTRUCTION} must have 'duration', 'parameters' of sim_node "
+                "and of controller_node, and 'pushes' as texts, if any"
+            ) from error
 
 
 def _plan(path: Path, layout: JointLayout, content: Any) -> RecordedPlan:

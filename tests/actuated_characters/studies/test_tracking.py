@@ -23,7 +23,7 @@ from msgs_config.character.bullet import pybullet
 from msgs_config.geometry import rotations
 from sim_node.physics.world import WorldSettings
 from tests.support.in_process import InProcessRunner
-from tests.support.physics import LoneWorld, character
+from tests.support.physics import DenseDynamics, LoneWorld, character
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
@@ -165,21 +165,10 @@ def test_growth_is_that_of_the_controllers_own_law_stepped_with_delay(
     mass = root @ root.T + 0.1 * np.eye(3)
     stiffness, damping = np.array([500.0, 100.0, 900.0]), np.array([50.0, 5.0, 20.0])
     position, velocity, waiting = rng.normal(size=3), np.zeros(3), [np.zeros(3)] * delay_ticks
-    sizes, scale = [], 0.0
-
-    def solve(force: FloatArray, added: FloatArray) -> FloatArray:
-        return np.array(np.linalg.solve(mass + np.diag(added), force), dtype=float)
-
+    sizes, scale, dynamics = [], 0.0, DenseDynamics(mass, np.zeros(3))
     for _ in range(3000):
         effort = stable_pd_effort(
-            solve,
-            np.zeros(3),
-            stiffness,
-            damping,
-            -position,
-            velocity,
-            np.zeros(3),
-            PERIOD,
+            dynamics, stiffness, damping, -position, velocity, np.zeros(3), PERIOD
         )
         waiting = [*waiting, effort]
         acceleration = np.linalg.solve(mass, waiting.pop(0))

@@ -89,14 +89,6 @@ def reports(whole: Run, mode: Mode) -> list[ModeReport]:
 # Before a hit
 
 
-def test_without_a_hit_it_is_plain_tracking_to_the_bit() -> None:
-    plain, reactive = unhit(), unhit("reactive")
-
-    assert reactive.efforts.tobytes() == plain.efforts.tobytes()
-    assert reactive.positions.tobytes() == plain.positions.tobytes()
-    assert reactive.mode_names() == ["TRACK"]
-
-
 def test_an_active_ragdoll_is_plain_tracking_to_the_bit_until_its_torque_is_bounded() -> None:
     plain, active = unhit(), unhit("active_ragdoll")
     torques = np.linalg.norm(plain.efforts[:, 3:6], axis=1)
@@ -219,17 +211,6 @@ def test_the_response_grows_with_the_impulse() -> None:
     assert peaks[0] > 0.005
     assert peaks == sorted(peaks)
     assert peaks[3] > 0.5
-
-
-def test_the_same_again_is_the_same_to_the_bit() -> None:
-    again = run(
-        {"clip": "walk", "behaviour": "reactive"},
-        3 * RATE_HZ,
-        (ProjectileThrow(SPEED, HIT, direction=FROM_FRONT),),
-        mass=2.0,
-    )
-
-    assert again.efforts.tobytes() == walk(20.0).efforts[: 3 * RATE_HZ].tobytes()
 
 
 # Limp, and up again
@@ -402,19 +383,6 @@ def test_strengths_and_gains_of_zero_count_while_it_gives_way() -> None:
     assert soft["left_knee"] == soft["left_shoulder"] == 0.0
     assert used[1].damping[heads["left_knee"]] == 0.0
     assert soft["right_knee"] > 0.0 and soft["right_shoulder"] > 0.0
-
-
-def test_a_joint_without_gains_does_not_count_in_their_mean() -> None:
-    model = DynamicsModel(HUMANOID)
-    model.update(np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size))
-    off = {"gains.left_knee.p": 0.0, "gains.left_knee.d": 0.0}
-    gains, ones = driver(off).settings.gains, np.ones(len(LAYOUT.vector_starts))
-
-    scaled = ComplianceProfile(HUMANOID, np.diag(model.mass_matrix())).gains(gains, ones, 1.0, 1.0)
-
-    heads = [joint.start for joint in LAYOUT.joints[1:] if joint.name != "left_knee"]
-    assert scaled.stiffness[LAYOUT.joint("left_knee").start] == 0.0
-    assert scaled.stiffness[heads].mean() == pytest.approx(gains.stiffness[heads].mean())
 
 
 def test_gains_by_inertia_keep_their_mean_and_make_all_joints_swing_alike() -> None:

@@ -114,18 +114,6 @@ def test_a_stamped_trajectory_begins_at_exactly_its_tick(pendulum: Pendulum) -> 
     assert pendulum.next().position[0] > REST
 
 
-def test_another_one_takes_over_where_the_first_one_is(pendulum: Pendulum) -> None:
-    pendulum.start(trajectory(TARGET))
-    for _ in range(12):
-        before = pendulum.next()
-
-    pendulum.start(trajectory(0.2))
-
-    positions = [before.position[0], *(pendulum.next().position[0] for _ in range(60))]
-    assert np.abs(np.diff(positions)).max() < 0.1  # rad a tick
-    assert positions[-1] == pytest.approx(0.2, abs=1e-9)
-
-
 def test_a_new_episode_forgets_it(pendulum: Pendulum) -> None:
     pendulum.start(trajectory(TARGET))
     for _ in range(40):

@@ -93,8 +93,7 @@ class PlainRollout:
         mujoco.mj_differentiatePos(MODEL._model, error, 1.0, self.data.qpos, target)
         actuated = np.arange(N) >= 6
         effort = stable_pd_effort(
-            lambda force, added: law.solve(force, added, PERIOD),
-            law.bias_force(),
+            law,
             self.gains.stiffness * actuated,
             self.gains.damping * actuated,
             error + offset,

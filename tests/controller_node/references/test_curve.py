@@ -61,47 +61,6 @@ def test_velocity_and_acceleration_are_the_difference_quotients(name: str, degre
 
 
 @every_degree
-@every_moved
-def test_it_goes_through_its_knots_without_a_jump(name: str, degree: int) -> None:
-    whole, layout = loaded(name)
-    knots = of_degree(random_knots(whole, TIMES), degree)
-    curve = Curve(layout, knots)
-
-    for number, time in enumerate(TIMES.tolist()):
-        assert_same_place(layout, curve.sample(time), at_knot(layout, knots, number))
-    for number, time in enumerate(TIMES[1:].tolist(), start=1):
-        before = curve.sample(time - JUST_BEFORE)
-        assert_same_place(layout, before, at_knot(layout, knots, number), atol=1e-7)
-
-
-@every_moved
-def test_at_its_knots_it_has_their_velocity_and_acceleration_from_both_sides(name: str) -> None:
-    whole, layout = loaded(name)
-    knots = random_knots(whole, TIMES)
-    curve = Curve(layout, knots)
-    assert knots.velocities is not None and knots.accelerations is not None
-
-    for number, time in enumerate(TIMES.tolist()):
-        for at in [time] * (number < 3) + [time - JUST_BEFORE] * (number > 0):
-            state = curve.sample(at)
-            np.testing.assert_allclose(state.velocity, knots.velocities[number], atol=1e-6)
-            np.testing.assert_allclose(state.acceleration, knots.accelerations[number], atol=1e-4)
-
-
-@every_moved
-def test_cubic_segments_have_the_velocities_of_their_knots_from_both_sides(name: str) -> None:
-    whole, layout = loaded(name)
-    knots = of_degree(random_knots(whole, TIMES), 3)
-    curve = Curve(layout, knots)
-    assert knots.velocities is not None
-
-    for number, time in enumerate(TIMES[1:-1].tolist(), start=1):
-        for at in (time, time - JUST_BEFORE):
-            state = curve.sample(at)
-            np.testing.assert_allclose(state.velocity, knots.velocities[number], atol=1e-6)
-
-
-@every_degree
 def test_a_polynomial_of_its_degree_is_met_exactly(degree: int) -> None:
     _, layout = loaded("franka_panda")
     rng = np.random.default_rng(8)

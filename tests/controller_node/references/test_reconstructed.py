@@ -11,7 +11,7 @@ import pytest
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.references.files.clip import clip_path, read_clip
-from controller_node.references.files.reconstructed import PLAN, read_plan
+from controller_node.references.files.reconstructed import PLAN, ReconstructedClip
 from controller_node.references.offsets import Offsets, RecordedPlan
 from msgs_config.errors import ClipError, ConfigurationError
 from tests.support.physics import character
@@ -66,7 +66,7 @@ def test_a_plan_is_nothing_before_it_begins_and_when_it_is_over() -> None:
 def test_a_file_gives_back_the_same_doubles(tmp_path: Path) -> None:
     plan = some_plan()
 
-    found = read_plan(HUMANOID, str(written(tmp_path / "walk.json", plan)))
+    found = ReconstructedClip(HUMANOID, str(written(tmp_path / "walk.json", plan))).plan
 
     assert found is not None
     assert (found.rate_hz, found.ticks) == (240, 60)
@@ -105,7 +105,7 @@ def test_a_clip_without_a_plan_has_none(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "clip.json").write_text('{"Loop": "none", "Frames": [[1], [1]]}')
 
-    assert read_plan(HUMANOID, clip) is None
+    assert ReconstructedClip(HUMANOID, clip).plan is None
 
 
 def without(key: str) -> Callable[[dict[str, Any]], object]:
@@ -148,7 +148,7 @@ def test_what_is_wrong_with_a_file_is_said(
     path.write_text(json.dumps(content))
 
     with pytest.raises(ClipError, match=reason) as error:
-        read_plan(HUMANOID, str(path))
+        _ = ReconstructedClip(HUMANOID, str(path)).plan
 
     assert str(path) in str(error.value)
     assert "\n" not in str(error.value)
@@ -160,7 +160,7 @@ def test_a_file_that_is_no_clip_is_refused(tmp_path: Path, text: str) -> None:
     path.write_text(text)
 
     with pytest.raises(ClipError, match="not a motion clip"):
-        read_plan(HUMANOID, str(path))
+        ReconstructedClip(HUMANOID, str(path))
 
 
 def test_a_file_of_before_is_refused_in_a_line(tmp_path: Path) -> None:

@@ -1,0 +1,43 @@
+"""The behaviours `active_ragdoll` and `reactive`, as the parameters' values say."""
+
+import numpy as np
+
+from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
+from controller_node.behaviours.motion_library import MotionLibrary
+from controller_node.behaviours.posture import Posture
+from controller_node.behaviours.reaction import Reaction, ReactionKit
+from controller_node.behaviours.settings import REACTION_PARAMETERS, reaction_settings
+from controller_node.planner.settings import NO_PLANNER
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.model import Character
+from msgs_config.parameters import Values
+
+_LYING = 0.5  # the part of a get-up clip in which it may begin
+
+
+@BEHAVIOURS.offer("active_ragdoll", *REACTION_PARAMETERS)
+@BEHAVIOURS.offer("reactive")
+def _reaction(character: Character, values: Values) -> BehaviourChoice:
+    posture = Posture(character)
+    settings = reaction_settings(character, values)
+    library = get_ups = None
+    if settings.searches:
+        library = MotionLibrary(character, settings.library, settings.blend_duration)
+    if settings.by_clip:
+        sides = [settings.face_up, settings.face_down]
+        get_ups = MotionLibrary(character, sides, lasting=0.0, share=_LYING)
+    kit = ReactionKit(
+        character=character,
+        settings=settings,
+        model=DynamicsModel(character, values.number("gravity")),
+        posture=posture,
+        period=1.0 / values.integer("rate"),
+        library=library,
+        get_ups=get_ups,
+        plans=values.text("planner") != NO_PLANNER,
+    )
+    rest = np.array(character.rest_position)
+    for made in (library, get_ups):
+        if made is not None:  # a first search takes longer than others
+            made.nearest(made.predicted(rest, np.zeros_like(rest)))
+    return BehaviourChoice(lambda: Reaction(kit), needs_contacts=True)

@@ -1,0 +1,74 @@
+"""Trajectories and strengths that come over topics, and count from their stamps on."""
+
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+
+from controller_node.controller import Controller
+from controller_node.interface.publishers import Publishers
+from controller_node.interface.stamped_subscription import StampedSubscription, nanoseconds
+from controller_node.references.trajectory import points_of_lists
+from controller_node.strength import strengths_of
+from msgs_config.messages import topics
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.joint_state import split_stamp
+from msgs_config.runtime.once_logger import OnceLogger
+
+
+class StampedTopics:
+    """Subscribes to `~/joint_trajectory` and `~/strength`, and publishes what was accepted."""
+
+    def __init__(
+        self, node: Node, controller: Controller, outputs: Publishers, logger: OnceLogger
+    ) -> None:
+        self._controller = controller
+        self._outputs = outputs
+        self._trajectories = StampedSubscription(
+            node, topics.JOINT_TRAJECTORY, "trajectory", self._set_trajectory, logger
+        )
+        self._strengths = StampedSubscription(
+            node, topics.STRENGTH, "strength", self._set_strengths, logger
+        )
+        self._now_ns = self._episode_ns = 0
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Numbers of rejected messages, for the diagnostics."""
+        return {
+            "refused_trajectories": self._trajectories.refused,
+            "refused_strengths": self._strengths.refused,
+        }
+
+    def take(self, state_ns: int, episode_ns: int) -> None:
+        """Take the messages that came before the answer to the state of a stamp, ns.
+
+        A message without a stamp counts from this state on, one with a stamp from its tick on. A
+        wrong one is rejected whole, and what was in force goes on.
+        """
+        self._now_ns, self._episode_ns = state_ns, episode_ns
+        self._trajectories.take(state_ns)
+        self._strengths.take(state_ns)
+
+    def _set_trajectory(self, message: JointTrajectory, start_ns: int) -> None:
+        points = message.points
+        self._controller.set_trajectory(
+            points_of_lists(
+                message.joint_names,
+                [nanoseconds(point.time_from_start) / NANOSECONDS_PER_SECOND for point in points],
+                [point.positions for point in points],
+                [point.velocities for point in points],
+                [point.accelerations for point in points],
+            ),
+            start_ns=start_ns,
+            now_ns=self._now_ns,
+            episode_ns=self._episode_ns,
+        )
+        message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)
+        self._outputs.publish_trajectory(message)
+
+    def _set_strengths(self, message: JointState, start_ns: int) -> None:
+        layout, clock = self._controller.layout, self._controller.clock
+        start_ns = clock.stamp_ns(clock.first_tick_from(start_ns))
+        strengths = strengths_of(layout, tuple(message.name), tuple(message.effort), start_ns)
+        self._controller.set_strengths(strengths, episode_ns=self._episode_ns)
+        self._outputs.publish_strengths(strengths)
