@@ -137,7 +137,8 @@ def _add_recorded(run: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from actuated_characters.runs.run_directory import plot_figures, prepare_directory
+    from actuated_characters.report.run_figures import plot_figures
+    from actuated_characters.runs.run_directory import prepare_directory
 
     run = planned_run(options)
     plan, motion = run.plan, _name_of(run.plan.controller)
@@ -292,21 +293,13 @@ def _set_option(name: str, value: str | None, controller: dict[str, object]) -> 
 
 
 def _report(directory: Path) -> None:
+    from actuated_characters.report.run_figures import describe_figures
     from actuated_characters.runs.run_directory import read_figures
 
     summary, _ = read_figures(directory)
     table = Table(title=escape(f"results in {directory}"), title_justify="left")
     table.add_column("figure")
     table.add_column("value", justify="right", overflow="fold")
-    for name, value in summary.items():
-        table.add_row(name, _shown(value))
+    for name, value in describe_figures(summary):
+        table.add_row(name, escape(value))
     Console().print(table)
-
-
-def _shown(value: object) -> str:
-    """A figure as the table has it."""
-    if isinstance(value, dict):
-        return ", ".join(f"{name}: {part}" for name, part in value.items()) or "none"
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    return "-" if value is None else str(value)

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from actuated_characters.bags.recording import Recording, read_recordings
+from actuated_characters.metrics.error_measures import effort_sizes, limit_shares
 from actuated_characters.metrics.recording_metrics import (
     PushSpan,
-    effort_sizes,
-    limit_shares,
     push_spans,
     saturated_shares,
     vectors_of,
@@ -208,7 +207,9 @@ def _size(said: dict[str, Any]) -> int | None:
 def run_facts(recording: Recording) -> RunFacts:
     """What a whole recording says."""
     vectors = vectors_of(recording.character)
-    shares = saturated_shares(limit_shares(effort_sizes(recording), vectors.limits))
+    shares = saturated_shares(
+        limit_shares(effort_sizes(recording.layout, recording.effort), vectors.limits)
+    )
     first = recording.controller[0].parameters if recording.controller else {}
     return RunFacts(
         name=recording.name,

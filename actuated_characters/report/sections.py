@@ -8,18 +8,14 @@ import numpy as np
 from matplotlib.image import imsave
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics.error_measures import distances, effort_sizes, limit_shares
 from actuated_characters.metrics.recording_metrics import (
     contact_series,
-    distances,
-    effort_sizes,
-    limit_shares,
     measure_recording,
     push_spans,
-    reset_rows,
     saturated_shares,
     tracking_errors,
     vectors_of,
-    weight,
 )
 from actuated_characters.render.stills import strip
 from actuated_characters.report import charts
@@ -67,7 +63,7 @@ class CharacterReport:
         spans = mode_spans(recording)
         self._modes = spans if any(span.mode != TRACK for span in spans) else []
         self._changes = live_changes(recording)
-        self._breaks = reset_rows(recording)
+        self._breaks = recording.episode_rows[1:]
         self._pauses = pauses(recording.published_ns)
         self._marks = Marks(
             pushes=[(push.start, push.duration) for push in self._pushes],
@@ -161,7 +157,7 @@ class CharacterReport:
 
     def _efforts(self) -> Section:
         title, recording, vectors = "torques against limits", self._recording, self._vectors
-        sizes = effort_sizes(recording)
+        sizes = effort_sizes(recording.layout, recording.effort)
         if np.isnan(sizes).all():
             return Section(title, notes=["The recording has no efforts."])
         shares = limit_shares(sizes, vectors.limits)
@@ -187,7 +183,9 @@ class CharacterReport:
         title, recording = "root path", self._recording
         if not recording.layout.has_floating_base:
             return Section(title, notes=["The base is fixed."])
-        errors = distances(recording, recording.position, recording.reference_position)[:, :2]
+        errors = distances(recording.layout, recording.position, recording.reference_position)[
+            :, :2
+        ]
         figure = charts.root_chart(
             recording.times,
             recording.position[:, :3],
@@ -208,7 +206,7 @@ class CharacterReport:
                 "another recorder."
             )
             return Section(title, notes=[note])
-        heavy = weight(recording)
+        heavy = recording.character.mass * float(recording.parameters.get("gravity", np.nan))
         figure = charts.contact_chart(
             recording.times, series, heavy if heavy > 0.0 else np.nan, self._marks
         )

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.recording_metrics import distances, measure_recording, vectors_of
+from actuated_characters.metrics.error_measures import distances
+from actuated_characters.metrics.recording_metrics import measure_recording, vectors_of
 from actuated_characters.report.changes import differences
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import RecordingError
@@ -218,7 +219,7 @@ def _growth(first: Recording, second: Recording, rows: _Rows) -> Growth:
     vectors = vectors_of(first.character)
     turns = np.array([unit == "rad" for unit in vectors.units], dtype=np.bool_)
     ours, theirs = first.position[rows.first], second.position[rows.second]
-    apart = distances(first, ours, theirs)
+    apart = distances(first.layout, ours, theirs)
     same = (ours.view(np.int64) == theirs.view(np.int64)).all(axis=1)
     apart[same] = 0.0  # and not what a rotation's way there and back leaves
     stamps = first.stamps_ns[rows.first]

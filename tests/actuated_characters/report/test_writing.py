@@ -189,7 +189,7 @@ def test_the_figures_are_those_of_the_run(tmp_path: Path) -> None:
     knees = [
         abs(t.state.position[10] - t.reference.position[10]) for t in made.ticks if t.reference
     ]
-    assert summary["ticks"] == len(made.ticks) == len(knees) == len(series)
+    assert summary["ticks"] == len(made.ticks) == len(knees) == len(series["time_s"])
     assert summary["sim_time_s"] == pytest.approx(0.1)
     assert summary["wall_time_s"] == pytest.approx(24e-9)  # as tests/support/bags.py stamps them
     again = measure_recording(recording)[0]
