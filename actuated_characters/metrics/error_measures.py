@@ -4,6 +4,8 @@ Positions are those of a layout, (r, n) of r states and n degrees of freedom; a 
 b physical vectors: a hinge, slider or ball joint, the root's translation or its rotation.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
@@ -21,21 +23,27 @@ _LOWEST = 0.5  # of the height of the reference's centre of mass
 _BLOCK = 8192  # rows that are worked on together, so that long recordings need no more memory
 
 
-def vector_joint_types(layout: JointLayout) -> list[JointType]:
-    """Type of the joint of each of b vectors."""
-    return [joint.type for joint in layout.joints for _ in joint.vectors]
+class VectorKinds(NamedTuple):
+    """The kinds of the b vectors of a layout."""
+
+    rotating: BoolArray  # (b,) hinges and ball joints
+    sliding: BoolArray  # (b,) sliders
+    units: tuple[str, ...]  # (b,) "rad" or "m", of the position
+
+    @property
+    def actuated(self) -> BoolArray:
+        """The vectors (b,) of joints: all but the root's."""
+        return self.rotating | self.sliding
 
 
-def actuated_vectors(layout: JointLayout) -> BoolArray:
-    """Mask (b,) of the vectors of joints: all but the root's."""
-    types = vector_joint_types(layout)
-    return np.array([each is not JointType.FLOATING for each in types], dtype=np.bool_)
-
-
-def rotating_joints(layout: JointLayout) -> BoolArray:
-    """Mask (b,) of the vectors of hinges and ball joints."""
-    rotating = (JointType.REVOLUTE, JointType.SPHERICAL)
-    return np.array([each in rotating for each in vector_joint_types(layout)], dtype=np.bool_)
+def vector_kinds(layout: JointLayout) -> VectorKinds:
+    """The kinds of a layout's vectors, in its order."""
+    types = [joint.type for joint in layout.joints for _ in joint.vectors]
+    sliding = np.array([each is JointType.PRISMATIC for each in types], dtype=np.bool_)
+    of_root = np.array([each is JointType.FLOATING for each in types], dtype=np.bool_)
+    is_first = np.arange(len(types)) == 0  # of the root's, its translation
+    units = tuple("m" if each else "rad" for each in sliding | of_root & is_first)
+    return VectorKinds(~(sliding | of_root), sliding, units)
 
 
 def differences(layout: JointLayout, start: FloatArray, end: FloatArray) -> FloatArray:
@@ -61,7 +69,7 @@ def joint_errors(layout: JointLayout, position: FloatArray, desired: FloatArray)
 
     The joints are the layout's hinges and balls, in its order; NaN where nothing was desired.
     """
-    return distances(layout, position, desired)[:, rotating_joints(layout)]
+    return distances(layout, position, desired)[:, vector_kinds(layout).rotating]
 
 
 def effort_sizes(layout: JointLayout, efforts: FloatArray) -> FloatArray:

@@ -6,36 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.bags.recording import Recording, Wrenches
-from actuated_characters.metrics.error_measures import (
-    AT_LIMIT,
-    actuated_vectors,
-    distances,
-    vector_joint_types,
-)
+from actuated_characters.metrics.error_measures import AT_LIMIT, distances
 from actuated_characters.metrics.run_metrics import Measurement, Series, Tick
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.state import StampedReference, StampedState
-
-_EFFORT_UNITS = {"rad": "N m", "m": "N"}
-
-
-@dataclass(frozen=True)
-class Vectors:
-    """The b physical vectors of a layout: joints, and the root's translation and rotation."""
-
-    names: tuple[str, ...]  # (b,)
-    units: tuple[str, ...]  # (b,) "rad" or "m", of the position
-    limits: FloatArray  # (b,) N m or N
-    actuated: BoolArray  # (b,) all but the root's
-
-    @property
-    def effort_units(self) -> tuple[str, ...]:
-        """Units (b,) of the efforts: "N m" or "N"."""
-        return tuple(_EFFORT_UNITS[unit] for unit in self.units)
 
 
 @dataclass(frozen=True)
@@ -56,16 +33,6 @@ class ContactSeries:
     links: tuple[str, ...]  # (l,) with a contact in any tick, in the character's order
     touching: BoolArray  # (t, l)
     vertical_force: FloatArray  # (t,) N, sum over links; NaN in ticks that were not recorded
-
-
-def vectors_of(character: Character) -> Vectors:
-    """Names, units and limits of a character's vectors, in the layout's order."""
-    layout = character.layout
-    units = ["m" if each is JointType.PRISMATIC else "rad" for each in vector_joint_types(layout)]
-    if layout.has_floating_base:
-        units[0] = "m"
-    names, limits = tuple(character.vector_names), character.effort_limits()
-    return Vectors(names, tuple(units), limits, actuated_vectors(layout))
 
 
 def tracking_errors(recording: Recording) -> FloatArray:

@@ -9,12 +9,11 @@ import numpy as np
 
 from actuated_characters.metrics.error_measures import (
     AT_LIMIT,
-    actuated_vectors,
     distances,
     effort_sizes,
     has_fallen,
     limit_shares,
-    rotating_joints,
+    vector_kinds,
 )
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
@@ -84,7 +83,7 @@ class Measurement:
         self._first_stamp: int | None = None
         self._last_stamp = 0
         self._ticks = 0
-        self._rotates, self._actuated = rotating_joints(layout), actuated_vectors(layout)
+        self._kinds = vector_kinds(layout)
         self._sliders = [joint for joint in layout.joints if joint.type is JointType.PRISMATIC]
         self._columns = [*COLUMNS]
         for joint in self._sliders:
@@ -126,7 +125,7 @@ class Measurement:
         """The figures by name; `wall_time` in s is what the ticks took. None: not measurable."""
         series, layout = self.series(), self._layout
         sim_time = (self._last_stamp - (self._first_stamp or 0)) / NANOSECONDS_PER_SECOND
-        vectors = self._ticks * int(self._actuated.sum())
+        vectors = self._ticks * int(self._kinds.actuated.sum())
         parameters = self._configuration.parameters
         commanded = layout.mask(parameters.get("commanded_joints", ()))
         of_root = commanded[layout.joints[0].entries] if layout.has_floating_base else np.zeros(0)
@@ -174,9 +173,9 @@ class Measurement:
         columns = dict(zip(self._columns, rows.T, strict=True))
         columns["time_s"][:] = stamps / NANOSECONDS_PER_SECOND
         errors = distances(self._layout, position, desired)
-        if self._rotates.any():
-            columns["joint_error_mean_rad"][:] = errors[:, self._rotates].mean(axis=1)
-            columns["joint_error_max_rad"][:] = errors[:, self._rotates].max(axis=1)
+        if self._kinds.rotating.any():
+            columns["joint_error_mean_rad"][:] = errors[:, self._kinds.rotating].mean(axis=1)
+            columns["joint_error_max_rad"][:] = errors[:, self._kinds.rotating].max(axis=1)
         sizes = effort_sizes(self._layout, applied)
         if self._layout.has_floating_base:
             columns["root_error_m"][:] = errors[:, 0]
@@ -187,8 +186,8 @@ class Measurement:
             given = (position, desired, applied)
             for name, values in zip(slider_columns(joint.name), given, strict=True):
                 columns[name][:] = values[:, joint.start]
-        limits = self._configuration.effort_limits[self._actuated]
-        shares = limit_shares(sizes[:, self._actuated], limits)
+        limits = self._configuration.effort_limits[self._kinds.actuated]
+        shares = limit_shares(sizes[:, self._kinds.actuated], limits)
         columns["effort_of_limit_max"][:] = shares.max(axis=1, initial=0.0)
         self._saturated += int((shares >= AT_LIMIT).sum())
         self._rows.append(rows)
