@@ -1,7 +1,9 @@
 """The page about a run: whole, by itself, and with the numbers that the messages give."""
 
+import base64
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from html import escape
 from html.parser import HTMLParser
 from io import BytesIO
 from pathlib import Path
@@ -16,14 +18,24 @@ from actuated_characters.bags.recording import read_recording
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
 from actuated_characters.metrics.recording_metrics import contact_series, measure_recording
+from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.report.decimation import decimated, span_maxima, span_means
-from actuated_characters.report.page import Chapter, Section, Table, render_page
+from actuated_characters.report.page import NOT_KNOWN, Chapter, Section, Table, render_page
+from actuated_characters.report.sections import NAMES
 from actuated_characters.report.writing import default_directory, write_report
 from actuated_characters.runs.run_directory import prepare_directory
 from msgs_config.errors import RecordingError
-from msgs_config.messages import topics
+from msgs_config.messages import configuration, topics
 from msgs_config.messages.topics import Topic
-from tests.support.bags import Made, add_to, make_run, said_configuration, said_states, write_bag
+from tests.support.bags import (
+    Made,
+    add_to,
+    make_run,
+    said_configuration,
+    said_references,
+    said_states,
+    write_bag,
+)
 from tests.support.eventful import Eventful, add_timed, eventful_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
@@ -129,12 +141,36 @@ def test_names_from_the_bag_are_texts(page: Page) -> None:
 def test_the_pictures_lie_beside_the_page(run: Path, page: Page) -> None:
     names = {path.name for path in (run / "report").iterdir()} - {"index.html"}
 
-    kinds = ("strip", "errors", "efforts", "root", "contacts", "ticks")
-    assert names == {f"{kind}.png" for kind in kinds}
+    assert names == {f"{name}.png" for name in NAMES if name != "plans"}
     assert len(page.pictures) == len(names)
     for name in names:
-        content = (run / "report" / name).read_bytes()
-        assert imread(BytesIO(content)).std() > 0.0
+        assert imread(BytesIO((run / "report" / name).read_bytes())).std() > 0.0
+
+
+def test_the_page_begins_with_picture_verdict_and_errors_and_ends_with_the_topics(
+    run: Path, page: Page
+) -> None:
+    strip = base64.b64encode((run / "report" / "strip.png").read_bytes()).decode()
+    verdict = f"It tracked its reference for {TICKS / 240:.4g} s without a fall"
+    parts = [strip, verdict, "mean joint error", "tracking error", "events", "the bag", HOSTILE]
+
+    places = [page.text.rindex(escape(part)) for part in parts]
+
+    assert "<h1>humanoid: walk</h1>" in page.text
+    assert places == sorted(places)
+
+
+def test_a_fall_is_in_the_verdict(tmp_path: Path) -> None:
+    made = make_run("humanoid", 0.1, WALK)
+    fallen = made.ticks[12].state.position.copy()
+    fallen[2] = 0.4
+    states = [replace(s, position=fallen) if n == 12 else s for n, s in enumerate(made.states)]
+    references = [tick.reference for tick in made.ticks if tick.reference is not None]
+    messages = [*said_states(made.plan, states), *said_references(made.plan, references)]
+
+    page = write_report(write_bag(tmp_path / "bag", [said_configuration(made.plan), *messages]))
+
+    assert "It fell at 0.05 s of 0.1 s." in page.read_text(encoding="utf-8")
 
 
 def test_the_table_of_errors_is_that_of_the_messages(page: Page, walk: Eventful) -> None:
@@ -183,17 +219,16 @@ def test_what_happened_is_listed(page: Page) -> None:
 def test_the_figures_are_those_of_the_run(tmp_path: Path) -> None:
     made = make_run("humanoid", 0.1, WALK)
     recording = read_recording(write_bag(tmp_path / "bag", made.messages()))
+    known = configuration.parse(configuration.describe(made.plan.character, made.plan.simulator))
+    measurement = Measurement(known)
+    for tick in made.ticks:
+        measurement.add(tick)
 
     summary, series = measure_recording(recording)
 
-    knees = [
-        abs(t.state.position[10] - t.reference.position[10]) for t in made.ticks if t.reference
-    ]
-    assert summary["ticks"] == len(made.ticks) == len(knees) == len(series["time_s"])
-    assert summary["sim_time_s"] == pytest.approx(0.1)
-    assert summary["wall_time_s"] == pytest.approx(24e-9)  # as tests/support/bags.py stamps them
-    again = measure_recording(recording)[0]
-    assert summary["state_hash"] == again["state_hash"]
+    assert summary == measurement.summary(wall_time=24e-9)  # as tests/support/bags.py stamps them
+    for name, column in measurement.series().items():
+        np.testing.assert_array_equal(series[name], column)
 
 
 # What is not there is said
@@ -208,12 +243,12 @@ def test_what_a_recording_lacks_is_said(tmp_path: Path) -> None:
 
     for words in (
         "The recording has no reference.",
-        "The base is fixed.",
         "The recording has no contacts",
         "Pushes were not recorded.",
     ):
         assert any(words in heading for heading in page.headings)
     assert (tmp_path / "bag-report" / "efforts.png").is_file()
+    assert "A run of 0.05 s without a reference." in page.text and "root" not in page.headings
 
 
 def test_one_state_is_enough(tmp_path: Path) -> None:
@@ -259,6 +294,28 @@ def test_a_report_is_replaced_and_nothing_else_is(
     assert main(["report", str(bag)]) == 1
     said = capsys.readouterr().err
     assert "holds other files than a report's: mine.txt" in said and said.count("\n") == 1
+
+
+@pytest.mark.parametrize("after", [0, 3, 7])
+def test_an_interrupted_report_leaves_the_old_one(
+    tmp_path: Path, pendulum: Made, after: int
+) -> None:
+    bag = write_bag(tmp_path / "bag", pendulum.messages())
+    page = write_report(bag, stills=0)
+    before = {file.name: file.read_bytes() for file in page.parent.iterdir()}
+    told: list[int] = []
+
+    def interrupt(done: int, total: int) -> None:
+        told.append(done)
+        assert total == 7
+        if done == after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_report(bag, stills=1, progress=interrupt)
+
+    assert told == list(range(after + 1))
+    assert {file.name: file.read_bytes() for file in page.parent.iterdir()} == before
 
 
 def test_a_report_is_one_of_a_runs_results(tmp_path: Path, pendulum: Made) -> None:
@@ -308,6 +365,14 @@ def test_texts_are_escaped_wherever_they_are() -> None:
     assert page.pictures == []
     assert page.rows(evil) == [[evil], [evil]]
     assert not re.search(r"onerror=alert\(1\)>", page.text)
+
+
+def test_a_column_without_a_value_is_left_out() -> None:
+    table = Table([("a", NOT_KNOWN, "1"), ("b", NOT_KNOWN, NOT_KNOWN)], ("joint", "limit", "p"))
+
+    page = Page(render_page("page", [Chapter("", [Section("", tables=[table])])]))
+
+    assert page.cells == [["joint", "p"], ["a", "1"], ["b", NOT_KNOWN]]
 
 
 def test_a_long_series_keeps_its_extremes() -> None:
