@@ -122,7 +122,7 @@ class Measurement:
         return dict(zip(self._columns, rows.T, strict=True))
 
     def summary(self, wall_time: float) -> dict[str, object]:
-        """The figures by name; `wall_time` in s is what the ticks took. None: not measurable."""
+        """The figures by name, None if not measurable; `wall_time` is that of all ticks, s."""
         series, layout = self.series(), self._layout
         sim_time = (self._last_stamp - (self._first_stamp or 0)) / NANOSECONDS_PER_SECOND
         vectors = self._ticks * int(self._kinds.actuated.sum())
@@ -194,6 +194,6 @@ class Measurement:
 
 
 def _of_known(measure: Callable[[FloatArray], float], values: FloatArray) -> float | None:
-    """Mean or maximum of what is known of a series; None if nothing is."""
+    """Mean or maximum of a series, NaN left out; None without a number."""
     known = values[~np.isnan(values)]
     return float(measure(known)) if len(known) else None

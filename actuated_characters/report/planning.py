@@ -1,4 +1,4 @@
-"""A planner's predictions against what came of them: the centre of mass, and the plans' costs."""
+"""A planner's predictions of the centre of mass against its path, and the plans' costs."""
 
 from typing import Any
 

@@ -59,10 +59,8 @@ class CharacterReport:
         self._recording, self._prefix, self._stills = recording, prefix, stills
         self._facts = facts = run_facts(recording)
         self._kinds = vector_kinds(recording.layout)
-        self._names, self._limits = (
-            recording.character.vector_names,
-            recording.character.effort_limits(),
-        )
+        self._names = recording.character.vector_names
+        self._limits = recording.character.effort_limits()
         self._errors = tracking_errors(recording)
         self._figures, _ = measure_recording(recording)
         reacts = any(span.mode != TRACK for span in facts.modes)
@@ -317,7 +315,7 @@ class CharacterReport:
 
 
 def _statistics(values: FloatArray) -> Sequence[str]:
-    """Mean, percentile and maximum of what is known of a series."""
+    """Mean, percentile and maximum of a series, NaN left out."""
     known = values[~np.isnan(values)]
     if not len(known):
         return (NOT_KNOWN,) * len(_STATISTICS)

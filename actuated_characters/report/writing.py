@@ -23,7 +23,6 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 PAGE = "index.html"
 
 _PICTURE = re.compile(rf"([0-9]+-[A-Za-z0-9_]*-)?({'|'.join(NAMES)})\.png")
-_HEAD = 400  # characters of a page that its generator is in
 _UNFIT = re.compile("[^A-Za-z0-9_]+")  # for the name of a file
 
 Progress = Callable[[int, int], None]
@@ -94,25 +93,21 @@ def _old_files(directory: Path) -> list[Path]:
         return []
     if not directory.is_dir():
         raise RecordingError(f"cannot write the report: {directory} is no directory")
-    present = sorted(directory.iterdir())
-    foreign = [file for file in present if not file.is_file() or not _is_ours(file.name)]
-    if present and not foreign and not _is_report(directory / PAGE):
-        foreign = present
+    present, page = sorted(directory.iterdir()), directory / PAGE
+    foreign = [
+        file
+        for file in present
+        if not file.is_file() or (file != page and not _PICTURE.fullmatch(file.name))
+    ]
+    if present and not foreign and not _is_report(page):
+        foreign = [page] if page in present else present
     if foreign:
         raise RecordingError(f"{directory} holds other files than a report's: {foreign[0].name}")
     return present
 
 
-def _is_ours(name: str) -> bool:
-    return name == PAGE or _PICTURE.fullmatch(name) is not None
-
-
 def _is_report(page: Path) -> bool:
-    try:
-        with page.open(encoding="utf-8", errors="replace") as file:
-            return GENERATOR in file.read(_HEAD)
-    except OSError:
-        return False
+    return page.exists() and GENERATOR in page.read_text(encoding="utf-8", errors="replace")
 
 
 def _bag_section(contents: Contents) -> Section:

@@ -8,7 +8,7 @@ from actuated_characters.report.decimation import decimated
 from actuated_characters.studies.framework.plots import label, make_panels
 
 _SIZE = (11.0, 3.4)  # inches, of each character's panel
-_LEAST = 1e-17  # rad or m; what is drawn on a logarithmic axis of what is the same
+_LEAST = 1e-17  # rad or m; stands for 0 on a logarithmic axis
 
 
 def draw_comparisons(comparisons: list[Comparison]) -> Figure:

@@ -55,7 +55,7 @@ class Comparison:
     common: int  # states with the same stamps
     first: FirstDifference | None
     growth: Growth
-    figures: dict[str, tuple[object, object]]
+    figures: dict[str, tuple[object, object]]  # without those that neither has
     simulator: dict[str, tuple[object, object]]  # parameters that differ
     controller: dict[str, tuple[object, object]] | None  # at the start; None: not in both
     versions: dict[str, tuple[object, object]]  # of package, engines and libraries that differ
@@ -92,7 +92,8 @@ def compare(first: Recording, second: Recording, tolerance: float | None = None)
     if not len(stamps):
         spans = [f"{r.stamps_ns[0]} to {r.stamps_ns[-1]} ns" for r in both]
         raise RecordingError(f"the recordings have no stamp in common: {' and '.join(spans)}")
-    figures, others = (measure_recording(recording)[0] for recording in both)
+    measured = [measure_recording(recording)[0] for recording in both]
+    figures = {name: (value, measured[1][name]) for name, value in measured[0].items()}
     told = [r.controller[0].parameters if r.controller else {} for r in both]
     return Comparison(
         name=first.name,
@@ -100,7 +101,7 @@ def compare(first: Recording, second: Recording, tolerance: float | None = None)
         common=len(stamps),
         first=_first_difference((first, ours), (second, theirs), tolerance),
         growth=_growth((first, ours), (second, theirs)),
-        figures={name: (value, others[name]) for name, value in figures.items()},
+        figures={name: values for name, values in figures.items() if values != (None, None)},
         simulator=differences(first.parameters, second.parameters),
         controller=differences(*told) if all(told) or not any(told) else None,
         versions=differences(first.versions, second.versions),
@@ -191,7 +192,7 @@ def _growth(first: _Rows, second: _Rows) -> Growth:
     recording, rows = first
     ours, theirs = _values(first, "position"), _values(second, "position")
     apart = error_measures.distances(recording.layout, ours, theirs)
-    # of equal positions 0, and not what a rotation's way there and back leaves
+    # equal positions are 0 apart, although a rotation's logarithm leaves rounding errors
     apart[~_different_bits(ours, theirs).any(axis=1)] = 0.0
     kinds, stamps = error_measures.vector_kinds(recording.layout), recording.stamps_ns[rows]
     unknown = np.full((len(apart), 1), np.nan)  # for characters without a joint of the kind

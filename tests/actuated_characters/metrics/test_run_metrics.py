@@ -404,13 +404,27 @@ def test_missing_ticks_are_counted() -> None:
     assert assembled(STATES)[1] == 0
 
 
-def test_a_reference_that_never_comes_leaves_the_others_their_ticks() -> None:
-    figures, missing = assembled([*STATES, *REFERENCES[:4], *REFERENCES[5:]])
+RESET = [*STATES[:5], replace(STATES[5], effort=None), *STATES[6:]]
+
+
+@pytest.mark.parametrize(
+    ("states", "references", "measured_ticks"),
+    [
+        (STATES, [*REFERENCES[:4], *REFERENCES[5:]], (1, 2, 3, 4, 6, 7, 8, 9)),
+        (RESET, REFERENCES, (1, 2, 3, 4, 6, 7, 8, 9)),
+    ],
+    ids=["a reference never comes", "between two episodes there is no tick"],
+)
+def test_a_tick_that_cannot_be_measured_leaves_the_others_theirs(
+    states: list[StampedState], references: list[StampedReference], measured_ticks: tuple[int, ...]
+) -> None:
+    figures, missing = assembled([*states, *references])
 
     assert missing == 0
-    assert figures["ticks"] == 9
-    errors = [0.1 * tick / 2.0 for tick in (1, 2, 3, 4, 6, 7, 8, 9)]
+    assert figures["ticks"] == (9 if states is STATES else 8)
+    errors = [0.1 * tick / 2.0 for tick in measured_ticks]
     assert figures["joint_error_mean_rad"] == pytest.approx(np.mean(errors))
+    assert figures["state_hash"] == hash_of(*states)
 
 
 def test_references_wait_only_for_the_states_that_they_belong_to() -> None:
@@ -436,16 +450,6 @@ def test_a_flood_of_references_takes_a_bounded_memory_and_is_counted() -> None:
     assembler.add_state(replace(STATES[0], stamp_ns=reference(30_000, entries()).stamp_ns))
     assembler.finish()
     assert assembler.dropped_references == 39_999 - 10
-
-
-def test_between_two_episodes_there_is_no_tick() -> None:
-    states = [*STATES[:5], replace(STATES[5], effort=None), *STATES[6:]]
-
-    figures, missing = assembled([*states, *REFERENCES])
-
-    assert missing == 0
-    assert figures["ticks"] == 8
-    assert figures["state_hash"] == hash_of(*states)
 
 
 def test_a_state_that_is_no_tick_is_an_error() -> None:
