@@ -12,6 +12,7 @@ from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.character.model import Character
+from msgs_config.geometry import fixed_order
 
 AT_LIMIT = 1.0 - 1e-9
 """Share of its limit from which on an effort is at the limit: it was clipped in its direction."""
@@ -109,4 +110,6 @@ def is_lost(centre: FloatArray, desired: FloatArray) -> bool:
 
     It is beyond 0.6 m, or below half of the desired height.
     """
-    return bool(np.linalg.norm(centre - desired) > _FARTHEST or centre[2] < _LOWEST * desired[2])
+    apart = centre - desired
+    is_far = fixed_order.dot(apart, apart) > _FARTHEST**2
+    return bool(is_far or centre[2] < _LOWEST * desired[2])
