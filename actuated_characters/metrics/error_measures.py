@@ -110,6 +110,5 @@ def is_lost(centre: FloatArray, desired: FloatArray) -> bool:
 
     It is beyond 0.6 m, or below half of the desired height.
     """
-    apart = centre - desired
-    is_far = fixed_order.dot(apart, apart) > _FARTHEST**2
+    is_far = fixed_order.norm(centre - desired) > _FARTHEST
     return bool(is_far or centre[2] < _LOWEST * desired[2])
