@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-GENERATOR = '<meta name="generator" content="actuated_characters report">'
+GENERATOR = '<meta name="generator" content="actuated_characters report"'
 """Marks a page as a report's."""
 
 NOT_KNOWN = "-"
@@ -85,9 +85,9 @@ def render_page(title: str, chapters: Sequence[Chapter]) -> str:
     links = "".join(f'<a href="#c{n}">{escape(text)}</a>' for n, text in enumerate(titles) if text)
     body = "".join(_chapter(number, chapter) for number, chapter in enumerate(chapters))
     return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f"{GENERATOR}\n"
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
+        f"{GENERATOR}/>\n"
+        '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
         f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
         f"<h1>{escape(title)}</h1>\n<nav>{links}</nav>\n{body}</body>\n</html>\n"
     )
@@ -117,7 +117,7 @@ def _figure(illustration: Illustration) -> str:
     data = base64.b64encode(illustration.png).decode("ascii")
     text = escape(illustration.text, quote=True)
     return (
-        f'<figure><img alt="{text}" src="data:image/png;base64,{data}">'
+        f'<figure><img alt="{text}" src="data:image/png;base64,{data}"/>'
         f"<figcaption>{text}</figcaption></figure>\n"
     )
 

@@ -5,12 +5,12 @@ import math
 import struct
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
-from std_msgs.msg import String
 
 from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.metrics.error_measures import is_lost
@@ -19,14 +19,12 @@ from actuated_characters.metrics.tick_assembler import MOST_AHEAD, TickAssembler
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.errors import ActuatedCharactersError, ClockError, RecordingError
-from msgs_config.messages import configuration, topics
+from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.configuration import RunConfiguration
-from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.parameters import resolve
-from sim_node.parameters import PARAMETERS, character_parameters
-from tests.support.physics import character, controller, run_together, simulation
+from tests.support.bags import Made, make_run, said_configuration, said_references, said_states
+from tests.support.physics import character
 
 RATE = 100
 CLOCK = TickClock(RATE)
@@ -467,14 +465,15 @@ STATE, TORQUE = topics.JOINT_STATES.name, topics.JOINT_TORQUES.name
 REFERENCE = topics.REFERENCE.of(CONTROLLER).name
 CONFIGURATION = topics.CONFIGURATION.of(SIMULATOR).name
 MILLISECOND = 10**6
-PENDULUM_NAMES = character("pendulum").layout.dof_names
+
+
+@cache
+def pendulum(**simulator: object) -> Made:
+    return make_run("pendulum", 20 / 240, **simulator)
 
 
 def configuration_message(**given: object) -> Message:
-    whole = character("pendulum")
-    values = resolve(PARAMETERS + character_parameters(whole), given)
-    text = configuration.describe(whole, values)
-    return CONFIGURATION, serialize_message(String(data=text)), 0
+    return CONFIGURATION, said_configuration(pendulum(**given).plan)[1], 0
 
 
 def report(name: str, published_ns: int, **values: object) -> Message:
@@ -483,22 +482,16 @@ def report(name: str, published_ns: int, **values: object) -> Message:
     return topics.DIAGNOSTICS.name, serialize_message(message), published_ns
 
 
-def pendulum_messages(ticks: int = 20) -> list[Message]:
-    """What a pendulum's run says: in each ms a state, its reference and its torque."""
-    encode = JointStateEncoder(PENDULUM_NAMES).encode
-    messages: list[Message] = []
-    with simulation("pendulum") as run:
-        for now, effort, wanted in run_together(run, controller("pendulum"), ticks):
-            at = (len(messages) // 3 + 1) * MILLISECOND
-            applied = () if now.effort is None else (now.effort,)
-            state = encode(now.stamp_ns, now.position, now.velocity, *applied)
-            desired = encode(now.stamp_ns, wanted.position, wanted.velocity)
-            torque = encode(now.stamp_ns, effort=effort)
-            messages += [(STATE, state, at), (REFERENCE, desired, at), (TORQUE, torque, at + 1000)]
-        last = run.state
-    assert last.effort is not None
-    raw = encode(last.stamp_ns, last.position, last.velocity, last.effort)
-    return [*messages, (STATE, raw, (ticks + 1) * MILLISECOND)]
+def pendulum_messages() -> list[Message]:
+    """What a recorder hears of a pendulum: in each ms a state, and its reference; and a torque."""
+    made = pendulum()
+    references = [tick.reference for tick in made.ticks if tick.reference is not None]
+    states = enumerate(said_states(made.plan, made.states), start=1)
+    desired = enumerate(said_references(made.plan, references), start=1)
+    messages = [(REFERENCE, raw, at * MILLISECOND) for at, (_, raw) in desired]
+    messages += [(STATE, raw, at * MILLISECOND) for at, (_, raw) in states]
+    messages.append((TORQUE, b"", MILLISECOND + 1000))
+    return sorted(messages, key=lambda message: message[2])
 
 
 def heard(messages: Iterable[Message]) -> MetricsCollector:
@@ -524,10 +517,7 @@ def test_a_listener_gives_the_figures_of_the_run_that_it_hears() -> None:
     assert figures["body_weight_n"] == pytest.approx(9.81 * mass_kg)
     assert list(series) == list(COLUMNS)
     assert {len(column) for column in series.values()} == {20}
-    driver = controller("pendulum")
-    with simulation("pendulum") as run:
-        states = [now for now, _, _ in run_together(run, driver, 20)]
-        assert figures["state_hash"] == hash_of(*states, run.state)
+    assert figures["state_hash"] == hash_of(*pendulum().states)
 
 
 def test_early_and_repeated_messages_change_nothing() -> None:
