@@ -64,11 +64,13 @@ def _compare(options: argparse.Namespace) -> int:
     console = Console()
     for comparison in comparisons:
         _print(console, comparison, tolerance)
-    _print_differences(console, "versions", _versions(options.first, options.second))
+    _print_differences(console, "versions", comparisons[0].versions)
     if output is not None:
-        from actuated_characters.report.comparison.chart import draw_comparisons, save_figure
+        from actuated_characters.report.charts import png
+        from actuated_characters.report.comparison.chart import draw_comparisons
+        from actuated_characters.whole_files import write_whole
 
-        save_figure(draw_comparisons(comparisons), output)
+        write_whole(output, png(draw_comparisons(comparisons)))
         console.print(escape(str(output)), soft_wrap=True)
     return 0 if all(comparison.identical for comparison in comparisons) else _DIFFERENT
 
@@ -138,13 +140,6 @@ def _print_differences(
         return
     rows = [(name, *map(_shorten, values)) for name, values in differences.items()]
     console.print(make_table(f"{title} that differ", ("", "first", "second"), rows, right=False))
-
-
-def _versions(first: Path, second: Path) -> dict[str, tuple[object, object]]:
-    from actuated_characters.report.changes import differences
-    from actuated_characters.report.facts import recorded_versions
-
-    return differences(recorded_versions(first), recorded_versions(second))
 
 
 def _shorten(value: object) -> str:

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.settings import Commands, add_bag, add_command
 from msgs_config.errors import ConfigurationError
 
@@ -44,4 +45,10 @@ def _report(options: argparse.Namespace) -> None:
         raise ConfigurationError(f"--stills is {options.stills}; it must be 0 to {_MOST_STILLS}")
     from actuated_characters.report.writing import write_report
 
-    print(write_report(options.bag, options.output, stills=options.stills))
+    with progress_bar("report", 1, "sections", transient=True) as bar:
+
+        def progress(done: int, total: int) -> None:
+            bar.update(bar.task_ids[0], completed=done, total=total)
+
+        page = write_report(options.bag, options.output, stills=options.stills, progress=progress)
+    print(page)

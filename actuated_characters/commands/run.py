@@ -21,7 +21,7 @@ from actuated_characters.commands.common.settings import (
     bring_parameters,
     node_settings,
 )
-from actuated_characters.commands.common.tables import make_table, show
+from actuated_characters.commands.common.tables import make_table
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -126,12 +126,8 @@ def _add_recorded(run: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from actuated_characters.runs.run_directory import (
-        PLOT,
-        plot_figures,
-        prepare_directory,
-        read_figures,
-    )
+    from actuated_characters.report.run_figures import describe_figures, plot_figures
+    from actuated_characters.runs.run_directory import PLOT, prepare_directory, read_figures
 
     run = planned_run(options)
     plan, motion = run.plan, _motion_name(run.plan)
@@ -154,7 +150,7 @@ def _run(options: argparse.Namespace) -> None:
             raise
         progress(plan.ticks)
     plot_figures(directory)
-    figures = [(name, show(value)) for name, value in read_figures(directory)[0].items()]
+    figures = describe_figures(read_figures(directory)[0])
     Console().print(make_table(f"results in {directory}", ("figure", "value"), figures))
     for text, hit in zip(options.throw, hits, strict=True):
         print(f"throw '{text}': {hit}")

@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium import spaces
 
 from actuated_characters.api import Controller, Simulation
-from actuated_characters.reconstruction.world import is_lost
+from actuated_characters.metrics.error_measures import is_lost
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel

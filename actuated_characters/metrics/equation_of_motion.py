@@ -1,12 +1,12 @@
-"""The equation of motion tick by tick: what is left of it when all that is known has been summed.
+"""The residual of the equation of motion, tick by tick.
 
     M (v' - v) / h + C = f + J^T w + J^T p
 
 is the lecture's equation (GAMES 105, lecture 9) as the engine steps it: M, C and every J are those
 of the state that a tick begins with, v' is the velocity that it ends with, h its length, f the
 effort that was applied, w the contacts' wrenches on the links and p the pushes. All of these are
-on the topics, and with them the equation holds to rounding. What no topic carries is left over:
-the effort of a joint's limit that has been reached, on that joint's own entry, and the torque of
+on the topics, and with them the equation holds to rounding. The residual is what no topic carries:
+the effort of a joint's limit that has been reached, on that joint's entry, and the torque of
 rolling and spinning friction, where a URDF asks for it.
 
 It holds for one substep: with more, a tick has a state in between for each.
@@ -33,7 +33,7 @@ class Balance:
     """The parts of the equation of one tick, generalised forces (n,): N or N m an entry."""
 
     inertial: FloatArray  # M (v' - v) / h
-    bias: FloatArray  # C: Coriolis, centrifugal, gravity, and what passive joint forces take
+    bias: FloatArray  # C: Coriolis, centrifugal and gravity forces, less passive joint forces
     applied: FloatArray  # f
     contact: FloatArray  # J^T w
     pushed: FloatArray  # J^T p
@@ -41,7 +41,7 @@ class Balance:
 
     @property
     def residual(self) -> FloatArray:
-        """What is left (n,): `M (v' - v) / h + C - f - J^T w - J^T p`."""
+        """The residual (n,): `M (v' - v) / h + C - f - J^T w - J^T p`."""
         return self.inertial + self.bias - self.applied - self.contact - self.pushed
 
     @property
@@ -118,7 +118,8 @@ class EquationOfMotion:
         turn = rotations.matrix(rotations.exp(position[3:6]))
         spin, next_spin = turn @ velocity[3:6], turn @ next_velocity[3:6]
         # the base turns by the new angular velocity, which the turn does not change
-        centre, next_centre = turn @ offset, turn @ _turned(offset, period * next_velocity[3:6])
+        turned = rotations.exp(period * next_velocity[3:6])
+        centre, next_centre = turn @ offset, turn @ rotations.rotate(turned, offset)
         change = np.cross(next_spin, next_centre) - np.cross(spin, centre)
         acceleration[:3] += change / period
         acceleration[:3] -= np.cross((next_spin - spin) / period, centre)
@@ -141,7 +142,3 @@ class EquationOfMotion:
         for link in np.flatnonzero(wrenches.any(axis=1)).tolist():
             force += self._model.link_jacobian(link).T @ wrenches[link]
         return force
-
-
-def _turned(vector: FloatArray, rotation_vector: FloatArray) -> FloatArray:
-    return rotations.rotate(rotations.exp(rotation_vector), vector)

@@ -1,20 +1,28 @@
-"""The figures of a run, measured from what went over the topics."""
+"""The figures of a run, measured tick by tick."""
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from msgs_config.arrays import BoolArray, FloatArray
+from actuated_characters.metrics.error_measures import (
+    AT_LIMIT,
+    distances,
+    effort_sizes,
+    has_fallen,
+    limit_shares,
+    vector_kinds,
+)
+from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.state import StampedReference, StampedState
 
-_BLOCK = 256  # ticks that are evaluated together: a few array operations for all of them
-_FALL_FRACTION = 0.5  # of the reference's root height
-_LEAST_HEIGHT = 0.5  # m; a reference below lies on the ground of its own will
-_AT_LIMIT = 1.0 - 1e-9
+Series: TypeAlias = dict[str, FloatArray]
+"""A column (t,) of one entry a tick, by its name."""
 
 COLUMNS = (
     "time_s",
@@ -26,6 +34,14 @@ COLUMNS = (
     "assist_force_n",
     "effort_of_limit_max",
 )
+"""Of every character's series; those of sliders follow, see `slider_columns`."""
+
+_BLOCK = 256  # ticks that are evaluated together: a few array operations for all of them
+
+
+def slider_columns(slider: str) -> tuple[str, str, str]:
+    """Names of the columns of a slider: position in m, its reference, and effort in N."""
+    return f"position.{slider}", f"reference_position.{slider}", f"effort.{slider}"
 
 
 @dataclass(frozen=True)
@@ -55,11 +71,11 @@ class StateHash:
 
 
 class Measurement:
-    """Takes a run tick by tick; gives its figures and its series at the end."""
+    """Measures a run tick by tick; gives its figures and its series at the end."""
 
     def __init__(self, configuration: RunConfiguration) -> None:
         self._configuration = configuration
-        self._layout = configuration.layout
+        self._layout = layout = configuration.layout
         self._hash = StateHash()
         self._block: list[Tick] = []
         self._rows: list[FloatArray] = []
@@ -67,69 +83,79 @@ class Measurement:
         self._first_stamp: int | None = None
         self._last_stamp = 0
         self._ticks = 0
-        owners = [joint.type for joint in self._layout.joints for _ in joint.vectors]
-        self._rotates = np.array(
-            [owner in (JointType.REVOLUTE, JointType.SPHERICAL) for owner in owners], dtype=np.bool_
-        )
-        self._actuated: BoolArray = np.array(
-            [owner is not JointType.FLOATING for owner in owners], dtype=np.bool_
-        )
+        self._kinds = vector_kinds(layout)
+        self._sliders = [joint for joint in layout.joints if joint.type is JointType.PRISMATIC]
+        self._columns = [*COLUMNS]
+        for joint in self._sliders:
+            self._columns += slider_columns(joint.name)
 
     def add_state(self, state: StampedState) -> None:
-        """Take a state into the hash; each once, in order."""
+        """Add a state to the hash; each once, in order."""
         self._hash.add(state)
         if self._first_stamp is None:
             self._first_stamp = state.stamp_ns
         self._last_stamp = state.stamp_ns
 
     def add_tick(self, tick: Tick) -> None:
-        """Take a tick that is over; in order."""
+        """Add a tick that is over; in order."""
         self._ticks += 1
         self._block.append(tick)
         if len(self._block) == _BLOCK:
             self._evaluate()
+
+    def add(self, tick: Tick) -> None:
+        """Add the next tick of a run without gaps, and the states that it has besides."""
+        if self._first_stamp is None:
+            self.add_state(tick.state)
+        self.add_state(tick.following)
+        self.add_tick(tick)
 
     @property
     def state_hash(self) -> str:
         """The hash over all states so far."""
         return self._hash.hexdigest()
 
-    def series(self) -> FloatArray:
-        """One row a tick, of `COLUMNS`; NaN where there was no reference."""
+    def series(self) -> Series:
+        """The columns of `COLUMNS` and those of sliders; NaN where nothing can be measured."""
         self._evaluate()
-        return np.vstack([np.empty((0, len(COLUMNS))), *self._rows])
+        rows = np.vstack([np.empty((0, len(self._columns))), *self._rows])
+        return dict(zip(self._columns, rows.T, strict=True))
 
     def summary(self, wall_time: float) -> dict[str, object]:
-        """The figures by name; `wall_time` in s is what the ticks took. None: not measurable."""
-        columns = dict(zip(COLUMNS, self.series().T, strict=True))
+        """The figures by name, None if not measurable; `wall_time` is that of all ticks, s."""
+        series, layout = self.series(), self._layout
         sim_time = (self._last_stamp - (self._first_stamp or 0)) / NANOSECONDS_PER_SECOND
-        vectors = self._ticks * int(self._actuated.sum())
+        vectors = self._ticks * int(self._kinds.actuated.sum())
         parameters = self._configuration.parameters
-        gravity = float(parameters.get("gravity", np.nan))
-        actuated = self._layout.mask(parameters.get("commanded_joints", ()))
+        commanded = layout.mask(parameters.get("commanded_joints", ()))
+        of_root = commanded[layout.joints[0].entries] if layout.has_floating_base else np.zeros(0)
+        height, desired = series["root_height_m"], series["reference_root_height_m"]
+        is_known = not np.isnan(desired).all()
         return {
             "ticks": self._ticks,
             "sim_time_s": sim_time,
             "wall_time_s": wall_time,
             "real_time_factor": sim_time / wall_time if wall_time > 0.0 else None,
-            "actuators": int(actuated.sum()),
-            "degrees_of_freedom": self._layout.size,
-            "fell": self._fell(columns),
-            "joint_error_mean_rad": _mean(columns["joint_error_mean_rad"]),
-            "root_error_mean_m": _mean(columns["root_error_m"]),
-            "root_error_max_m": _maximum(columns["root_error_m"]),
-            "assist_force_mean_n": _mean(columns["assist_force_n"]),
-            "body_weight_n": self._configuration.mass * gravity,
+            "actuators": int(commanded.sum()),
+            "root_actuators": int(of_root.sum()),
+            "degrees_of_freedom": layout.size,
+            "fell": bool(has_fallen(height, desired).any()) if is_known else None,
+            "joint_error_mean_rad": _of_known(np.mean, series["joint_error_mean_rad"]),
+            "slider_error_mean_m": _of_known(np.mean, self._slider_errors(series)),
+            "slider_error_max_m": _of_known(np.max, self._slider_errors(series)),
+            "root_error_mean_m": _of_known(np.mean, series["root_error_m"]),
+            "root_error_max_m": _of_known(np.max, series["root_error_m"]),
+            "assist_force_mean_n": _of_known(np.mean, series["assist_force_n"]),
+            "body_weight_n": self._configuration.mass * float(parameters.get("gravity", np.nan)),
             "saturated_fraction": self._saturated / vectors if vectors else None,
             "state_hash": self.state_hash,
         }
 
-    def _fell(self, columns: dict[str, FloatArray]) -> bool | None:
-        height, desired = columns["root_height_m"], columns["reference_root_height_m"]
-        if np.isnan(desired).all():
-            return None
-        stands = desired > _LEAST_HEIGHT  # false where it is NaN
-        return bool(np.any(stands & (height < _FALL_FRACTION * desired)))
+    def _slider_errors(self, series: Series) -> FloatArray:
+        """Distance of each slider from its reference in each tick, m."""
+        names = [slider_columns(joint.name) for joint in self._sliders]
+        pairs = [series[position] - series[reference] for position, reference, _ in names]
+        return np.abs(np.array(pairs))
 
     def _evaluate(self) -> None:
         """Evaluate the ticks that were collected."""
@@ -139,50 +165,35 @@ class Measurement:
         missing = np.full(self._layout.size, np.nan)
         position = np.stack([tick.state.position for tick in block])
         desired = np.stack(
-            [missing if tick.reference is None else tick.reference.position for tick in block]
+            [missing if t.reference is None else t.reference.position for t in block]
         )
-        applied = np.stack(
-            [tick.following.effort for tick in block if tick.following.effort is not None]
-        )
+        applied = np.stack([t.following.effort for t in block if t.following.effort is not None])
         stamps = np.array([tick.state.stamp_ns - (self._first_stamp or 0) for tick in block])
-        rows = np.full((len(block), len(COLUMNS)), np.nan)
-        rows[:, 0] = stamps / NANOSECONDS_PER_SECOND
-        self._measure_errors(rows, position, desired)
-        self._measure_efforts(rows, applied)
+        rows = np.full((len(block), len(self._columns)), np.nan)
+        columns = dict(zip(self._columns, rows.T, strict=True))
+        columns["time_s"][:] = stamps / NANOSECONDS_PER_SECOND
+        errors = distances(self._layout, position, desired)
+        if self._kinds.rotating.any():
+            columns["joint_error_mean_rad"][:] = errors[:, self._kinds.rotating].mean(axis=1)
+            columns["joint_error_max_rad"][:] = errors[:, self._kinds.rotating].max(axis=1)
+        sizes = effort_sizes(self._layout, applied)
+        if self._layout.has_floating_base:
+            columns["root_error_m"][:] = errors[:, 0]
+            columns["root_height_m"][:] = position[:, 2]
+            columns["reference_root_height_m"][:] = desired[:, 2]
+            columns["assist_force_n"][:] = sizes[:, 0]
+        for joint in self._sliders:
+            given = (position, desired, applied)
+            for name, values in zip(slider_columns(joint.name), given, strict=True):
+                columns[name][:] = values[:, joint.start]
+        limits = self._configuration.effort_limits[self._kinds.actuated]
+        shares = limit_shares(sizes[:, self._kinds.actuated], limits)
+        columns["effort_of_limit_max"][:] = shares.max(axis=1, initial=0.0)
+        self._saturated += int((shares >= AT_LIMIT).sum())
         self._rows.append(rows)
 
-    def _measure_errors(self, rows: FloatArray, position: FloatArray, desired: FloatArray) -> None:
-        layout = self._layout
-        difference = layout.difference(
-            layout.configuration(position), layout.configuration(desired)
-        )
-        errors = layout.norms(difference)
-        if self._rotates.any():
-            rows[:, 1] = errors[:, self._rotates].mean(axis=1)
-            rows[:, 2] = errors[:, self._rotates].max(axis=1)
-        if layout.has_floating_base:
-            rows[:, 3], rows[:, 4], rows[:, 5] = errors[:, 0], position[:, 2], desired[:, 2]
 
-    def _measure_efforts(self, rows: FloatArray, applied: FloatArray) -> None:
-        norms = self._layout.norms(applied)
-        if self._layout.has_floating_base:
-            rows[:, 6] = norms[:, 0]
-        limits = self._configuration.effort_limits[self._actuated]
-        of_limit = np.divide(
-            norms[:, self._actuated],
-            limits,
-            out=np.ones((len(rows), len(limits))),
-            where=limits > 0.0,
-        )
-        rows[:, 7] = of_limit.max(axis=1, initial=0.0)
-        self._saturated += int((of_limit >= _AT_LIMIT).sum())
-
-
-def _mean(values: FloatArray) -> float | None:
+def _of_known(measure: Callable[[FloatArray], float], values: FloatArray) -> float | None:
+    """Mean or maximum of a series, NaN left out; None without a number."""
     known = values[~np.isnan(values)]
-    return float(known.mean()) if len(known) else None
-
-
-def _maximum(values: FloatArray) -> float | None:
-    known = values[~np.isnan(values)]
-    return float(known.max()) if len(known) else None
+    return float(measure(known)) if len(known) else None

@@ -1,4 +1,4 @@
-"""Matches what several topics say of one tick, and measures it. No ROS in here."""
+"""Puts the messages of one tick together, and measures it. Knows no ROS."""
 
 from collections import deque
 
@@ -15,9 +15,9 @@ _MOST_WAITING = _LONGEST_WAIT + MOST_AHEAD  # references
 class TickAssembler:
     """Puts states and references together by their stamps, in the order of the states.
 
-    A tick is over when the next state has come, which says what effort was applied, and when its
-    reference has come. A repeated state counts once. References wait for the states they belong to:
-    one of no tick, of a tick too far ahead or of one whose state never came is dropped.
+    A tick is over when its reference has come, and the next state, which has the effort that was
+    applied. A repeated state counts once. References wait for the states that they belong to: one
+    of no tick, of a tick too far ahead or of one whose state never came is dropped.
     """
 
     def __init__(self, measurement: Measurement, rate_hz: int) -> None:
@@ -34,19 +34,24 @@ class TickAssembler:
         """Number of the last tick whose state came; 0 before the first."""
         return self._last_tick or 0
 
-    def add_state(self, state: StampedState) -> None:
-        """Take a state as it came. Raises ClockError if its stamp is no tick."""
+    def add_state(self, state: StampedState) -> bool:
+        """Take a state as it came; whether it is a new one.
+
+        Raises:
+            ClockError: its stamp is no tick.
+        """
         tick = self._clock.tick(state.stamp_ns)
         if self._last_tick is not None:
             if tick <= self._last_tick:
-                return
+                return False
             self.missing_ticks += tick - self._last_tick - 1
         else:
             self._drop_outside(tick, tick + MOST_AHEAD)
         self._last_tick = tick
         self._measurement.add_state(state)
         self._states.append(state)
-        self._assemble(patience=_LONGEST_WAIT)
+        self._assemble(longest_wait=_LONGEST_WAIT)
+        return True
 
     def add_reference(self, reference: StampedReference) -> None:
         """Take a reference as it came; a repeated one replaces itself."""
@@ -54,13 +59,13 @@ class TickAssembler:
             return
         if self._may_wait(reference.stamp_ns):
             self._references[reference.stamp_ns] = reference
-            self._assemble(patience=_LONGEST_WAIT)
+            self._assemble(longest_wait=_LONGEST_WAIT)
         else:
             self.dropped_references += 1
 
     def finish(self) -> None:
-        """Measure the ticks whose reference has not come and will not any more."""
-        self._assemble(patience=0)
+        """Measure the last ticks, whose references have not come, without them."""
+        self._assemble(longest_wait=0)
 
     def _may_wait(self, stamp_ns: int) -> bool:
         try:
@@ -79,11 +84,11 @@ class TickAssembler:
         }
         self.dropped_references += before - len(self._references)
 
-    def _assemble(self, patience: int) -> None:
+    def _assemble(self, longest_wait: int) -> None:
         while len(self._states) > 1:
             state, following = self._states[0], self._states[1]
             reference = self._references.pop(state.stamp_ns, None)
-            if reference is None and len(self._states) <= patience:
+            if reference is None and len(self._states) <= longest_wait:
                 return
             self._states.popleft()
             tick = self._clock.tick(following.stamp_ns)

@@ -1,19 +1,16 @@
 """Simulates a reconstruction again, from a fresh world, as a run of its file does."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from actuated_characters.metrics.error_measures import centre_path, joint_errors
 from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.reconstruction.tree import Node
 from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import Plan
 from msgs_config.arrays import FloatArray
-from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.errors import SimulationError
 from msgs_config.messages import configuration
 from msgs_config.messages.clock import TickClock
@@ -46,10 +43,7 @@ def verified(problem: Problem, file: Path, best: Node) -> Figures:
     positions: list[FloatArray] = []
     motions: list[FloatArray] = []
     for count, tick in enumerate(ticks_in_process(plan, problem.planned_pushes(plan)), start=1):
-        if count == 1:
-            measurement.add_state(tick.state)
-        measurement.add_state(tick.following)
-        measurement.add_tick(tick)
+        measurement.add(tick)
         time = clock.time_after(count)
         positions.append(tick.following.position)
         motions.append(motion.sample(time).configuration.position)
@@ -58,12 +52,14 @@ def verified(problem: Problem, file: Path, best: Node) -> Figures:
         if count == best.tick:
             break
     summary = measurement.summary(wall_time=0.0)
+    path, desired = np.array(positions), np.array(motions)
+    apart = centre_path(plan.character, path) - centre_path(plan.character, desired)
     return Figures(
         ticks=len(positions),
         fell=bool(summary["fell"]),
-        centre_error_mean_m=centre_error(plan, positions, motions),
-        joint_error_mean_rad=joint_error(plan.character.layout, positions, motions),
-        least_root_height_m=float(min(position[2] for position in positions)),
+        centre_error_mean_m=float(np.linalg.norm(apart, axis=1).mean()),
+        joint_error_mean_rad=float(joint_errors(plan.character.layout, path, desired).mean()),
+        least_root_height_m=float(path[:, 2].min()),
         state_hash=measurement.state_hash,
     )
 
@@ -75,27 +71,3 @@ def _check_equal(state: StampedState, node: Node, time: float) -> None:
             f"the search's states are not repeated: at {time:g} s "
             f"{np.abs(found - node.end).max():.3g} away"
         )
-
-
-def centre_error(
-    plan: Plan, positions: Sequence[FloatArray], motions: Sequence[FloatArray]
-) -> float:
-    """Mean distance in m of the centre of mass from the motion's, over states (n,) each."""
-    centre = DynamicsModel(plan.character).centre_of_mass_at
-    pairs = zip(positions, motions, strict=True)
-    return float(np.mean([np.linalg.norm(centre(here) - centre(there)) for here, there in pairs]))
-
-
-def joint_error(
-    layout: JointLayout, positions: Sequence[FloatArray], motions: Sequence[FloatArray]
-) -> float:
-    """Mean angle in rad between the joints' rotations and the motion's, over states (n,) each."""
-    rotates = [
-        joint.type in (JointType.REVOLUTE, JointType.SPHERICAL)
-        for joint in layout.joints
-        for _ in joint.vectors
-    ]
-    difference = layout.difference(
-        layout.configuration(np.array(motions)), layout.configuration(np.array(positions))
-    )
-    return float(layout.norms(difference)[:, rotates].mean())

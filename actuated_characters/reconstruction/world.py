@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuated_characters.metrics.error_measures import is_lost
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.runs.planned_wrenches import push_schedule
 from controller_node.parameters import make_controller
@@ -15,9 +16,6 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import SimulationError
 from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation, Snapshot
-
-_FARTHEST = 0.6  # m, of the centre of mass from the motion's
-_LOWEST = 0.5  # of the height of the motion's centre of mass
 
 
 @dataclass(frozen=True)
@@ -46,11 +44,6 @@ class Grown:
     end: FloatArray  # (2 n,) position and velocity
     cost: float  # of the window's states, mean
     ahead: float  # of going on as planned
-
-
-def is_lost(centre: FloatArray, wanted: FloatArray) -> bool:
-    """Whether a centre of mass (3,) is so far from the motion's that the motion is lost."""
-    return bool(np.linalg.norm(centre - wanted) > _FARTHEST or centre[2] < _LOWEST * wanted[2])
 
 
 class TrialWorld:

@@ -1,4 +1,4 @@
-"""Parameters: what was in force, what was changed meanwhile, and how two runs' differ."""
+"""Parameters of a recording: those in force, changes while it ran, and differences of two runs."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,9 +9,6 @@ from actuated_characters.bags.recording import Recording
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-
-_KINDS = ("p", "d", "i")
-_ABSENT = object()
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,7 @@ class Change:
 
 @dataclass(frozen=True)
 class GainsInForce:
-    """What a controller drives one joint by; None where it said nothing."""
+    """A controller's gains of one joint; None where they were not recorded."""
 
     joint: str
     p: float | None  # N m/rad or N/m
@@ -38,30 +35,28 @@ class GainsInForce:
 def live_changes(recording: Recording) -> list[Change]:
     """The controllers' parameters that were changed in the course of a recording."""
     changes: list[Change] = []
+    start = int(recording.stamps_ns[0])
     for earlier, later in zip(recording.controller, recording.controller[1:], strict=False):
-        after = later.after_stamp_ns
-        if after is None:  # another controller, or the same one restarted
-            after = int(recording.stamps_ns[0])
-        time = (after - int(recording.stamps_ns[0])) / NANOSECONDS_PER_SECOND
+        # None: another controller, or the same one restarted
+        after = start if later.after_stamp_ns is None else later.after_stamp_ns
         for name, values in differences(earlier.parameters, later.parameters).items():
-            changes.append(Change(time, name, *values))
+            changes.append(Change((after - start) / NANOSECONDS_PER_SECOND, name, *values))
     return changes
 
 
 def differences(
     first: Mapping[str, Any], second: Mapping[str, Any]
 ) -> dict[str, tuple[object, object]]:
-    """Both values of each parameter that is not the same; None where one does not know it."""
-    names = sorted(first.keys() | second.keys())
+    """Both values of each parameter that differs; None for one that is not there."""
     return {
         name: (first.get(name), second.get(name))
-        for name in names
+        for name in sorted(first.keys() | second.keys())
         if first.get(name) != second.get(name) or (name in first) != (name in second)
     }
 
 
 def law(parameters: Mapping[str, Any]) -> str | None:
-    """The control law by its name, with what is added to it."""
+    """The control law by its name, with balance where it is enabled; None if there is none."""
     found = parameters.get("law")
     if found is None:
         return None
@@ -69,24 +64,24 @@ def law(parameters: Mapping[str, Any]) -> str | None:
 
 
 def gains(parameters: Mapping[str, Any], names: Sequence[str]) -> list[GainsInForce]:
-    """Gains and limits of the vectors of these names, with the scales counted in."""
+    """Gains and limits of the vectors of these names, times the parameters that scale them."""
     assists = float(bool(parameters.get("root_assistance", True)))
     rows = []
     for name in names:
         scaled: dict[str, float | None] = {}
-        for kind in _KINDS:
+        for kind in ("p", "d", "i"):
             value = number(parameters.get(f"gains.{name}.{kind}"))
             scale = number(parameters.get(f"gain_scale.{kind}", 1.0)) or 0.0
             factor = assists if name in (ROOT, ROOT_TORQUE) else scale
             scaled[kind] = None if value is None else factor * value
-        limit = parameters.get(f"effort_limit.{name}", _ABSENT)
+        limit = parameters.get(f"effort_limit.{name}", "unknown")
         scaled["limit"] = math.inf if limit is None else number(limit)  # JSON has no infinity
         rows.append(GainsInForce(name, **scaled))
     return rows
 
 
 def number(value: object) -> float | None:
-    """A number of a message that anybody may have written; None if it is none."""
+    """A number of a message from any node; None if it is none."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     try:

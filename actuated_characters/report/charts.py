@@ -1,33 +1,36 @@
-"""The pictures of a report: series over simulated time, with what happened marked on them."""
+"""The charts of a report: series over simulation time, with the run's events marked on them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from actuated_characters.metrics.recording_metrics import ContactSeries
+from actuated_characters.metrics.error_measures import AT_LIMIT
 from actuated_characters.report.decimation import decimated, span_maxima, span_means, span_starts
 from actuated_characters.studies.framework.plots import label, make_panels
-from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
+
+TIME = "simulation time (s)"
 
 _WIDTH = 11.0  # inches
 _ROW = 0.24  # inches of a row of a heat map
-_COLUMNS = 3  # small multiples in a row
+_COLUMNS = 3  # panels in a row
+_HEIGHT, _HEIGHT_ALONE = 1.45, 2.2  # inches of a panel among others in a row, and alone in it
+_DPI = 110
 _CELLS = 700  # of a heat map, along the time
 _POINTS = 4000  # of a path
 _BINS = 60  # of a histogram
-_SATURATED = 1.0 - 1e-9
-_TIME = "simulation time (s)"
-_THIN = 0.9
 _REFERENCE: dict[str, Any] = {"color": "black", "linestyle": "--", "linewidth": 1.0, "alpha": 0.8}
 _PUSH = "tab:orange"
-_THROW: dict[str, Any] = {"color": "tab:red", "linestyle": "--"}
 _MODES = {
     "TRACK": "tab:green",
     "REACT": "tab:red",
@@ -39,6 +42,7 @@ _OTHER_MODE = "tab:pink"
 _BAND = 0.04  # of a panel's height, that the modes take up at its top ...
 _BAND_ABOVE = 0.02  # ... and above it, where colours have a meaning
 _MOMENTS: dict[str, dict[str, Any]] = {
+    "ball let go": {"color": "tab:red", "linestyle": "--"},
     "reset": {"color": "black", "linestyle": "-"},
     "parameter changed": {"color": "tab:purple", "linestyle": ":"},
     "pause": {"color": "tab:gray", "linestyle": "-."},
@@ -47,7 +51,7 @@ _MOMENTS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Marks:
-    """What happened, s since the first state."""
+    """The events of a run, s since the first state."""
 
     pushes: Sequence[tuple[float, float]] = ()  # start and duration
     resets: Sequence[float] = ()
@@ -58,7 +62,8 @@ class Marks:
 
     @property
     def _moments(self) -> dict[str, Sequence[float]]:
-        return {"reset": self.resets, "parameter changed": self.changes, "pause": self.pauses}
+        each = (self.throws, self.resets, self.changes, self.pauses)
+        return {name: times for name, times in zip(_MOMENTS, each, strict=True) if times}
 
     def draw(self, axes: Axes, *, filled: bool = True) -> None:
         """Draw them over a panel whose x is time; not filled, where colours have a meaning."""
@@ -71,8 +76,6 @@ class Marks:
         for name, times in self._moments.items():
             for time in times:
                 axes.axvline(time, linewidth=1.0, **_MOMENTS[name])
-        for time in self.throws:
-            axes.axvline(time, linewidth=1.0, **_THROW)
         band = (1.0 - _BAND, 1.0) if filled else (1.0, 1.0 + _BAND_ABOVE)
         for start, duration, name in self.modes:
             color = _MODES.get(name, _OTHER_MODE)
@@ -80,17 +83,13 @@ class Marks:
             axes.axvspan(start, end, *band, color=color, linewidth=0, clip_on=False)
 
     def explained(self, figure: Figure) -> Figure:
-        """The figure, with what the marks are below its panels, if there are any."""
+        """The figure with a legend of the marks, if there are any, below its panels."""
         handles: list[Line2D | Patch] = []
         if self.pushes:
             handles.append(Patch(color=_PUSH, alpha=0.5, label="push"))
-        if self.throws:
-            handles.append(Line2D([], [], label="ball let go", **_THROW))
         for mode in dict.fromkeys(name for _, _, name in self.modes):
             handles.append(Patch(color=_MODES.get(mode, _OTHER_MODE), label=mode))
-        for name, times in self._moments.items():
-            if times:
-                handles.append(Line2D([], [], label=name, **_MOMENTS[name]))
+        handles += [Line2D([], [], label=name, **_MOMENTS[name]) for name in self._moments]
         if handles:
             figure.legend(
                 handles=handles, loc="outside lower center", ncols=len(handles), fontsize="small"
@@ -98,216 +97,167 @@ class Marks:
         return figure
 
 
-def error_chart(
-    times: FloatArray,  # (t,) s
-    errors: FloatArray,  # (t, k) rad or m
-    names: Sequence[str],
-    units: Sequence[str],
-    breaks: IntArray,
-    marks: Marks,
-) -> Figure:
-    """One panel a joint: how far it is from its reference, all joints of a unit to one scale."""
-    columns = min(_COLUMNS, len(names))
-    rows = -(-len(names) // columns)
-    figure, panels = make_panels(rows, columns, (_WIDTH, 1.45 * rows + 0.7), same_x=True)
-    tops = {unit: _top(errors[:, [u == unit for u in units]]) for unit in set(units)}
-    at, drawn = decimated(*broken(times, errors, breaks))
-    for number, (panel, name, unit) in enumerate(zip(panels, names, units, strict=False)):
-        marks.draw(panel)
-        panel.plot(at, drawn[:, number], linewidth=_THIN)
-        panel.set_ylim(0.0, tops[unit])
-        last = number + columns >= len(names)
-        named = number % columns == 0 or len(tops) > 1
-        label(panel, _TIME if last else "", f"error ({unit})" if named else "", name, legend=None)
-        panel.tick_params(labelbottom=last)
-    for panel in panels[len(names) :]:
-        panel.set_axis_off()
-    span_time(panels, times)
-    return marks.explained(figure)
+@dataclass(frozen=True)
+class Panel:
+    """Curves over time in one unit."""
+
+    unit: str  # with the quantity: the label of the y axis
+    lines: Mapping[str, FloatArray]  # (t + 1,) or (t,) by name; NaN where nothing is known
+    title: str = ""
+    from_zero: bool = False  # of an error, which is never negative
+    is_logarithmic: bool = False
+
+    def known(self) -> "Panel":
+        """The panel without the curves of which nothing is known."""
+        known = {name: line for name, line in self.lines.items() if not np.isnan(line).all()}
+        return replace(self, lines=known)
 
 
-def effort_chart(
-    times: FloatArray,  # (t + 1,) s
-    shares: FloatArray,  # (t, k) of the limit
-    names: Sequence[str],
-    marks: Marks,
+@dataclass(frozen=True)
+class Timeline:
+    """Simulation time as the x axis of a recording's panels."""
+
+    times: FloatArray  # (t + 1,) s, of the states
+    breaks: IntArray  # rows of the first states of all episodes but the first
+    marks: Marks
+
+    @property
+    def path_rows(self) -> IntArray:
+        """Rows of the states that are enough to draw a path, each episode's first among them."""
+        count = len(self.times)
+        rows = np.concatenate((span_starts(count, _POINTS), self.breaks, [count - 1]))
+        return np.unique(rows.astype(np.intp))
+
+    def path(self, rows: IntArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Times and values (r, k) of the states of some rows, interrupted where an episode ends."""
+        return _interrupted(self.times[rows], values, np.searchsorted(rows, self.breaks))
+
+    def plot(self, panel: Axes, values: FloatArray, **style: Any) -> None:
+        """Draw a value of each state (t + 1,), or of each tick (t,); nothing if none is known."""
+        if np.isnan(values).all():
+            return
+        breaks = self.breaks[self.breaks < len(values)]
+        column = values[:, np.newaxis]
+        at, drawn = decimated(*_interrupted(self.times[: len(values)], column, breaks))
+        panel.plot(at, drawn[:, 0], **{"linewidth": 0.9, **style})
+
+    def finish(self, figure: Figure, panels: Sequence[Axes]) -> Figure:
+        """The figure, with marks on panels of series, all as wide as the recording is long."""
+        for panel in panels:
+            self.marks.draw(panel)
+            if self.times[-1] > self.times[0]:
+                panel.set_xlim(float(self.times[0]), float(self.times[-1]))
+        return self.marks.explained(figure)
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as the content of a PNG file."""
+    content = BytesIO()
+    figure.savefig(content, format="png", dpi=_DPI)
+    return content.getvalue()
+
+
+def series_chart(
+    timeline: Timeline, panels: Sequence[Panel], *, columns: int = _COLUMNS, title: str = ""
 ) -> Figure:
-    """A heat map: the largest share of its limit that each joint's effort reached, over time."""
-    figure, (panel,) = make_panels(1, 1, (_WIDTH, _ROW * len(names) + 1.6))
+    """A figure of panels row by row; those that begin at zero have one scale for each unit.
+
+    Neither a curve of which nothing is known is drawn, nor a panel without a curve.
+    """
+    panels = [panel.known() for panel in panels if panel.known().lines]
+    columns = min(columns, max(len(panels), 1))
+    rows = max(-(-len(panels) // columns), 1)
+    height = _HEIGHT if columns > 1 else _HEIGHT_ALONE
+    figure, axes = make_panels(rows, columns, (_WIDTH, height * rows + 0.7), same_x=True)
+    tops = {panel.unit: 0.0 for panel in panels}
+    for panel in panels:
+        largest = [np.nanmax(values, initial=0.0) for values in panel.lines.values()]
+        tops[panel.unit] = max(tops[panel.unit], *largest) if panel.from_zero else 0.0
+    for number, (each, panel) in enumerate(zip(axes, panels, strict=False)):
+        for name, values in panel.lines.items():
+            timeline.plot(each, values, label=name, **(_REFERENCE if "reference" in name else {}))
+        if panel.from_zero:
+            each.set_ylim(0.0, 1.05 * tops[panel.unit] or 1.0)
+        if panel.is_logarithmic:
+            each.set_yscale("log")
+        is_last = number + columns >= len(panels)
+        legend = "upper right" if len(panel.lines) > 1 or columns == 1 else None
+        label(each, TIME if is_last else "", panel.unit, panel.title, legend=legend)
+        each.tick_params(labelbottom=is_last)
+    for each in axes[len(panels) :]:
+        each.set_axis_off()
+    figure.suptitle(title)
+    return timeline.finish(figure, axes[: len(panels)])
+
+
+def effort_chart(timeline: Timeline, shares: FloatArray, names: Sequence[str]) -> Figure:
+    """The largest share of its limit (t, k) that each joint's effort reached, as colours."""
     colors = colormaps["Blues"].with_extremes(over="red", bad="white")
-    mesh = panel.pcolormesh(
-        _edges(times, len(shares)),
-        np.arange(len(names) + 1),
-        span_maxima(shares, _CELLS).T,
-        cmap=colors,
-        vmin=0.0,
-        vmax=_SATURATED,
-        rasterized=True,
-    )
-    marks.draw(panel, filled=False)
-    _name_rows(panel, names)
-    panel.set_xlabel(_TIME)
-    bar = figure.colorbar(mesh, ax=panel, extend="max", pad=0.01)
+    figure, mesh = _heat_map(timeline, span_maxima(shares, _CELLS), names, colors, AT_LIMIT)
+    bar = figure.colorbar(mesh, ax=figure.axes[0], extend="max", pad=0.01)
     bar.set_label("effort / limit; red: at it", fontsize="small")
-    return marks.explained(figure)
+    return timeline.marks.explained(figure)
 
 
-def root_chart(
-    times: FloatArray,  # (t,) s
-    position: FloatArray,  # (t, 3) m, world
-    reference: FloatArray,  # (t, 3) m, NaN where there is none
-    errors: FloatArray,  # (t, 2) m and rad
-    breaks: IntArray,
-    marks: Marks,
-) -> Figure:
-    """The root's path from above, its height, and how far it is from the reference."""
-    figure = Figure(figsize=(_WIDTH, 5.4), layout="constrained")
-    grid = figure.add_gridspec(2, 3, height_ratios=(1.3, 1.0))
-    above = figure.add_subplot(grid[0, :])
-    rows = strided(len(times), breaks)
+def contact_chart(timeline: Timeline, touching: BoolArray, names: Sequence[str]) -> Figure:
+    """When (t, k) each of some links touched something."""
+    cells = span_means(touching.astype(float), _CELLS)
+    figure, _ = _heat_map(timeline, cells, names, colormaps["Blues"], 1.5)  # pale: marks are seen
+    return timeline.marks.explained(figure)
+
+
+def _heat_map(
+    timeline: Timeline, cells: FloatArray, names: Sequence[str], colors: Colormap, top: float
+) -> tuple[Figure, QuadMesh]:
+    """A row of cells for each of k names; `cells` (c, k), 0 to `top`, lie evenly over the ticks."""
+    figure, (panel,) = make_panels(1, 1, (_WIDTH, _ROW * len(names) + 1.3))
+    ticks, rows = len(timeline.times) - 1, np.arange(len(names) + 1)
+    edges = np.append(timeline.times[span_starts(ticks, _CELLS)], timeline.times[ticks])
+    style: dict[str, Any] = {"cmap": colors, "vmin": 0.0, "vmax": top, "rasterized": True}
+    mesh = panel.pcolormesh(edges, rows, cells.T, **style)
+    panel.set_yticks(rows[:-1] + 0.5, names, fontsize="small")
+    panel.invert_yaxis()
+    panel.set_xlabel(TIME)
+    timeline.marks.draw(panel, filled=False)
+    return figure, mesh
+
+
+def path_chart(timeline: Timeline, position: FloatArray, reference: FloatArray) -> Figure:
+    """The path of the root (t + 1, 3) from above, and that of its reference, m in the world."""
+    figure, (panel,) = make_panels(1, 1, (_WIDTH, 3.2))
+    rows = timeline.path_rows
     styles: dict[str, dict[str, Any]] = {"simulated": {"linewidth": 1.2}, "reference": _REFERENCE}
-    for (name, style), path in zip(styles.items(), (position, reference), strict=True):
-        _, drawn = broken(times[rows], path[rows], np.searchsorted(rows, breaks))
-        if not np.isnan(drawn).all():
-            above.plot(drawn[:, 0], drawn[:, 1], label=name, **style)
-    above.plot(*position[0, :2], marker="o", markersize=5, color="black", linestyle="none")
-    above.set_aspect("equal", adjustable="datalim")
-    label(above, "x (m)", "y (m)", "from above; the dot is the begin")
-    height = figure.add_subplot(grid[1, 0])
-    at, drawn = decimated(*broken(times, np.stack((position[:, 2], reference[:, 2]), 1), breaks))
-    height.plot(at, drawn[:, 0], linewidth=_THIN, label="simulated")
-    if not np.isnan(drawn[:, 1]).all():
-        height.plot(at, drawn[:, 1], label="reference", **_REFERENCE)
-    label(height, _TIME, "height (m)", legend=None)
-    panels = [height]
-    at, drawn = decimated(*broken(times, errors, breaks))
-    for column, name in enumerate(("position error (m)", "rotation error (rad)")):
-        if np.isnan(drawn[:, column]).all():
-            continue
-        panel = figure.add_subplot(grid[1, column + 1], sharex=height)
-        panel.plot(at, drawn[:, column], linewidth=_THIN)
-        panel.set_ylim(bottom=0.0)
-        label(panel, _TIME, name, legend=None)
-        panels.append(panel)
-    for panel in panels:
-        marks.draw(panel)
-    span_time(panels, times)
-    return marks.explained(figure)
+    for (name, style), values in zip(styles.items(), (position, reference), strict=True):
+        _, path = timeline.path(rows, values[rows])
+        if not np.isnan(path).all():
+            panel.plot(path[:, 0], path[:, 1], label=name, **style)
+    panel.plot(*position[0, :2], marker="o", markersize=5, color="black", linestyle="none")
+    panel.set_aspect("equal", adjustable="datalim")
+    label(panel, "x (m)", "y (m)", "from above; the dot is the begin")
+    return figure
 
 
-def contact_chart(
-    times: FloatArray, contacts: ContactSeries, weight: float, marks: Marks
-) -> Figure:
-    """Which link touched something when, and the vertical force on all of them over the weight."""
-    count = max(len(contacts.links), 1)
-    heights = (_ROW * count + 0.3, 1.6)
-    figure = Figure(figsize=(_WIDTH, sum(heights) + 0.9), layout="constrained")
-    above, below = figure.subplots(2, sharex=True, height_ratios=heights)
-    if contacts.links:
-        above.pcolormesh(
-            _edges(times, len(contacts.touching)),
-            np.arange(len(contacts.links) + 1),
-            span_means(contacts.touching.astype(float), _CELLS).T,
-            cmap="Blues",
-            vmin=0.0,
-            vmax=1.5,  # not too dark for the marks
-            rasterized=True,
-        )
-        _name_rows(above, contacts.links)
-    else:
-        above.set_yticks([])
-        above.text(0.5, 0.5, "nothing touched anything", transform=above.transAxes, ha="center")
-    above.set_title("links that touched something", fontsize="medium")
-    at, drawn = decimated(times[:-1], contacts.vertical_force[:, np.newaxis] / weight)
-    below.plot(at, drawn[:, 0], linewidth=_THIN, label="vertical force / weight")
-    below.axhline(1.0, **_REFERENCE)
-    label(below, _TIME, "vertical force / weight", legend=None)
-    marks.draw(above, filled=False)
-    marks.draw(below)
-    span_time([above], times)
-    return marks.explained(figure)
-
-
-def tick_chart(
-    times: FloatArray,  # (t + 1,) s
-    steps: FloatArray,  # (t,) s of wall time, NaN for a pause
-    period: float,  # s of wall time; 0 where nothing paces the run
-    late: FloatArray | None,  # (t + 1,) s
-    marks: Marks,
-) -> Figure:
-    """Wall time from state to state, as a histogram and over time; how late, if it was paced."""
-    rows = 1 if late is None else 2
-    figure = Figure(figsize=(_WIDTH, 2.6 * rows + 0.4), layout="constrained")
-    grid = figure.add_gridspec(rows, 3)
-    counted, over_time = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1:])
-    shown = 1e3 * np.maximum(steps, 1e-6)
-    known = shown[~np.isnan(shown)]
+def histogram(steps: FloatArray) -> Figure:
+    """How often a tick took how much wall time, of times (t,) in ms; NaN is left out."""
+    figure, (panel,) = make_panels(1, 1, (_WIDTH, 2.4))
+    known = steps[~np.isnan(steps)]
     if len(known) and known.max() > known.min():
-        counted.hist(known, bins=np.geomspace(known.min(), known.max(), _BINS).tolist())
-        counted.set_xscale("log")
+        panel.hist(known, bins=np.geomspace(known.min(), known.max(), _BINS).tolist())
+        panel.set_xscale("log")
     else:
-        counted.hist(known)
-    counted.set_yscale("log")
-    label(counted, "wall time of a tick (ms)", "ticks", "how often, pauses left out", legend=None)
-    at, drawn = decimated(times[1:], shown[:, np.newaxis])
-    over_time.plot(at, drawn[:, 0], linewidth=0.6)
-    over_time.set_yscale("log")
-    label(over_time, "" if rows > 1 else _TIME, "wall time (ms)", "over time", legend=None)
-    panels = [over_time]
-    if period:
-        counted.axvline(1e3 * period, label="period", **_REFERENCE)
-        over_time.axhline(1e3 * period, label="period", **_REFERENCE)
-        for axes in (counted, over_time):
-            axes.legend(loc="upper right", fontsize="small")
-    if late is not None:
-        panel = figure.add_subplot(grid[1, 1:], sharex=over_time)
-        at, drawn = decimated(times, 1e3 * late[:, np.newaxis])
-        panel.plot(at, drawn[:, 0], linewidth=0.6)
-        panel.axhline(1e3 * period, label="a period", **_REFERENCE)
-        label(panel, _TIME, "lateness (ms)", "behind the schedule", legend="upper right")
-        panels.append(panel)
-    for panel in panels:
-        marks.draw(panel)
-    span_time(panels, times)
-    return marks.explained(figure)
+        panel.hist(known)
+    panel.set_yscale("log")
+    label(panel, "wall time of a tick (ms)", "ticks", "how often, pauses left out", legend=None)
+    return figure
 
 
-def broken(
+def _interrupted(
     times: FloatArray, values: FloatArray, breaks: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The series with NaN before each row of `breaks`, so that no line is drawn over a reset."""
+    """A series (r, k) with NaN before each row of `breaks`, so that no line crosses a reset."""
     if not len(breaks):
         return times, values
     return (
         np.insert(times, breaks, times[breaks]),
         np.insert(values, breaks, np.nan, axis=0),
     )
-
-
-def strided(length: int, breaks: IntArray) -> IntArray:
-    """Rows of a path that are enough to draw it; those at which an episode begins among them."""
-    rows = np.concatenate((span_starts(length, _POINTS), breaks, [length - 1]))
-    return np.unique(rows.astype(np.intp))
-
-
-def _edges(times: FloatArray, length: int) -> FloatArray:
-    """Times at which the cells of a heat map of so many ticks begin, and that of the end."""
-    return np.append(times[span_starts(length, _CELLS)], times[length])
-
-
-def _name_rows(axes: Axes, names: Sequence[str]) -> None:
-    axes.set_yticks(np.arange(len(names)) + 0.5, names, fontsize="small")
-    axes.invert_yaxis()
-
-
-def span_time(panels: Sequence[Axes], times: FloatArray) -> None:
-    """Let panels have the times (t,) of a recording as their width."""
-    if times[-1] > times[0]:
-        for panel in panels:
-            panel.set_xlim(float(times[0]), float(times[-1]))
-
-
-def _top(values: FloatArray) -> float:
-    """Where an axis of values from 0 on is to end."""
-    known = values[np.isfinite(values)]
-    return 1.05 * float(known.max(initial=0.0)) or 1.0

@@ -1,4 +1,4 @@
-"""What is in a bag, whoever has written it: files, topics, and when their messages came."""
+"""The contents of a bag, of this project or any other: files, topics, and when messages came."""
 
 import struct
 from array import array
@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
 from std_msgs.msg import String
 
 from actuated_characters.bags.metadata import METADATA, load_metadata
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.recording import find_bag
-from actuated_characters.bags.storage import SUFFIXES
-from msgs_config.arrays import IntArray
+from actuated_characters.bags.storage import MCAP, SUFFIXES
 from msgs_config.errors import MessageError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
@@ -24,12 +24,7 @@ from msgs_config.messages.joint_state import decode
 _STATES = topics.JOINT_STATES.name
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 _STATE_TYPE, _TEXT_TYPE = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
-
 _HEADER_BYTES = 12  # of a message up to the end of its stamp
-_MCAP_MAGIC = b"\x89MCAP0\r\n"
-_MCAP_RECORD = struct.Struct("<BQ")  # opcode and length
-_MCAP_CHUNK, _MCAP_DATA_END = 0x06, 0x0F
-_CHUNK_HEAD = 28  # bytes of a chunk before the name of its compression
 
 
 @dataclass
@@ -61,7 +56,7 @@ class TopicContents:
 
 @dataclass
 class StateMessages:
-    """Stamps and log times of a topic of states, and what its simulator says of itself."""
+    """Stamps and log times of a topic of states, and its simulator's configuration."""
 
     stamps_ns: "array[int]" = field(default_factory=lambda: array("q"))
     log_times_ns: "array[int]" = field(default_factory=lambda: array("q"))
@@ -69,28 +64,18 @@ class StateMessages:
     has_topic: bool = False  # whether there is a topic of states
 
     def add(self, message: RecordedMessage) -> None:
-        """Take a state's stamp."""
+        """Add a state's stamp, which is in the header, at the message's beginning."""
         raw = message.raw
         if len(raw) >= _HEADER_BYTES:
-            order = "<" if raw[1] & 1 else ">"  # the header comes first, and its stamp
+            order = "<" if raw[1] & 1 else ">"
             seconds, nanoseconds = struct.unpack_from(f"{order}iI", raw, 4)
             self.stamps_ns.append(seconds * NANOSECONDS_PER_SECOND + nanoseconds)
             self.log_times_ns.append(message.log_time_ns)
 
     def configure(self, message: RecordedMessage) -> None:
-        """Take what a simulator says of itself, if it can be read."""
+        """Keep a simulator's configuration, if it can be read."""
         with suppress(MessageError):
             self.configuration = self.configuration or decode(message.raw, String).data
-
-    @property
-    def stamps(self) -> IntArray:
-        """The stamps as an array, ns."""
-        return np.array(self.stamps_ns, dtype=np.intp)
-
-    @property
-    def log_times(self) -> IntArray:
-        """The log times as an array, ns."""
-        return np.array(self.log_times_ns, dtype=np.intp)
 
 
 @dataclass(frozen=True)
@@ -119,7 +104,7 @@ class Contents:
 
 
 def read_contents(path: Path) -> Contents:
-    """Look through the bag in a run's directory, or a bag or a file of one, of anybody.
+    """Read the contents of a run's bag, or of any bag or one file of a bag.
 
     Raises:
         RecordingError: there is no complete bag, or it is damaged.
@@ -127,27 +112,26 @@ def read_contents(path: Path) -> Contents:
     bag = find_bag(path)
     found: dict[str, TopicContents] = {}
     states: dict[str, StateMessages] = {}
-    looks: dict[str, Callable[[RecordedMessage], None] | None] = {}  # by topic
-    for message in read_messages(bag):  # the first thing that finds a bag to be none
+    readers: dict[str, Callable[[RecordedMessage], None] | None] = {}  # by topic
+    for message in read_messages(bag):  # which raises where the bag is none
         name = message.topic
         if name not in found:
             found[name] = TopicContents(name, message.type_name)
-            looks[name] = _look(name, message.type_name, states)
+            readers[name] = _reader(name, message.type_name, states)
         found[name].add(message.log_time_ns)
-        look = looks[name]
-        if look is not None:
-            look(message)
+        reader = readers[name]
+        if reader is not None:
+            reader(message)
     metadata = _metadata(bag)
-    for name, type_name in _announced(metadata).items():
+    for name, type_name in _listed_topics(metadata).items():
         found.setdefault(name, TopicContents(name, type_name))
     inside = sorted(bag.iterdir()) if bag.is_dir() else [bag]
-    files = {file.name: file.stat().st_size for file in inside if file.is_file()}
     version = metadata.get("version")
     return Contents(
         bag=bag,
-        files=files,
+        files={file.name: file.stat().st_size for file in inside if file.is_file()},
         storage=str(metadata.get("storage_identifier", "unknown")),
-        compression=_compression(bag, metadata),
+        compression=_compression(inside, metadata),
         version=version if isinstance(version, int) else None,
         ros_distro=str(metadata.get("ros_distro") or "unknown"),
         topics=tuple(found[name] for name in sorted(found)),
@@ -155,25 +139,19 @@ def read_contents(path: Path) -> Contents:
     )
 
 
-def _look(
+def _reader(
     topic: str, type_name: str, states: dict[str, StateMessages]
 ) -> Callable[[RecordedMessage], None] | None:
-    """What is to be done with the messages of a topic, beside counting them."""
-    namespace = _before(topic, _STATES) if type_name == _STATE_TYPE else None
-    if namespace is not None:
-        of = states.setdefault(namespace, StateMessages())
+    """The method that reads a topic's messages; None for a topic that is only counted."""
+    whole = f"/{topic.lstrip('/')}"
+    if type_name == _STATE_TYPE and whole.endswith(f"/{_STATES}"):
+        of = states.setdefault(whole.removesuffix(_STATES).strip("/"), StateMessages())
         of.has_topic = True
         return of.add
-    namespace = _before(topic, _CONFIGURATION) if type_name == _TEXT_TYPE else None
-    if namespace is not None:
+    if type_name == _TEXT_TYPE and whole.endswith(f"/{_CONFIGURATION}"):
+        namespace = whole.removesuffix(_CONFIGURATION).strip("/")
         return states.setdefault(namespace, StateMessages()).configure
     return None
-
-
-def _before(topic: str, name: str) -> str | None:
-    """The namespace of a topic, without slashes around it, if it is of this name in one."""
-    whole = f"/{topic.lstrip('/')}"
-    return whole.removesuffix(f"/{name}").strip("/") if whole.endswith(f"/{name}") else None
 
 
 def _metadata(bag: Path) -> dict[str, Any]:
@@ -187,7 +165,7 @@ def _metadata(bag: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def _announced(metadata: dict[str, Any]) -> dict[str, str]:
+def _listed_topics(metadata: dict[str, Any]) -> dict[str, str]:
     """Type by name of the topics that the metadata lists; some may have no messages."""
     try:
         listed = [entry["topic_metadata"] for entry in metadata["topics_with_message_count"]]
@@ -196,32 +174,17 @@ def _announced(metadata: dict[str, Any]) -> dict[str, str]:
         return {}
 
 
-def _compression(bag: Path, metadata: dict[str, Any]) -> str:
-    """What the bag is compressed by: whole files, single messages, or MCAP's chunks."""
+def _compression(files: list[Path], metadata: dict[str, Any]) -> str:
+    """The compression of a bag's files: of whole files, single messages, or MCAP's chunks."""
     form, mode = metadata.get("compression_format"), metadata.get("compression_mode")
     if form:
         return f"{form} ({str(mode).lower()})"
-    files = [bag] if bag.is_file() else sorted(bag.glob("*.mcap"))
-    kinds = set(map(_chunk_compression, files))
-    named = [f"{kind} (chunks)" for kind in sorted(kinds) if kind]
-    return ", ".join(named) or "none"
+    kinds = {_chunk_compression(file) for file in files if file.suffix == SUFFIXES[MCAP]}
+    return ", ".join(f"{kind} (chunks)" for kind in sorted(kinds) if kind) or "none"
 
 
 def _chunk_compression(file: Path) -> str:
-    """Name of the compression of an MCAP file's first chunk; empty for none.
-
-    Source: the MCAP format specification, sections "Records" and "Chunk".
-    """
+    """Name of the compression of an MCAP file's first chunk; empty for none."""
     with file.open("rb") as stream:
-        if stream.read(len(_MCAP_MAGIC)) != _MCAP_MAGIC:
-            return ""
-        while len(head := stream.read(_MCAP_RECORD.size)) == _MCAP_RECORD.size:
-            opcode, length = _MCAP_RECORD.unpack(head)
-            if opcode == _MCAP_CHUNK:
-                begin = stream.read(_CHUNK_HEAD + 4 + 32)
-                (size,) = struct.unpack_from("<I", begin, _CHUNK_HEAD)
-                return begin[_CHUNK_HEAD + 4 :][:size].decode("ascii", "replace")
-            if opcode == _MCAP_DATA_END:
-                return ""
-            stream.seek(length, 1)
-    return ""
+        records = StreamReader(stream, emit_chunks=True).records
+        return next((each.compression for each in records if isinstance(each, Chunk)), "")

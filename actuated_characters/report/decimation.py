@@ -1,4 +1,4 @@
-"""Series of any length as few enough points to draw; what sticks out of them stays."""
+"""Series of any length as few enough points to draw, their extremes among them."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What is to be known of the characters of a bag: as far as the bag says it."""
+"""The facts of a bag and of the characters in it, as far as they are recorded."""
 
 import json
 import math
@@ -9,14 +9,8 @@ from typing import Any
 import numpy as np
 
 from actuated_characters.bags.recording import Recording, read_recordings
-from actuated_characters.metrics.recording_metrics import (
-    PushSpan,
-    effort_sizes,
-    limit_shares,
-    push_spans,
-    saturated_shares,
-    vectors_of,
-)
+from actuated_characters.metrics.error_measures import effort_sizes, limit_shares
+from actuated_characters.metrics.recording_metrics import PushSpan, push_spans, saturated_shares
 from actuated_characters.report.changes import (
     Change,
     GainsInForce,
@@ -29,6 +23,7 @@ from actuated_characters.report.contents import Contents, StateMessages, read_co
 from actuated_characters.report.reactions import ModeSpan, ThrowMark, mode_spans, throw_marks
 from actuated_characters.report.timing import lateness, pauses, state_times, wall_steps
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.character.layout import JointType
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.versions import read_versions
@@ -39,7 +34,7 @@ _HIGHEST_RATE = 100_000  # Hz
 
 @dataclass(frozen=True)
 class Span:
-    """Something that has a begin and a length, in s; the begin counts from the first state."""
+    """A time span in s; its start counts from the first state."""
 
     start: float
     duration: float
@@ -47,7 +42,7 @@ class Span:
 
 @dataclass(frozen=True)
 class StreamFacts:
-    """What the stamps and the wall times of a stream of states say, whether it is whole or not."""
+    """The facts in stamps and wall times of a stream of states, also of an incomplete one."""
 
     name: str  # of the character: its topics' namespace
     character: str | None
@@ -69,7 +64,7 @@ class StreamFacts:
 
 @dataclass(frozen=True)
 class RunFacts:
-    """What more a whole recording of a character says."""
+    """The facts of a complete recording of one character."""
 
     name: str
     reference: bool  # whether there is any
@@ -88,16 +83,16 @@ class RunFacts:
 
 @dataclass(frozen=True)
 class BagFacts:
-    """All that `info` says."""
+    """The facts that `info` prints."""
 
     contents: Contents
     streams: tuple[StreamFacts, ...]
     runs: tuple[RunFacts, ...]
-    lacks: str | None  # why there is no more
+    lacks: str | None  # why there are no facts of runs
 
 
 def look_at(path: Path) -> BagFacts:
-    """What there is to be known of the bag in a run's directory, or of a bag itself, of anybody.
+    """The facts of a run's bag, or of any bag.
 
     Raises:
         RecordingError: there is no complete bag, or it is damaged.
@@ -112,46 +107,46 @@ def look_at(path: Path) -> BagFacts:
 
 
 def _stream(name: str, messages: StateMessages) -> StreamFacts:
-    said = _configuration(messages.configuration)
-    parameters = said.get("parameters")
+    told = _mapping(messages.configuration)
+    parameters = told.get("parameters")
     parameters = parameters if isinstance(parameters, dict) else {}
     rate = parameters.get("rate")
-    known: dict[str, Any] = {
-        "name": name,
-        "character": _text(said.get("character")),
-        "degrees_of_freedom": _size(said),
-        "mass": number(said.get("mass")),
-        "rate_hz": rate if isinstance(rate, int) and 0 < rate <= _HIGHEST_RATE else None,
-        "mode": _text(parameters.get("mode")),
-        "versions": read_versions(said.get("versions")),
-        "states": len(messages.stamps_ns),
-    }
-    if known["rate_hz"] is None or not known["states"]:
-        return StreamFacts(**known)
-    return StreamFacts(**known, **_timing(messages, int(known["rate_hz"]), parameters))
+    rate = rate if isinstance(rate, int) and 0 < rate <= _HIGHEST_RATE else None
+    timing = _timing(messages, rate, parameters) if rate and messages.stamps_ns else {}
+    return StreamFacts(
+        name=name,
+        character=_text(told.get("character")),
+        degrees_of_freedom=_degrees_of_freedom(told),
+        mass=number(told.get("mass")),
+        rate_hz=rate,
+        mode=_text(parameters.get("mode")),
+        versions=read_versions(told.get("versions")),
+        states=len(messages.stamps_ns),
+        **timing,
+    )
 
 
 def _timing(messages: StateMessages, rate: int, parameters: dict[str, Any]) -> dict[str, Any]:
-    times = state_times(messages.stamps, messages.log_times, rate)
+    stamps, log_times = (np.array(each) for each in (messages.stamps_ns, messages.log_times_ns))
+    times = state_times(stamps, log_times, rate)
     ticks, published = times.ticks, times.published_ns
     gaps, steps = pauses(published), wall_steps(published)
     period = pace_period(parameters)
+    since = (ticks - ticks[0]) / rate
     return {
         "repeated": times.repeated,
         "ticks": int(ticks[-1] - ticks[0]),
-        "sim_time": float(ticks[-1] - ticks[0]) / rate,
+        "sim_time": float(since[-1]),
         "missing": times.missing,
         "missing_count": times.missing_count,
         "tick_us": _percentiles_us(np.delete(steps, gaps)),
-        "pauses": [
-            Span(float(ticks[row] - ticks[0]) / rate, float(steps[row])) for row in gaps.tolist()
-        ],
+        "pauses": [Span(float(since[row]), float(steps[row])) for row in gaps],
         "late": late_facts(published, period) if period else {},
     }
 
 
 def pace_period(parameters: dict[str, Any]) -> float:
-    """Wall time from tick to tick, s, as a simulator's parameters say; 0 where nothing paces it."""
+    """Wall time from tick to tick, s, by a simulator's parameters; 0 if nothing paces it."""
     rate = number(parameters.get("rate")) or 0.0
     factor = number(parameters.get("real_time_factor")) or 0.0
     if parameters.get("mode") == "realtime":
@@ -160,10 +155,9 @@ def pace_period(parameters: dict[str, Any]) -> float:
 
 
 def late_facts(published_ns: IntArray, period: float) -> dict[str, float]:
-    """How many ticks began more than a period in s late, and percentiles of the lateness."""
+    """Number of ticks that began more than a period in s late, and percentiles of lateness."""
     late = lateness(published_ns, period)[1:]
-    missed = {"ticks": int((late > period).sum())}
-    return missed | _percentiles_us(late)
+    return {"ticks": int((late > period).sum())} | _percentiles_us(late)
 
 
 def _percentiles_us(seconds: FloatArray) -> dict[str, float]:
@@ -174,17 +168,7 @@ def _percentiles_us(seconds: FloatArray) -> dict[str, float]:
     return named | {"max_us": 1e6 * float(seconds.max())}
 
 
-def recorded_versions(path: Path) -> dict[str, str]:
-    """The versions that the simulator of a bag has said it runs with.
-
-    Raises:
-        RecordingError: there is no complete bag, or it is damaged.
-    """
-    found = (_stream(name, states) for name, states in read_contents(path).states.items())
-    return next((stream.versions for stream in found if stream.versions), {})
-
-
-def _configuration(text: str) -> dict[str, Any]:
+def _mapping(text: str) -> dict[str, Any]:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError):
@@ -196,19 +180,19 @@ def _text(value: object) -> str | None:
     return value if isinstance(value, str) else None
 
 
-def _size(said: dict[str, Any]) -> int | None:
-    """How many degrees of freedom the joints of a configuration have."""
-    entries = {"revolute": 1, "prismatic": 1, "spherical": 3, "floating": 6, "fixed": 0}
+def _degrees_of_freedom(told: dict[str, Any]) -> int | None:
+    """Number of degrees of freedom of the joints in a configuration."""
     try:
-        return sum(entries[joint["type"]] for joint in said["joints"])
-    except (KeyError, TypeError):
+        return sum(len(JointType(joint["type"]).suffixes) for joint in told["joints"])
+    except (KeyError, TypeError, ValueError):
         return None
 
 
 def run_facts(recording: Recording) -> RunFacts:
-    """What a whole recording says."""
-    vectors = vectors_of(recording.character)
-    shares = saturated_shares(limit_shares(effort_sizes(recording), vectors.limits))
+    """The facts of a complete recording."""
+    names, limits = recording.character.vector_names, recording.character.effort_limits()
+    sizes = effort_sizes(recording.layout, recording.effort)
+    shares = saturated_shares(limit_shares(sizes, limits))
     first = recording.controller[0].parameters if recording.controller else {}
     return RunFacts(
         name=recording.name,
@@ -217,7 +201,7 @@ def run_facts(recording: Recording) -> RunFacts:
         episodes=episodes(recording),
         resets=len(recording.episode_rows) - 1,
         law=law(first),
-        gains=gains(first, vectors.names) if recording.controller else [],
+        gains=gains(first, names) if recording.controller else [],
         changes=live_changes(recording),
         pushes=push_spans(recording),
         pushes_recorded=bool(recording.applied_wrench),
@@ -225,7 +209,7 @@ def run_facts(recording: Recording) -> RunFacts:
         modes=mode_spans(recording),
         saturated_shares={
             name: float(share)
-            for name, share, limit in zip(vectors.names, shares, vectors.limits, strict=True)
+            for name, share, limit in zip(names, shares, limits, strict=True)
             if math.isfinite(limit) and not math.isnan(share)
         },
     )
@@ -242,7 +226,7 @@ def episodes(recording: Recording) -> list[Span]:
 
 
 def as_json(facts: BagFacts) -> str:
-    """The facts as JSON; what is not known, or infinite, is null."""
+    """The facts as JSON; an unknown or infinite number is null."""
     contents = facts.contents
     sim_time = longest_sim_time(facts)
     content = {

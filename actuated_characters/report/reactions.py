@@ -1,4 +1,4 @@
-"""What was thrown in a recording, and what its character did about it."""
+"""A recording's throws, and the modes of a behaviour that reacts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND as _SECOND
 
 TRACK = "TRACK"
-"""The mode of who follows its reference."""
+"""The mode in which the reference is tracked."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class ModeSpan:
     mode: str
     start: float  # s since the first state
     duration: float  # s
-    facts: Mapping[str, Any]  # what led to it
+    facts: Mapping[str, Any]  # that led to it
 
 
 @dataclass(frozen=True)
@@ -35,21 +35,19 @@ class ThrowMark:
 
 
 def mode_spans(recording: Recording) -> list[ModeSpan]:
-    """The modes one after another, each until the next or the end; none if nobody said any."""
+    """The modes one after another, each until the next or the end; none without a behaviour."""
     changes = recording.modes
     first_ns, last_ns = (int(recording.stamps_ns[row]) for row in (0, -1))
-    ends = [change.stamp_ns for change in changes[1:]] + [last_ns] * bool(changes)
-    spans = []
-    for change, end in zip(changes, ends, strict=True):
-        start_ns, end_ns = (min(max(at, first_ns), last_ns) for at in (change.stamp_ns, end))
-        start, duration = start_ns - first_ns, end_ns - start_ns
-        second = NANOSECONDS_PER_SECOND
-        spans.append(ModeSpan(change.mode, start / second, duration / second, change.facts))
-    return spans
+    stamps = np.clip([*(change.stamp_ns for change in changes), last_ns], first_ns, last_ns)
+    starts, lengths = stamps - first_ns, np.diff(stamps)
+    return [
+        ModeSpan(change.mode, int(start) / _SECOND, int(length) / _SECOND, change.facts)
+        for change, start, length in zip(changes, starts, lengths, strict=False)
+    ]
 
 
 def throw_marks(recording: Recording) -> list[ThrowMark]:
-    """The balls in the order in which they were thrown."""
+    """The balls in the order in which they were thrown; each episode's first is `ball_1`."""
     begins, marks, count = set(recording.episode_rows.tolist()), [], 0
     for tick, throws in enumerate(recording.throws):
         count = 0 if tick in begins else count
@@ -62,7 +60,7 @@ def throw_marks(recording: Recording) -> list[ThrowMark]:
 
 
 def thrown_line(throw: ThrowMark) -> str:
-    """What it is, in words."""
+    """A throw in words."""
     return (
         f"{throw.name} thrown: {throw.mass:.4g} kg, radius {throw.radius:.3g} m, "
         f"{throw.speed:.4g} m/s"
@@ -70,10 +68,7 @@ def thrown_line(throw: ThrowMark) -> str:
 
 
 def mode_line(span: ModeSpan) -> str:
-    """What it is, in words."""
-    facts = ", ".join(f"{name} {_shown(value)}" for name, value in span.facts.items())
+    """A mode in words."""
+    shown = {k: f"{v:.4g}" if isinstance(v, float) else v for k, v in span.facts.items()}
+    facts = ", ".join(f"{name} {value}" for name, value in shown.items())
     return f"{span.mode} for {span.duration:.4g} s" + (f": {facts}" if facts else "")
-
-
-def _shown(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,6 +1,7 @@
-"""The sections of a report on one character: what is drawn, what is listed, or why it is not."""
+"""The sections of a report on one character: the result, then charts and tables of each topic."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -8,33 +9,24 @@ import numpy as np
 from matplotlib.image import imsave
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics.error_measures import (
+    effort_sizes,
+    fall_time,
+    limit_shares,
+    vector_kinds,
+)
 from actuated_characters.metrics.recording_metrics import (
     contact_series,
-    distances,
-    effort_sizes,
-    limit_shares,
     measure_recording,
-    push_spans,
-    reset_rows,
-    saturated_shares,
     tracking_errors,
-    vectors_of,
-    weight,
 )
 from actuated_characters.render.stills import strip
 from actuated_characters.report import charts
-from actuated_characters.report.changes import gains, law, live_changes
-from actuated_characters.report.charts import Marks
-from actuated_characters.report.facts import episodes, late_facts, pace_period
-from actuated_characters.report.page import Illustration, Section, Table
+from actuated_characters.report.facts import late_facts, pace_period, run_facts
+from actuated_characters.report.page import NOT_KNOWN, Illustration, Section, Table
 from actuated_characters.report.planning import foresight, plan_chart
-from actuated_characters.report.reactions import (
-    TRACK,
-    mode_line,
-    mode_spans,
-    throw_marks,
-    thrown_line,
-)
+from actuated_characters.report.reactions import TRACK, mode_line, thrown_line
+from actuated_characters.report.run_figures import NOMINAL, describe_figures
 from actuated_characters.report.timing import lateness, pauses, wall_steps
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
@@ -42,257 +34,294 @@ from msgs_config.errors import ActuatedCharactersError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NAMES = ("strip", "errors", "efforts", "root", "contacts", "plans", "ticks")
-"""Of the pictures, in their order."""
+NAMES = ("strip", "errors", "root", "efforts", "contacts", "ground", "plans", "histogram", "ticks")
+"""Names of the pictures."""
 
 STILLS = 8
-"""Pictures of the character, where nothing else is said."""
+"""Default number of poses in the picture of the character."""
 
-_DPI = 110
 _MOST_LISTED = 200
 _PERCENTILE = 95
+_TILES = (
+    ("mean joint error", "joint_error_mean_rad", "rad"),
+    ("mean slider error", "slider_error_mean_m", "m"),
+    ("mean root error", "root_error_mean_m", "m"),
+    ("largest root error", "root_error_max_m", "m"),
+)
+_STATISTICS = ("mean", f"{_PERCENTILE} %", "largest")
 
 
 class CharacterReport:
     """Makes the sections of one recording."""
 
     def __init__(self, recording: Recording, prefix: str = "", stills: int = STILLS) -> None:
-        """`prefix` comes before the names of the pictures; `stills` is how many show poses."""
-        self._recording = recording
-        self._prefix = prefix
-        self._count = stills
-        self._vectors = vectors_of(recording.character)
-        self._pushes = push_spans(recording)
-        self._throws = throw_marks(recording)
-        spans = mode_spans(recording)
-        self._modes = spans if any(span.mode != TRACK for span in spans) else []
-        self._changes = live_changes(recording)
-        self._breaks = reset_rows(recording)
+        """`prefix` comes before the names of the pictures; `stills` is the number of poses."""
+        self._recording, self._prefix, self._stills = recording, prefix, stills
+        self._facts = facts = run_facts(recording)
+        self._kinds = vector_kinds(recording.layout)
+        self._names = recording.character.vector_names
+        self._limits = recording.character.effort_limits()
+        self._errors = tracking_errors(recording)
+        self._figures, _ = measure_recording(recording)
+        reacts = any(span.mode != TRACK for span in facts.modes)
+        self._modes = facts.modes if reacts else []
         self._pauses = pauses(recording.published_ns)
-        self._marks = Marks(
-            pushes=[(push.start, push.duration) for push in self._pushes],
-            resets=recording.times[self._breaks].tolist(),
-            changes=sorted({change.time for change in self._changes}),
+        breaks = recording.episode_rows[1:]
+        marks = charts.Marks(
+            pushes=[(push.start, push.duration) for push in facts.pushes],
+            resets=recording.times[breaks].tolist(),
+            changes=sorted({change.time for change in facts.changes}),
             pauses=recording.times[self._pauses].tolist(),
-            throws=[throw.start for throw in self._throws],
+            throws=[throw.start for throw in facts.throws],
             modes=[(span.start, span.duration, span.mode) for span in self._modes],
         )
+        self._timeline = charts.Timeline(recording.times, breaks, marks)
 
-    def sections(self) -> list[Section]:
+    @property
+    def title(self) -> str:
+        """The character, and the motion that was tracked, as far as it was recorded."""
+        first = self._recording.controller[0].parameters if self._recording.controller else {}
+        kind = first.get("reference")
+        motion = first.get(str(kind), kind)
+        name = self._recording.character.name
+        return f"{name}: {motion}" if isinstance(motion, str) else name
+
+    @property
+    def makers(self) -> list[Callable[[], Section]]:
+        """Functions that make the sections, in their order; each takes about a second."""
+        plans = [self._plans] if self._recording.plans else []
+        root = [self._root] if self._recording.layout.has_floating_base else []
+        first = [self._result, self._tracking, *root, self._efforts, self._contacts]
+        return [*first, *plans, self._events, self._ticks, self._run]
+
+    def sections(self) -> Iterator[Section]:
         """All sections, in their order."""
-        return [
-            self._overview(),
-            self._stills(),
-            self._errors(),
-            self._efforts(),
-            self._root(),
-            self._contacts(),
-            *([self._plans()] if self._recording.plans else []),
-            self._ticks(),
-            self._events(),
-        ]
+        return (make() for make in self.makers)
 
-    def _overview(self) -> Section:
+    def _result(self) -> Section:
+        pictures, notes = self._strip()
+        return Section("", pictures, notes=notes, verdict=self._verdict(), tiles=self._tiles())
+
+    def _verdict(self) -> str:
+        """A sentence on how the run ended."""
+        recording, law = self._recording, self._facts.law
+        length = f"{recording.times[-1]:.4g} s"
+        if not self._facts.reference:
+            verdict = f"A run of {length} without a reference"
+        elif self._figures["fell"]:
+            height, desired = recording.position[:, 2], recording.reference_position[:, 2]
+            verdict = f"It fell at {fall_time(recording.times, height, desired):.3g} s of {length}"
+        elif self._figures["fell"] is not None:
+            verdict = f"It tracked its reference for {length} without a fall"
+        else:
+            verdict = f"It tracked its reference for {length}"
+        return verdict + (f" (control law {law})." if law else ".")
+
+    def _tiles(self) -> list[tuple[str, str]]:
+        """The figures that support the verdict, as far as they could be measured."""
+        figures = {name: value for name, value in self._figures.items() if isinstance(value, float)}
+        tiles = [
+            (title, f"{figures[key]:.3g} {unit}") for title, key, unit in _TILES if key in figures
+        ]
+        force, weight = figures.get("assist_force_mean_n"), figures["body_weight_n"]
+        if force is not None and weight > 0.0:
+            tiles.append(("mean root force / weight", f"{force / weight:.3g}"))
+        if "saturated_fraction" in figures:
+            tiles.append(("at effort limits", f"{100.0 * figures['saturated_fraction']:.3g} %"))
+        return tiles
+
+    def _strip(self) -> tuple[list[Illustration], list[str]]:
+        """The picture of the character, or a note why there is none."""
         recording = self._recording
-        character, parameters = recording.character, recording.parameters
-        first = recording.controller[0].parameters if recording.controller else {}
-        facts = [
-            ("character", character.name),
-            ("degrees of freedom", str(recording.layout.size)),
-            ("mass", f"{character.mass:.4g} kg"),
-            ("rate", f"{parameters.get('rate')} Hz"),
-            ("mode", str(parameters.get("mode", "unknown"))),
-            ("law", law(first) or "not recorded"),
-        ]
-        measured, _ = measure_recording(recording)
-        rows = [(name, _shown(value)) for name, value in measured.items()]
-        tables = [Table(facts), Table(rows, caption="figures")]
-        if recording.controller:
-            tables.append(self._gains())
-        return Section("overview", tables=tables)
-
-    def _gains(self) -> Table:
-        rows = [
-            (row.joint, *map(_shown, (row.p, row.d, row.i, row.limit)))
-            for row in gains(self._recording.controller[0].parameters, self._vectors.names)
-        ]
-        columns = ("joint", "p", "d", "i", "limit")
-        return Table(rows, columns, "the controller's gains and limits at the start")
-
-    def _stills(self) -> Section:
-        recording = self._recording
-        if not self._count:
-            return Section("stills", notes=["None were asked for."])
+        if not self._stills:
+            return [], []
         has_ghost = bool(np.isfinite(recording.reference_position).all(axis=1).any())
         try:
-            picture = strip(recording, self._count, ghost=has_ghost and bool(recording.layout.size))
+            poses = strip(recording, self._stills, ghost=has_ghost and bool(recording.layout.size))
         except ActuatedCharactersError as error:
-            return Section("stills", notes=[f"It cannot be drawn: {error}"])
+            return [], [f"The character cannot be drawn: {error}"]
         content = BytesIO()
-        imsave(content, picture, format="png")
+        imsave(content, poses, format="png")
         ghost = "; the reference is the ghost" if has_ghost else ""
         text = f"{recording.character.name}, evenly from the first state to the last{ghost}"
-        still = Illustration(self._prefix + "strip", content.getvalue(), text)
-        return Section("stills", [still])
+        return [Illustration(self._prefix + "strip", content.getvalue(), text)], []
 
-    def _errors(self) -> Section:
-        title, recording, vectors = "tracking error", self._recording, self._vectors
-        if np.isnan(recording.reference_position).all():
+    def _tracking(self) -> Section:
+        title = "tracking error"
+        if not self._facts.reference:
             return Section(title, notes=["The recording has no reference."])
-        errors = tracking_errors(recording)
-        rows = []
-        for name, unit, values in zip(vectors.names, vectors.units, errors.T, strict=True):
-            rows.append((name, unit, *_statistics(values)))
-        columns = ("joint", "unit", "mean", f"{_PERCENTILE} %", "largest")
-        table = Table(rows, columns, "distance from the reference")
-        joints = np.flatnonzero(vectors.actuated)
-        if not len(joints):
-            return Section(title, tables=[table], notes=["There are no joints to draw."])
-        figure = charts.error_chart(
-            recording.times,
-            errors[:, joints],
-            [vectors.names[joint] for joint in joints],
-            [vectors.units[joint] for joint in joints],
-            self._breaks,
-            self._marks,
-        )
-        picture = self._drawn(figure, "errors", "distance of each joint from its reference")
-        return Section(title, [picture], [table])
+        columns = list(zip(self._names, self._kinds.units, self._errors.T, strict=True))
+        rows = [(name, unit, *_statistics(values)) for name, unit, values in columns]
+        table = Table(rows, ("joint", "unit", *_STATISTICS), "distance from the reference")
+        panels = []
+        for column, (name, unit, values) in enumerate(columns):
+            panels.append(charts.Panel(f"error ({unit})", {name: values}, name, from_zero=True))
+            if unit == "m":
+                panels.append(self._position_panel(column))
+        text = "distance of root and joints from the reference, positions of sliders, root height"
+        return Section(title, [self._series("errors", text, panels, columns=3)], [table])
+
+    def _position_panel(self, column: int) -> charts.Panel:
+        """A slider's position, or the root's height, and that of its reference."""
+        recording, entry = self._recording, int(self._recording.layout.vector_starts[column])
+        title = self._names[column] if self._kinds.sliding[column] else "root height"
+        entry += 0 if self._kinds.sliding[column] else 2
+        positions = (recording.position[:, entry], recording.reference_position[:, entry])
+        lines = dict(zip(("simulated", "reference"), positions, strict=True))
+        return charts.Panel("position (m)", lines, title)
 
     def _efforts(self) -> Section:
-        title, recording, vectors = "torques against limits", self._recording, self._vectors
-        sizes = effort_sizes(recording)
+        title, recording = "torques against limits", self._recording
+        sizes = effort_sizes(recording.layout, recording.effort)
         if np.isnan(sizes).all():
             return Section(title, notes=["The recording has no efforts."])
-        shares = limit_shares(sizes, vectors.limits)
-        at_limit = saturated_shares(shares)
         rows = []
-        for row, (name, unit) in enumerate(zip(vectors.names, vectors.effort_units, strict=True)):
-            limit = vectors.limits[row]
-            of_ticks = f"{100.0 * at_limit[row]:.3g} %" if np.isfinite(limit) else "-"
-            rows.append((name, unit, *_statistics(sizes[:, row]), f"{limit:g}", of_ticks))
-        columns = ("joint", "unit", "mean", f"{_PERCENTILE} %", "largest", "limit", "at the limit")
-        table = Table(
-            rows, columns, "efforts that were applied, and in how many ticks at the limit"
-        )
-        limited = np.flatnonzero(vectors.actuated & np.isfinite(vectors.limits))
-        if not len(limited):
-            return Section(title, tables=[table], notes=["No joint has a limit."])
-        names = [vectors.names[joint] for joint in limited]
-        figure = charts.effort_chart(recording.times, shares[:, limited], names, self._marks)
+        for name, unit, limit, values in zip(
+            self._names, self._kinds.units, self._limits, sizes.T, strict=True
+        ):
+            share = self._facts.saturated_shares.get(name)
+            of_ticks = NOT_KNOWN if share is None else f"{100.0 * share:.3g} %"
+            kind = {"rad": "N m", "m": "N"}[unit]
+            rows.append((name, kind, *_statistics(values), _shown(limit), of_ticks))
+        columns = ("joint", "unit", *_STATISTICS, "limit", "at the limit")
+        table = Table(rows, columns, "applied efforts, and the share of ticks at the limit")
+        shares = limit_shares(sizes, self._limits)
+        largest = np.nanmax(np.vstack((shares, np.zeros(len(self._names)))), axis=0)
+        near = np.flatnonzero(self._kinds.actuated & (largest > NOMINAL))
+        if not len(near):
+            return Section(title, tables=[table], notes=["No effort came near a limit."])
+        names = [self._names[row] for row in near]
+        figure = charts.effort_chart(self._timeline, shares[:, near], names)
         text = "the largest share of its limit that each joint's effort reached, over time"
         return Section(title, [self._drawn(figure, "efforts", text)], [table])
 
     def _root(self) -> Section:
-        title, recording = "root path", self._recording
-        if not recording.layout.has_floating_base:
-            return Section(title, notes=["The base is fixed."])
-        errors = distances(recording, recording.position, recording.reference_position)[:, :2]
-        figure = charts.root_chart(
-            recording.times,
-            recording.position[:, :3],
-            recording.reference_position[:, :3],
-            errors,
-            self._breaks,
-            self._marks,
-        )
-        text = "the root's path from above, its height, and its errors"
-        return Section(title, [self._drawn(figure, "root", text)])
+        recording = self._recording
+        position, desired = recording.position[:, :3], recording.reference_position[:, :3]
+        figure = charts.path_chart(self._timeline, position, desired)
+        return Section("root path", [self._drawn(figure, "root", "path of the root from above")])
 
     def _contacts(self) -> Section:
-        title, recording = "contacts", self._recording
+        recording = self._recording
         series = contact_series(recording.character, recording.contacts)
         if series is None:
             note = (
                 "The recording has no contacts: it was recorded with --exclude contacts, or by "
                 "another recorder."
             )
-            return Section(title, notes=[note])
-        heavy = weight(recording)
-        figure = charts.contact_chart(
-            recording.times, series, heavy if heavy > 0.0 else np.nan, self._marks
-        )
-        text = "which link touched something when, and what all of them bore"
+            return Section("contacts", notes=[note])
+        if not series.links:
+            return Section("contacts", notes=["No link touched anything."])
+        weight = recording.character.mass * float(recording.parameters.get("gravity", np.nan))
+        force = series.vertical_force / (weight if weight > 0.0 else np.nan)
+        curve = charts.Panel("vertical force / weight", {"vertical force / weight": force})
+        chart = charts.contact_chart(self._timeline, series.touching, series.links)
+        pictures = [
+            self._drawn(chart, "contacts", "links in contact over time"),
+            self._series("ground", "vertical force of all contacts", [curve]),
+        ]
         rows = [
             (link, f"{100.0 * share:.3g} %")
             for link, share in zip(series.links, series.touching.mean(axis=0), strict=True)
         ]
-        table = Table(rows, ("link", "of all ticks"), "links that touched something")
-        return Section(title, [self._drawn(figure, "contacts", text)], [table])
+        table = Table(rows, ("link", "of all ticks"), "links in contact")
+        return Section("contacts", pictures, [table])
 
     def _plans(self) -> Section:
         foreseen = foresight(self._recording)
         rows = [(f"{ahead:.4g}", *_statistics(errors)) for ahead, errors in foreseen.items()]
-        columns = ("after (s)", "mean", f"{_PERCENTILE} %", "largest")
-        table = Table(
-            rows[:_MOST_LISTED], columns, "centre of mass, off where a plan had foreseen it (m)"
-        )
-        figure = plan_chart(self._recording, self._marks)
-        text = "where each plan was to lead, where it led, and what plans cost"
+        caption = "distance of the centre of mass from its prediction by a plan (m)"
+        table = Table(rows[:_MOST_LISTED], ("after (s)", *_STATISTICS), caption)
+        figure = plan_chart(self._recording, self._timeline.marks)
+        text = "predicted and simulated path of the centre of mass, and costs of plans"
         return Section("plans", [self._drawn(figure, "plans", text)], [table])
+
+    def _events(self) -> Section:
+        facts, recording = self._facts, self._recording
+        steps = wall_steps(recording.published_ns)
+        rows = [(e.start, f"episode of {e.duration:.4g} s") for e in facts.episodes]
+        rows += [
+            (p.start, f"push on {p.link} for {p.duration:.3g} s: {p.impulse:.4g} N s")
+            for p in facts.pushes
+        ]
+        rows += [(throw.start, thrown_line(throw)) for throw in facts.throws]
+        rows += [(span.start, mode_line(span)) for span in self._modes]
+        rows += [(c.time, f"{c.name}: {c.before} to {c.after}") for c in facts.changes]
+        rows += [
+            (float(recording.times[row]), f"pause of {steps[row]:.3g} s of wall time")
+            for row in self._pauses
+        ]
+        listed = [(f"{time:.4f}", text) for time, text in sorted(rows)]
+        notes = []
+        if len(listed) > _MOST_LISTED:
+            notes.append(f"The first {_MOST_LISTED} of {len(listed)}.")
+        if not facts.pushes_recorded:
+            notes.append("Pushes were not recorded.")
+        table = Table(listed[:_MOST_LISTED], ("time (s)", "event"))
+        return Section("events", tables=[table], notes=notes)
 
     def _ticks(self) -> Section:
         title, recording = "tick times", self._recording
         steps = wall_steps(recording.published_ns)
         if not len(steps):
             return Section(title, notes=["There is one state only."])
-        period = pace_period(dict(recording.parameters))
-        late = lateness(recording.published_ns, period) if period else None
-        usual = np.delete(steps, self._pauses)
         steps[self._pauses] = np.nan
-        figure = charts.tick_chart(recording.times, steps, period, late, self._marks)
-        rows = [("wall time from state to state, ms, pauses left out", *_statistics(1e3 * usual))]
-        notes = []
-        if late is not None:
-            rows.append(("lateness, ms", *_statistics(1e3 * late[1:])))
+        known, period = 1e3 * steps, pace_period(dict(recording.parameters))
+        table_rows = [("wall time from state to state, pauses left out", *_statistics(known))]
+        curves, notes = {"wall time": known}, []
+        panels = [charts.Panel("wall time (ms)", curves, is_logarithmic=True)]
+        if period:
+            late, due = lateness(recording.published_ns, period), np.full(len(steps), 1e3 * period)
+            curves["period, for reference"] = due
+            of_late = {"lateness": 1e3 * late[1:], "period, for reference": due}
+            panels.append(charts.Panel("lateness (ms)", of_late, "behind the schedule"))
+            table_rows.append(("lateness", *_statistics(1e3 * late[1:])))
             count = int(late_facts(recording.published_ns, period)["ticks"])
             notes.append(f"{count} of {len(steps)} ticks began more than a period late.")
-        table = Table(rows, ("", "mean", f"{_PERCENTILE} %", "largest"))
-        text = "wall time from state to state"
-        return Section(title, [self._drawn(figure, "ticks", text)], [table], notes)
+        pictures = [
+            self._drawn(charts.histogram(known), "histogram", "frequency of tick times"),
+            self._series("ticks", "wall time from state to state", panels),
+        ]
+        return Section(title, pictures, [Table(table_rows, ("ms", *_STATISTICS))], notes)
 
-    def _events(self) -> Section:
-        recording = self._recording
-        spans = episodes(recording)
-        rows = [(e.start, f"episode of {e.duration:.4g} s") for e in spans]
-        rows += [
-            (p.start, f"push on {p.link} for {p.duration:.3g} s: {p.impulse:.4g} N s")
-            for p in self._pushes
+    def _run(self) -> Section:
+        character, parameters = self._recording.character, self._recording.parameters
+        facts = [
+            ("character", character.name),
+            ("degrees of freedom", str(self._recording.layout.size)),
+            ("mass", f"{character.mass:.4g} kg"),
+            ("rate", f"{parameters.get('rate')} Hz"),
+            ("mode", str(parameters.get("mode", "unknown"))),
+            ("law", self._facts.law or "not recorded"),
         ]
-        rows += [(throw.start, thrown_line(throw)) for throw in self._throws]
-        rows += [(span.start, mode_line(span)) for span in self._modes]
-        rows += [(c.time, f"{c.name}: {c.before} to {c.after}") for c in self._changes]
-        rows += [
-            (float(recording.times[row]), f"pause of {step:.3g} s of wall time")
-            for row, step in zip(
-                self._pauses, wall_steps(recording.published_ns)[self._pauses], strict=True
-            )
-        ]
-        listed = [(f"{time:.4f}", text) for time, text in sorted(rows)]
-        notes = []
-        if len(listed) > _MOST_LISTED:
-            notes.append(f"The first {_MOST_LISTED} of {len(listed)}.")
-        if not recording.applied_wrench:
-            notes.append("Pushes were not recorded.")
-        table = Table(listed[:_MOST_LISTED], ("time (s)", "what"))
-        return Section("what happened", tables=[table], notes=notes)
+        tables = [Table(facts), Table(describe_figures(self._figures), caption="figures")]
+        if self._facts.gains:
+            rows = [
+                (row.joint, *map(_shown, (row.p, row.d, row.i, row.limit)))
+                for row in self._facts.gains
+            ]
+            columns = ("joint", "p", "d", "i", "limit")
+            tables.append(Table(rows, columns, "the controller's gains and limits at the start"))
+        return Section("run", tables=tables)
+
+    def _series(
+        self, name: str, text: str, panels: Sequence[charts.Panel], columns: int = 1
+    ) -> Illustration:
+        figure = charts.series_chart(self._timeline, panels, columns=columns)
+        return self._drawn(figure, name, text)
 
     def _drawn(self, figure: "Figure", name: str, text: str) -> Illustration:
-        content = BytesIO()
-        figure.savefig(content, format="png", dpi=_DPI)
-        return Illustration(self._prefix + name, content.getvalue(), text)
+        return Illustration(self._prefix + name, charts.png(figure), text)
 
 
 def _statistics(values: FloatArray) -> Sequence[str]:
-    """Mean, percentile and maximum of what is known of a series."""
+    """Mean, percentile and maximum of a series, NaN left out."""
     known = values[~np.isnan(values)]
     if not len(known):
-        return ("-", "-", "-")
+        return (NOT_KNOWN,) * len(_STATISTICS)
     numbers = (known.mean(), np.percentile(known, _PERCENTILE), known.max())
     return tuple(f"{number:.4g}" for number in numbers)
 
 
-def _shown(value: object) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _shown(value: float | None) -> str:
+    return NOT_KNOWN if value is None or math.isinf(value) else f"{value:.4g}"

@@ -1,4 +1,4 @@
-"""When the states of a recording came by the wall clock, and which never did. No ROS in here."""
+"""Wall times of the states of a recording: missing ticks, pauses and lateness. Knows no ROS."""
 
 from dataclasses import dataclass
 
@@ -30,15 +30,15 @@ class StateTimes:
 
     @property
     def missing_count(self) -> int:
-        """How many ticks between the first and the last have no state."""
+        """Number of ticks between the first and the last that have no state."""
         return int(self.ticks[-1] - self.ticks[0]) + 1 - len(self.ticks) if len(self.ticks) else 0
 
 
 def state_times(stamps_ns: IntArray, published_ns: IntArray, rate_hz: int) -> StateTimes:
     """The states among messages with these stamps (m,) and wall times (m,), in the order received.
 
-    A state that is published again has an old stamp, and counts once. So does what has a stamp
-    before one that came already.
+    A state that is published again has an old stamp, and counts once, as does any message with a
+    stamp before one that came already.
     """
     ticks = -(-stamps_ns * rate_hz // NANOSECONDS_PER_SECOND)
     highest = np.maximum.accumulate(ticks)
@@ -66,11 +66,10 @@ def pauses(published_ns: IntArray) -> IntArray:
 
 
 def lateness(published_ns: IntArray, period: float) -> FloatArray:
-    """How late (m,) each state was by the schedule of a paced run, s; early ones are negative.
+    """Lateness (m,) of each state by the schedule of a paced run, s; negative for an early one.
 
-    The schedule is the simulator's own: a period in s of wall time from state to state, made up
-    for after a delay, and restarted after a long one and at the first state. After a pause it is
-    restarted, too, and nothing is late.
+    The schedule is the simulator's: a period in s of wall time from state to state, which catches
+    up after a short delay, and restarts at the first state, after a long delay and after a pause.
     """
     after_pauses = set((pauses(published_ns) + 1).tolist())
     times = ((published_ns - published_ns[:1]) / NANOSECONDS_PER_SECOND).tolist()

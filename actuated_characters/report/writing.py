@@ -1,11 +1,19 @@
 """Writes a report: a page, and its pictures beside it."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 from actuated_characters.bags.recording import find_bag, read_recordings
 from actuated_characters.report.contents import Contents, read_contents
-from actuated_characters.report.page import GENERATOR, Chapter, Section, Table, render_page
+from actuated_characters.report.page import (
+    GENERATOR,
+    NOT_KNOWN,
+    Chapter,
+    Section,
+    Table,
+    render_page,
+)
 from actuated_characters.report.sections import NAMES, STILLS, CharacterReport
 from actuated_characters.runs.run_directory import REPORT
 from actuated_characters.whole_files import write_whole
@@ -15,18 +23,27 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 PAGE = "index.html"
 
 _PICTURE = re.compile(rf"([0-9]+-[A-Za-z0-9_]*-)?({'|'.join(NAMES)})\.png")
-_HEAD = 400  # characters of a page that are enough to see whose it is
 _UNFIT = re.compile("[^A-Za-z0-9_]+")  # for the name of a file
 
+Progress = Callable[[int, int], None]
+"""Is told the number of sections that are made, and that of all."""
 
-def write_report(path: Path, output: Path | None = None, *, stills: int = STILLS) -> Path:
+
+def write_report(
+    path: Path,
+    output: Path | None = None,
+    *,
+    stills: int = STILLS,
+    progress: Progress = lambda done, total: None,
+) -> Path:
     """Report on a run's directory, or on a bag; returns the page.
 
     Args:
         path: The directory that a run, a recorder or `ros2 bag record` has left.
         output: Where page and pictures go; by default into the run's directory, or beside the bag.
-            A report that is there is replaced.
-        stills: How many pictures of each character.
+            A report that is there is replaced once the new one is made.
+        stills: Number of poses in the picture of each character.
+        progress: Called after the bag is read, and after each section.
 
     Raises:
         RecordingError: there is no whole recording, or the directory has other files in it, or
@@ -35,20 +52,26 @@ def write_report(path: Path, output: Path | None = None, *, stills: int = STILLS
     """
     directory = output or default_directory(path)
     old = _old_files(directory)
-    recordings = read_recordings(path)
-    contents = read_contents(path)
-    chapters = [Chapter("the bag", [_bag_section(contents)])]
-    files: dict[str, bytes] = {}
+    recordings, contents = read_recordings(path), read_contents(path)
+    reports = []
     for number, recording in enumerate(recordings, start=1):
-        several = len(recordings) > 1
-        prefix = f"{number}-{_UNFIT.sub('_', recording.name)}-" if several else ""
-        sections = CharacterReport(recording, prefix, stills).sections()
+        prefix = f"{number}-{_UNFIT.sub('_', recording.name)}-" if len(recordings) > 1 else ""
+        reports.append(CharacterReport(recording, prefix, stills))
+    done, total = 0, sum(len(report.makers) for report in reports)
+    progress(done, total)
+    chapters: list[Chapter] = []
+    files: dict[str, bytes] = {}
+    for recording, report in zip(recordings, reports, strict=True):
+        sections = []
+        for make in report.makers:
+            sections.append(make())
+            files |= {f"{each.name}.png": each.png for each in sections[-1].illustrations}
+            progress(done := done + 1, total)
         title = recording.name or recording.character.name
-        chapters.append(Chapter(title, sections))
-        files |= {f"{i.name}.png": i.png for section in sections for i in section.illustrations}
-    title = f"{', '.join(chapter.title for chapter in chapters[1:])}: {contents.bag}"
-    files[PAGE] = render_page(title, chapters).encode("utf-8")
-    _write(directory, old, files)
+        chapters.append(Chapter(title if len(recordings) > 1 else "", sections))
+    chapters.append(Chapter("the bag", [_bag_section(contents)]))
+    page = render_page(", ".join(report.title for report in reports), chapters)
+    _write(directory, {PAGE: page.encode("utf-8")} | files, old)
     return directory / PAGE
 
 
@@ -70,22 +93,21 @@ def _old_files(directory: Path) -> list[Path]:
         return []
     if not directory.is_dir():
         raise RecordingError(f"cannot write the report: {directory} is no directory")
-    present = sorted(directory.iterdir())
-    for file in present:
-        own = _PICTURE.fullmatch(file.name) is not None or file.name == PAGE
-        if not own or not file.is_file():
-            raise RecordingError(f"{directory} holds other files than a report's: {file.name}")
-    if present and not _is_own(directory / PAGE):
-        raise RecordingError(f"{directory} holds other files than a report's: {present[0].name}")
+    present, page = sorted(directory.iterdir()), directory / PAGE
+    foreign = [
+        file
+        for file in present
+        if not file.is_file() or (file != page and not _PICTURE.fullmatch(file.name))
+    ]
+    if present and not foreign and not _is_report(page):
+        foreign = [page] if page in present else present
+    if foreign:
+        raise RecordingError(f"{directory} holds other files than a report's: {foreign[0].name}")
     return present
 
 
-def _is_own(page: Path) -> bool:
-    try:
-        with page.open(encoding="utf-8", errors="replace") as file:
-            return GENERATOR in file.read(_HEAD)
-    except OSError:
-        return False
+def _is_report(page: Path) -> bool:
+    return page.exists() and GENERATOR in page.read_text(encoding="utf-8", errors="replace")
 
 
 def _bag_section(contents: Contents) -> Section:
@@ -100,21 +122,23 @@ def _bag_section(contents: Contents) -> Section:
             topic.name,
             topic.type_name,
             str(topic.count),
-            "-" if topic.rate_hz is None else f"{topic.rate_hz:.4g}",
+            NOT_KNOWN if topic.rate_hz is None else f"{topic.rate_hz:.4g}",
             f"{topic.largest_gap_ns / NANOSECONDS_PER_SECOND:.4g}",
         )
         for topic in contents.topics
     ]
     columns = ("topic", "type", "messages", "per s", "largest gap (s)")
-    return Section("contents", tables=[Table(facts), Table(rows, columns)])
+    return Section("", tables=[Table(facts), Table(rows, columns)])
 
 
-def _write(directory: Path, old: list[Path], files: dict[str, bytes]) -> None:
+def _write(directory: Path, files: dict[str, bytes], old: list[Path]) -> None:
+    """Write the files and remove old ones; the page comes first, for it marks the directory."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            write_whole(directory / name, content)
         for file in old:
-            file.unlink()
+            if file.name not in files:
+                file.unlink()
     except OSError as error:
         raise RecordingError(f"cannot write the report: {error}") from error
-    for name, content in files.items():
-        write_whole(directory / name, content)

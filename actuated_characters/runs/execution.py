@@ -173,10 +173,7 @@ def run_in_process(
     started = time.perf_counter()
     ticks = ticks_in_process(plan, pushes, throws, watch=watch)
     for count, tick in enumerate(ticks, start=1):
-        if count == 1:
-            measurement.add_state(tick.state)
-        measurement.add_state(tick.following)
-        measurement.add_tick(tick)
+        measurement.add(tick)
         if count % _IN_PROCESS_REPORT == 0:
             progress(count)
     figures = measurement.summary(wall_time=time.perf_counter() - started)

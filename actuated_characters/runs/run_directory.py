@@ -1,18 +1,16 @@
-"""The directory of a run's results: its figures as a summary, as series, and as a plot."""
+"""The directory of a run's results: its figures as a summary and as series over time."""
 
 import json
 import shutil
 from collections.abc import Mapping
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from actuated_characters.metrics.run_metrics import COLUMNS
+from actuated_characters.metrics.run_metrics import Series
 from actuated_characters.whole_files import part_of, write_whole, writing
-from msgs_config.arrays import FloatArray
 from msgs_config.errors import RecordingError, RunError
 
 BAG, PARAMETERS, LOGS = "bag", "parameters", "logs"
@@ -56,7 +54,7 @@ def figures_directory(run: Path, namespace: str, *, is_alone: bool) -> Path:
     return run if is_alone else run / namespace.rpartition("/")[2]
 
 
-def write_figures(directory: Path, summary: dict[str, object], series: FloatArray) -> None:
+def write_figures(directory: Path, summary: dict[str, object], series: Series) -> None:
     """Write `measurements.csv` with a line of column names, and then `summary.json`, each whole.
 
     Raises:
@@ -66,9 +64,9 @@ def write_figures(directory: Path, summary: dict[str, object], series: FloatArra
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"cannot write to {directory}: {error.strerror or error}") from error
-    header = ",".join(COLUMNS)
+    rows, header = np.column_stack(list(series.values())), ",".join(series)
     with writing(directory / SERIES) as part:
-        np.savetxt(part, series, delimiter=",", header=header, comments="", fmt="%.9g")
+        np.savetxt(part, rows, delimiter=",", header=header, comments="", fmt="%.9g")
     write_whole(directory / SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
@@ -88,51 +86,17 @@ def write_parameters(
     return file
 
 
-def read_figures(directory: Path) -> tuple[dict[str, Any], FloatArray]:
-    """The summary and the series (ticks, columns) that a run left in a directory.
+def read_figures(directory: Path) -> tuple[dict[str, Any], Series]:
+    """The summary and the series that a run left in a directory.
 
     Raises:
         RecordingError: there are none.
     """
     try:
         summary = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
-        series = np.loadtxt(directory / SERIES, delimiter=",", skiprows=1, ndmin=2)
+        with (directory / SERIES).open(encoding="utf-8") as file:
+            names = file.readline().strip().split(",")
+            rows = np.loadtxt(file, delimiter=",", ndmin=2).reshape(-1, len(names))
     except (OSError, ValueError) as error:
         raise RecordingError(f"{directory} holds no figures of a run") from error
-    return summary, series
-
-
-def plot_figures(directory: Path) -> None:
-    """Draw errors and efforts of a run over time into `plot.png`.
-
-    Raises:
-        RecordingError: there are none, or it cannot be written.
-    """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    summary, series = read_figures(directory)
-    columns = dict(zip(COLUMNS, series.T, strict=True))
-    figure, panels = pyplot.subplots(4, sharex=True, figsize=(10, 9), layout="constrained")
-    curves = (
-        ("joint error (rad)", {"mean": "joint_error_mean_rad", "largest": "joint_error_max_rad"}),
-        ("root (m)", {"error": "root_error_m"}),
-        ("root height (m)", {"simulated": "root_height_m", "reference": "reference_root_height_m"}),
-        ("effort", {"assistance / weight": "assist", "largest joint effort / limit": "effort"}),
-    )
-    columns["assist"] = columns["assist_force_n"] / (summary["body_weight_n"] or np.nan)
-    columns["effort"] = columns["effort_of_limit_max"]
-    for panel, (label, lines) in zip(panels, curves, strict=True):
-        for name, column in lines.items():
-            panel.plot(columns["time_s"], columns[column], label=name, linewidth=0.9)
-        panel.set_ylabel(label)
-        panel.grid(alpha=0.3)
-        panel.legend(loc="upper right", fontsize="small")
-    panels[-1].set_xlabel("simulation time (s)")
-    figure.suptitle(f"{summary['character']}, {summary['ticks']} ticks")
-    content = BytesIO()
-    figure.savefig(content, format="png", dpi=110)
-    pyplot.close(figure)
-    write_whole(directory / PLOT, content.getvalue())
+    return summary, dict(zip(names, rows.T, strict=True))

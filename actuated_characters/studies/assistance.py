@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics.error_measures import fall_time, joint_errors
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import label, make_panels, show_pictures
 from actuated_characters.studies.framework.study import RunSpec, StudyResult, StudyRunner
-from actuated_characters.studies.framework.tracking import errors_by_joint, fall_time
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
@@ -103,7 +103,7 @@ def _walk(runner: StudyRunner, name: str, strength: float, controller: dict[str,
         strength,
         run,
         fall,
-        float(errors_by_joint(run.layout, position[:until], desired[:until]).mean()),
+        float(joint_errors(run.layout, position[:until], desired[:until]).mean()),
         float(np.linalg.norm(position[:until, :3] - desired[:until, :3], axis=1).mean()),
         float(np.linalg.norm(run.effort[:until, :3], axis=1).mean()) / weight,
     )

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuated_characters.metrics.error_measures import joint_errors
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.engine.visual_shapes import outline
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import label, make_panels, show_pictures
 from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyResult, StudyRunner
-from actuated_characters.studies.framework.tracking import errors_by_joint
 from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -132,7 +132,7 @@ def _track(runner: StudyRunner, character: Character, clip: str) -> _Tracked:
         clip,
         read_clip(character, clip).wraps,
         outcome,
-        errors_by_joint(run.layout, run.position[:-1], desired),
+        joint_errors(run.layout, run.position[:-1], desired),
         _on_the_ground(character, desired[::_EACH], feet),
         _on_the_ground(character, run.position[::_EACH], legs),
         float(np.linalg.norm(run.effort[:, :3], axis=1).mean()) / weight,

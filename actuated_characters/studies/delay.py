@@ -6,13 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuated_characters.metrics.error_measures import fall_time, joint_errors
 from actuated_characters.studies.framework.plots import label, make_panels
 from actuated_characters.studies.framework.study import RunSpec, StudyResult, StudyRunner
-from actuated_characters.studies.framework.tracking import (
-    delayed_spectral_radius,
-    errors_by_joint,
-    fall_time,
-)
+from actuated_characters.studies.framework.tracking import delayed_spectral_radius
 from controller_node import parameters as controller_parameters
 from controller_node.control_laws import GainArrays
 from msgs_config.arrays import FloatArray
@@ -151,7 +148,7 @@ def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -
     return _Cell(
         rate,
         delay,
-        float(errors_by_joint(run.layout, run.position[:-1], desired).mean()),
+        float(joint_errors(run.layout, run.position[:-1], desired).mean()),
         float(run.times[-1]),
         bool(outcome.diverged),
         fall_time(times, run.position[:-1, 2], desired[:, 2]),

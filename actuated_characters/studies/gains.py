@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics.error_measures import joint_errors
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import THEORY, label, make_panels, show_pictures
@@ -17,12 +18,7 @@ from actuated_characters.studies.framework.study import (
     StudyResult,
     StudyRunner,
 )
-from actuated_characters.studies.framework.tracking import (
-    errors_by_joint,
-    inertialess_response,
-    lag,
-    overshoot,
-)
+from actuated_characters.studies.framework.tracking import inertialess_response, lag, overshoot
 from msgs_config.arrays import FloatArray
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -143,7 +139,7 @@ def _knee(run: Recording, factors: tuple[float, float]) -> _Knee:
 
 def _row(name: str, velocity: str, outcome: RunResult) -> tuple[Cell, ...]:
     run = outcome.recording
-    errors = errors_by_joint(run.layout, run.position[:-1], run.reference_position[:-1])
+    errors = joint_errors(run.layout, run.position[:-1], run.reference_position[:-1])
     saturated = outcome.summary["saturated_fraction"]
     knee: tuple[Cell, ...] = (None, None, None)
     if not outcome.diverged:

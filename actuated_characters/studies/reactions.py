@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.recording_metrics import distances, vectors_of
+from actuated_characters.metrics import error_measures
 from actuated_characters.render.stills import strip
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.reactions import mode_spans
@@ -139,8 +139,7 @@ def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
 
 def joint_errors(run: Recording, reference: FloatArray) -> FloatArray:
     """Mean distance (t + 1,) in rad of the joints from a reference (t + 1, n)."""
-    actuated = vectors_of(run.character).actuated
-    mean: FloatArray = distances(run, run.position, reference)[:, actuated].mean(axis=1)
+    mean: FloatArray = error_measures.joint_errors(run.layout, run.position, reference).mean(axis=1)
     return mean
 
 

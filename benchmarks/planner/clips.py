@@ -26,7 +26,7 @@ from rich.progress import track  # noqa: E402
 from rich.table import Table  # noqa: E402
 
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
-from actuated_characters.reconstruction.world import is_lost  # noqa: E402
+from actuated_characters.metrics.error_measures import is_lost, joint_errors  # noqa: E402
 from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import Plan, make_plan  # noqa: E402
 from actuated_characters.runs.planned_wrenches import parse_pushes_within  # noqa: E402
@@ -120,11 +120,11 @@ def attempt(task: Task) -> Attempt:
     off, turns = [], []
     try:
         for number, tick in enumerate(ticks_in_process(plan, pushes, controller=controller), 1):
-            wanted, got = plan.reference.sample(number / rate), tick.following.position
-            here, there = centre(got), centre(wanted.configuration.position)
-            difference = layout.difference(wanted.configuration, layout.configuration(got))
+            got = tick.following.position
+            wanted = plan.reference.sample(number / rate).configuration.position
+            here, there = centre(got), centre(wanted)
             off.append(float(np.linalg.norm(here - there)))
-            turns.append(float(layout.norms(difference)[2:].mean()))
+            turns.append(float(joint_errors(layout, got[np.newaxis], wanted[np.newaxis]).mean()))
             if is_lost(here, there):
                 return Attempt(float(np.mean(off)), float(np.mean(turns)), number / rate)
     except SimulationError:

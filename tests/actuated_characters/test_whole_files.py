@@ -9,6 +9,7 @@ import pytest
 
 from actuated_characters.metrics.run_metrics import COLUMNS
 from actuated_characters.render.stills import save_png
+from actuated_characters.report.run_figures import plot_figures
 from actuated_characters.runs.planned_files import write_planned
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.run_directory import (
@@ -16,7 +17,6 @@ from actuated_characters.runs.run_directory import (
     PLOT,
     SERIES,
     SUMMARY,
-    plot_figures,
     prepare_directory,
     read_figures,
     write_figures,
@@ -30,7 +30,7 @@ from tests.support.ros import Processes
 FULL_AT = 1000  # bytes
 OLD, NEW = "old", "x" * (FULL_AT + 1)
 FIGURES: dict[str, object] = {"character": "none", "ticks": 100, "body_weight_n": 9.81}
-ROWS = np.ones((100, len(COLUMNS)))
+ROWS = {name: np.ones(100) for name in COLUMNS}
 LIMITED = (
     "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
     "from actuated_characters.cli import main; sys.exit(main(sys.argv[1:]))"
@@ -79,7 +79,7 @@ def test_nothing_of_a_file_is_left_where_its_writer_or_its_directory_fails(
 
 WRITERS: dict[str, tuple[Callable[[Path], object], str]] = {  # and the file that is too large
     "summary": (
-        lambda run: write_figures(run, FIGURES | {"notes": NEW}, ROWS[:1]),
+        lambda run: write_figures(run, FIGURES | {"notes": NEW}, {"time_s": np.ones(1)}),
         SUMMARY,
     ),
     "series": (lambda run: write_figures(run, FIGURES, ROWS), SERIES),
@@ -122,7 +122,10 @@ def test_a_full_disk_leaves_no_file_in_part(tmp_path: Path, name: str) -> None:
     assert (run / file).stat().st_size > FULL_AT
     if before:
         summary, series = read_figures(run)
-        assert summary == FIGURES and np.array_equal(series, ROWS)
+        assert summary == FIGURES
+        assert series.keys() == ROWS.keys() and all(
+            map(np.array_equal, series.values(), ROWS.values())
+        )
 
 
 def test_what_a_killed_run_has_left_of_a_file_is_overwritten(tmp_path: Path) -> None:

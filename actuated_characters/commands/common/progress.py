@@ -11,6 +11,7 @@ def progress_bar(
 
     The task's field `state` is shown beside it.
     """
+    console = Console(stderr=True)
     count = [TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}")] if unit else []
     bar = Progress(
         TextColumn("{task.description}", markup=False),
@@ -19,8 +20,9 @@ def progress_bar(
         *count,
         TextColumn("{task.fields[state]}", markup=False),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=console,
         transient=transient,
+        disable=transient and not console.is_interactive,  # else it would leave an empty line
     )
     bar.add_task(description, total=total, state="")
     return bar

@@ -1,19 +1,14 @@
 """The picture of a comparison: how two recordings drift apart."""
 
-from io import BytesIO
-from pathlib import Path
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from actuated_characters.report.comparison.comparison import Comparison
 from actuated_characters.report.decimation import decimated
 from actuated_characters.studies.framework.plots import label, make_panels
-from actuated_characters.whole_files import write_whole
 
 _SIZE = (11.0, 3.4)  # inches, of each character's panel
-_DPI = 110
-_LEAST = 1e-17  # rad or m; what is drawn on a logarithmic axis of what is the same
+_LEAST = 1e-17  # rad or m; stands for 0 on a logarithmic axis
 
 
 def draw_comparisons(comparisons: list[Comparison]) -> Figure:
@@ -47,14 +42,3 @@ def draw_comparisons(comparisons: list[Comparison]) -> Figure:
             legend="lower right" if has_curves else None,
         )
     return figure
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as a PNG file, whole or not at all.
-
-    Raises:
-        RecordingError: the file cannot be written.
-    """
-    content = BytesIO()
-    figure.savefig(content, format="png", dpi=_DPI)
-    write_whole(path, content.getvalue())

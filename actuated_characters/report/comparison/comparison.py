@@ -1,22 +1,24 @@
 """Two recordings side by side, tick by tick and to the last bit."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.recording_metrics import distances, measure_recording, vectors_of
+from actuated_characters.metrics import error_measures
+from actuated_characters.metrics.recording_metrics import measure_recording
 from actuated_characters.report.changes import differences
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import RecordingError
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 
-_BLOCK = 8192  # rows that are compared together
+_QUANTITIES = ("effort", "position", "velocity")  # a state's effort came before it
 
 
 @dataclass(frozen=True)
 class FirstDifference:
-    """Where two recordings are no longer the same."""
+    """The first difference of two recordings."""
 
     tick: int  # whose state it is
     time: float  # s since the first state that both have
@@ -38,29 +40,25 @@ class Growth:
 
     def by_second(self) -> list[tuple[float, float, float, float]]:
         """The largest of joints, sliders and root in each second, after the second's begin."""
-        rows = []
-        seconds = np.floor(self.times + 1e-9)
-        for second in np.unique(seconds).tolist():
-            chosen = seconds == second
-            largest = [
-                _largest(values[chosen]) for values in (self.joints, self.sliders, self.root)
-            ]
-            rows.append((second, *largest))
-        return rows
+        seconds, first_rows = np.unique(np.floor(self.times + 1e-9), return_index=True)
+        columns = np.stack((self.joints, self.sliders, self.root), axis=1)
+        largest = np.fmax.reduceat(columns, first_rows)
+        return list(zip(seconds.tolist(), *largest.T.tolist(), strict=True))
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What two recordings of one character have in common, and what not."""
+    """The differences of two recordings of one character."""
 
     name: str
     states: tuple[int, int]  # of each
     common: int  # states with the same stamps
     first: FirstDifference | None
     growth: Growth
-    figures: dict[str, tuple[object, object]]
+    figures: dict[str, tuple[object, object]]  # without those that neither has
     simulator: dict[str, tuple[object, object]]  # parameters that differ
-    controller: dict[str, tuple[object, object]] | None  # at the start; None: not both say them
+    controller: dict[str, tuple[object, object]] | None  # at the start; None: not in both
+    versions: dict[str, tuple[object, object]]  # of package, engines and libraries that differ
 
     @property
     def identical(self) -> bool:
@@ -68,12 +66,8 @@ class Comparison:
         return self.first is None and self.states == (self.common, self.common)
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """States with the same stamps in both recordings."""
-
-    first: IntArray  # (c,)
-    second: IntArray  # (c,)
+_Rows: TypeAlias = tuple[Recording, IntArray]
+"""A recording, and its rows (c,) of the states that both recordings have."""
 
 
 def compare(first: Recording, second: Recording, tolerance: float | None = None) -> Comparison:
@@ -88,31 +82,36 @@ def compare(first: Recording, second: Recording, tolerance: float | None = None)
     Raises:
         RecordingError: they are of different characters, or have no stamp in common.
     """
-    _check_same_character(first, second)
-    _, ours, theirs = np.intersect1d(
+    both = (first, second)
+    if first.layout.joints != second.layout.joints:
+        named = [f"'{r.character.name}' ({r.layout.size} degrees of freedom)" for r in both]
+        raise RecordingError(f"the recordings are of different characters: {' and '.join(named)}")
+    stamps, ours, theirs = np.intersect1d(
         first.stamps_ns, second.stamps_ns, assume_unique=True, return_indices=True
     )
-    if not len(ours):
-        spans = [f"{r.stamps_ns[0]} to {r.stamps_ns[-1]} ns" for r in (first, second)]
+    if not len(stamps):
+        spans = [f"{r.stamps_ns[0]} to {r.stamps_ns[-1]} ns" for r in both]
         raise RecordingError(f"the recordings have no stamp in common: {' and '.join(spans)}")
-    rows = _Rows(ours.astype(np.intp), theirs.astype(np.intp))
-    own_figures, other_figures = measure_recording(first)[0], measure_recording(second)[0]
+    measured = [measure_recording(recording)[0] for recording in both]
+    figures = {name: (value, measured[1][name]) for name, value in measured[0].items()}
+    told = [r.controller[0].parameters if r.controller else {} for r in both]
     return Comparison(
         name=first.name,
         states=(len(first.stamps_ns), len(second.stamps_ns)),
-        common=len(ours),
-        first=_first_difference(first, second, rows, tolerance),
-        growth=_growth(first, second, rows),
-        figures={name: (value, other_figures[name]) for name, value in own_figures.items()},
+        common=len(stamps),
+        first=_first_difference((first, ours), (second, theirs), tolerance),
+        growth=_growth((first, ours), (second, theirs)),
+        figures={name: values for name, values in figures.items() if values != (None, None)},
         simulator=differences(first.parameters, second.parameters),
-        controller=_controller_differences(first, second),
+        controller=differences(*told) if all(told) or not any(told) else None,
+        versions=differences(first.versions, second.versions),
     )
 
 
 def pair(
     first: tuple[Recording, ...], second: tuple[Recording, ...]
 ) -> list[tuple[Recording, Recording]]:
-    """The recordings of two bags that are to be compared: by name, or the only ones.
+    """Pair the recordings of two bags by name; one recording each is a pair whatever its name.
 
     Raises:
         RecordingError: the bags have characters of different names.
@@ -128,116 +127,84 @@ def pair(
     return [(recording, others[recording.name]) for recording in first]
 
 
-def _check_same_character(first: Recording, second: Recording) -> None:
-    if first.layout.joints != second.layout.joints:
-        both = [
-            f"'{r.character.name}' ({r.layout.size} degrees of freedom)" for r in (first, second)
-        ]
-        raise RecordingError(f"the recordings are of different characters: {' and '.join(both)}")
-
-
-def _controller_differences(
-    first: Recording, second: Recording
-) -> dict[str, tuple[object, object]] | None:
-    if bool(first.controller) != bool(second.controller):
-        return None
-    if not first.controller:
-        return {}
-    return differences(first.controller[0].parameters, second.controller[0].parameters)
-
-
 def _first_difference(
-    first: Recording, second: Recording, rows: _Rows, tolerance: float | None
+    first: _Rows, second: _Rows, tolerance: float | None
 ) -> FirstDifference | None:
-    for start in range(0, len(rows.first), _BLOCK):
-        block = _Rows(rows.first[start : start + _BLOCK], rows.second[start : start + _BLOCK])
-        found = _in_block(first, second, block, tolerance)
-        if found is not None:
-            row, quantity, differs, amounts, values = found
-            worst = int(np.where(differs, amounts, -1.0).argmax())
-            stamp = int(first.stamps_ns[block.first[row]])
-            since = stamp - int(first.stamps_ns[rows.first[0]])
-            return FirstDifference(
-                tick=TickClock(int(first.parameters["rate"])).first_tick_from(stamp),
-                time=since / NANOSECONDS_PER_SECOND,
+    """The first row that differs, and there the degree of freedom that differs most."""
+    (recording, rows), earliest = first, None
+    for quantity in _QUANTITIES:
+        ours, theirs = _values(first, quantity), _values(second, quantity)
+        differs = _different_bits(ours, theirs)
+        if not differs.any():
+            continue
+        amounts = _amounts(recording, quantity, ours, theirs)
+        if tolerance is not None:
+            differs &= ~(amounts <= tolerance * np.maximum(1.0, np.abs(ours)))  # NaN is not
+        found = np.flatnonzero(differs.any(axis=1))
+        if not len(found) or (earliest is not None and found[0] >= earliest[0]):
+            continue
+        row = int(found[0])
+        amount = np.where(differs[row], np.nan_to_num(amounts[row], nan=np.inf), -1.0)
+        worst = int(amount.argmax())
+        stamp = int(recording.stamps_ns[rows[row]])
+        earliest = (
+            row,
+            FirstDifference(
+                tick=TickClock(int(recording.parameters["rate"])).first_tick_from(stamp),
+                time=(stamp - int(recording.stamps_ns[rows[0]])) / NANOSECONDS_PER_SECOND,
                 quantity=quantity,
-                dof=first.layout.dof_names[worst],
-                values=(float(values[0][worst]), float(values[1][worst])),
-                amount=float(amounts[worst]),
-                count=int(differs.sum()),
-            )
-    return None
+                dof=recording.layout.dof_names[worst],
+                values=(float(ours[row, worst]), float(theirs[row, worst])),
+                amount=float(amount[worst]),
+                count=int(differs[row].sum()),
+            ),
+        )
+    return None if earliest is None else earliest[1]
 
 
-def _in_block(
-    first: Recording, second: Recording, rows: _Rows, tolerance: float | None
-) -> tuple[int, str, BoolArray, FloatArray, tuple[FloatArray, FloatArray]] | None:
-    """The first row (of the block) that differs, in what, where (n,), by how much (n,)."""
-    earliest = None
-    for quantity in ("effort", "position", "velocity"):  # the effort came before the state
-        ours, theirs = _of(first, rows.first, quantity), _of(second, rows.second, quantity)
-        both_missing = np.isnan(ours) & np.isnan(theirs)
-        differs = (ours.view(np.int64) != theirs.view(np.int64)) & ~both_missing
-        if differs.any():
-            amounts = _amounts(first, quantity, ours, theirs)
-            if tolerance is not None:
-                allowed = tolerance * np.maximum(1.0, np.abs(ours))
-                differs &= ~(amounts <= allowed)  # NaN is not
-            different_rows = np.flatnonzero(differs.any(axis=1))
-            if len(different_rows) and (earliest is None or different_rows[0] < earliest[0]):
-                row = int(different_rows[0])
-                values = ours[row], theirs[row]
-                amount = np.nan_to_num(amounts[row], nan=np.inf)
-                earliest = row, quantity, differs[row], amount, values
-    return earliest
+def _different_bits(ours: FloatArray, theirs: FloatArray) -> BoolArray:
+    """Where (c, n) two arrays differ; -0.0 is not 0.0, and a missing value is itself."""
+    both_missing = np.isnan(ours) & np.isnan(theirs)
+    different: BoolArray = (ours.view(np.int64) != theirs.view(np.int64)) & ~both_missing
+    return different
 
 
-def _of(recording: Recording, rows: IntArray, quantity: str) -> FloatArray:
-    """A quantity (r, n) of some states; a state's effort is that of the tick before."""
+def _values(of: _Rows, quantity: str) -> FloatArray:
+    """A quantity (c, n) of some states; a state's effort is that of the tick before."""
+    recording, rows = of
     if quantity == "position":
         return recording.position[rows]
     if quantity == "velocity":
         return recording.velocity[rows]
-    efforts = np.full((len(rows), recording.layout.size), np.nan)
-    known = rows > 0
-    efforts[known] = recording.effort[rows[known] - 1]
-    return efforts
+    return np.vstack((np.full((1, recording.layout.size), np.nan), recording.effort))[rows]
 
 
 def _amounts(
     recording: Recording, quantity: str, ours: FloatArray, theirs: FloatArray
 ) -> FloatArray:
-    """How far apart two arrays (r, n) are in each entry."""
-    if quantity != "position":
-        return np.abs(theirs - ours)
-    layout = recording.layout
-    return np.abs(layout.difference(layout.configuration(ours), layout.configuration(theirs)))
+    """The sizes (c, n) of the differences of two arrays."""
+    if quantity == "position":
+        return np.abs(error_measures.differences(recording.layout, ours, theirs))
+    return np.abs(theirs - ours)
 
 
-def _growth(first: Recording, second: Recording, rows: _Rows) -> Growth:
-    vectors = vectors_of(first.character)
-    turns = np.array([unit == "rad" for unit in vectors.units], dtype=np.bool_)
-    ours, theirs = first.position[rows.first], second.position[rows.second]
-    apart = distances(first, ours, theirs)
-    same = (ours.view(np.int64) == theirs.view(np.int64)).all(axis=1)
-    apart[same] = 0.0  # and not what a rotation's way there and back leaves
-    stamps = first.stamps_ns[rows.first]
-    has_root = first.layout.has_floating_base
+def _growth(first: _Rows, second: _Rows) -> Growth:
+    recording, rows = first
+    ours, theirs = _values(first, "position"), _values(second, "position")
+    apart = error_measures.distances(recording.layout, ours, theirs)
+    # equal positions are 0 apart, although a rotation's logarithm leaves rounding errors
+    apart[~_different_bits(ours, theirs).any(axis=1)] = 0.0
+    kinds, stamps = error_measures.vector_kinds(recording.layout), recording.stamps_ns[rows]
+    unknown = np.full((len(apart), 1), np.nan)  # for characters without a joint of the kind
+
+    def largest(chosen: BoolArray) -> FloatArray:
+        values: FloatArray = np.fmax.reduce(np.hstack((unknown, apart[:, chosen])), axis=1)
+        return values
+
+    is_first = np.arange(apart.shape[1]) == 0
     return Growth(
         times=(stamps - stamps[0]) / NANOSECONDS_PER_SECOND,
-        joints=_largest_by_row(apart[:, vectors.actuated & turns]),
-        sliders=_largest_by_row(apart[:, vectors.actuated & ~turns]),
-        root=apart[:, 0] if has_root else np.full(len(apart), np.nan),
+        joints=largest(kinds.rotating),
+        sliders=largest(kinds.sliding),
+        root=largest(is_first & ~kinds.actuated),
     )
-
-
-def _largest_by_row(values: FloatArray) -> FloatArray:
-    if not values.shape[1]:
-        return np.full(len(values), np.nan)
-    largest: FloatArray = values.max(axis=1)
-    return largest
-
-
-def _largest(values: FloatArray) -> float:
-    known = values[~np.isnan(values)]
-    return float(known.max()) if len(known) else float("nan")

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.studies.framework.tracking import errors_by_joint
+from actuated_characters.metrics.error_measures import joint_errors
 from controller_node.effort_series import TIME_COLUMN
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
@@ -27,7 +27,7 @@ def effort_table(layout: JointLayout, times: FloatArray, efforts: FloatArray) ->
 
 def errors_of(run: Recording) -> tuple[FloatArray, FloatArray]:
     """Times (t,) in s, and the joint error (t,) in rad, mean over the joints, before each tick."""
-    errors = errors_by_joint(run.layout, run.position[:-1], run.reference_position[:-1])
+    errors = joint_errors(run.layout, run.position[:-1], run.reference_position[:-1])
     return run.times[:-1], errors.mean(axis=1)
 
 

@@ -1,24 +1,8 @@
-"""How well a motion is tracked: errors, overshoot, lag, time of a fall, and what theory says."""
+"""How well a motion is tracked: overshoot, lag, and what theory says."""
 
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import JointLayout, JointType
-
-_FALL_FRACTION = 0.5  # of the reference's root height, as `fell` of a run's summary has it ...
-_LEAST_HEIGHT = 0.5  # m; ... where the reference is not lying itself
-
-
-def errors_by_joint(layout: JointLayout, position: FloatArray, desired: FloatArray) -> FloatArray:
-    """Angle (t, j) in rad between positions and desired ones (t, n), for each of j joints.
-
-    The joints are the layout's hinges and balls, in its order; NaN where nothing was desired.
-    """
-    difference = layout.difference(layout.configuration(position), layout.configuration(desired))
-    kinds = [joint.type for joint in layout.joints for _ in joint.vectors]
-    rotate = [kind in (JointType.REVOLUTE, JointType.SPHERICAL) for kind in kinds]
-    errors: FloatArray = layout.norms(difference)[:, rotate]
-    return errors
 
 
 def overshoot(angle: FloatArray, reference: FloatArray) -> float:
@@ -79,18 +63,6 @@ def inertialess_response(
             (stiffness * (desired - angle[k]) + damping * speed) / held
         )
     return angle
-
-
-def fall_time(times: FloatArray, height: FloatArray, desired: FloatArray) -> float | None:
-    """When the root first is below half of its desired height; None if it never is.
-
-    Args:
-        times: Of the states (t,), s.
-        height: Of the root (t,), m.
-        desired: Its reference (t,), m; below 0.5 m it lies by intention, which is no fall.
-    """
-    fallen = (desired > _LEAST_HEIGHT) & (height < _FALL_FRACTION * desired)
-    return float(times[int(fallen.argmax())]) if fallen.any() else None
 
 
 def delayed_spectral_radius(

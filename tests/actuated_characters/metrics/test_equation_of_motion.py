@@ -2,21 +2,16 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.recording import read_recording
 from actuated_characters.metrics.equation_of_motion import Balance, EquationOfMotion
 from msgs_config.arrays import FloatArray
-from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
-from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
-from msgs_config.messages.state import StampedState
-from msgs_config.messages.wrenches import decode_wrenches
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import (
     EVERY_CHARACTER,
@@ -297,34 +292,24 @@ def test_what_spinning_friction_does_is_left_over_as_a_torque_about_the_normal(
 @pytest.mark.slow
 def test_it_holds_for_what_a_bag_says_of_a_walk(processes: Processes, tmp_path: Path) -> None:
     # Arrange
-    run = processes.command(
-        *("run", "--clip", "walk", "--duration", "0.5"),
-        *("--output", str(tmp_path / "walk")),
-    )
+    walk = ("run", "--clip", "walk", "--duration", "0.5", "--output", str(tmp_path / "walk"))
+    run = processes.command(*walk)
     assert run.wait(60.0) == 0
-    whole, decoder = load_character("humanoid"), JointStateDecoder()
+    recording = read_recording(tmp_path / "walk")
+    whole = recording.character
     equation = EquationOfMotion(whole, GRAVITY, RATE)
     rows = {link.name: row for row, link in enumerate(whole.links)}
-    states: dict[int, StampedState] = {}
-    contacts: dict[int, FloatArray] = {}
-    for message in read_messages(tmp_path / "walk" / "bag", ["/joint_states", "/contacts"]):
-        if message.topic == "/joint_states":
-            state = state_in_layout(whole.layout, decoder.decode(message.raw))
-            states[state.stamp_ns] = state
-        else:
-            touching = decode_wrenches(message.raw)
-            wrenches = contacts[touching.stamp_ns] = np.zeros((len(whole.links), 6))
-            wrenches[[rows[name] for name in touching.links]] = touching.wrenches
-    stamps = sorted(states)
-    assert len(stamps) == 121
-    assert set(contacts) == set(states)
+    assert len(recording.effort) == 120
 
-    for before, after in pairwise(stamps):
+    for tick, touching in enumerate(recording.contacts):
+        assert touching is not None
+        wrenches = np.zeros((len(whole.links), 6))
+        wrenches[[rows[name] for name in touching.links]] = touching.wrenches
+        before, velocity = recording.position[tick], recording.velocity[[tick, tick + 1]]
+
         # Act
-        given, led_to = states[before], states[after]
-        assert led_to.effort is not None
         balance = equation.balance(
-            given.position, given.velocity, led_to.effort, led_to.velocity, contacts[after]
+            before, velocity[0], recording.effort[tick], velocity[1], wrenches
         )
 
         # Assert: all parts are there, and the ground carries what the assistance does not

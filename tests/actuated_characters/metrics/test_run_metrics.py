@@ -1,34 +1,30 @@
 """The figures of a run, against numbers that can be worked out by hand."""
 
 import hashlib
-import json
 import math
 import struct
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
-from std_msgs.msg import String
 
 from actuated_characters.metrics.collector import MetricsCollector
+from actuated_characters.metrics.error_measures import is_lost
 from actuated_characters.metrics.run_metrics import COLUMNS, Measurement, StateHash, Tick
 from actuated_characters.metrics.tick_assembler import MOST_AHEAD, TickAssembler
-from controller_node import parameters as for_controller
 from msgs_config.arrays import FloatArray
-from msgs_config.character.file import shipped_characters
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.errors import ActuatedCharactersError, ClockError, RecordingError
-from msgs_config.messages import configuration, topics
+from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.configuration import RunConfiguration
-from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.parameters import resolve
-from sim_node.parameters import PARAMETERS, character_parameters
-from tests.support.physics import character, controller, run_together, simulation
+from tests.support.bags import Made, make_run, said_configuration, said_references, said_states
+from tests.support.physics import character
 
 RATE = 100
 CLOCK = TickClock(RATE)
@@ -62,14 +58,10 @@ def entries(
 
 
 def efforts(
-    root: Iterable[float] = (0.0, 0.0, 0.0),
-    turn: Iterable[float] = (0.0, 0.0, 0.0),
-    chest: Iterable[float] = (0.0, 0.0, 0.0),
-    knee: float = 0.0,
-    slider: float = 0.0,
+    root: Iterable[float] = (0.0, 0.0, 0.0), chest: Iterable[float] = (0.0, 0.0, 0.0), **of: float
 ) -> FloatArray:
     """Efforts on all degrees of freedom, zero where nothing is said."""
-    return entries(root, turn, chest, knee, slider)
+    return entries(root, chest=chest, **of)
 
 
 NONE = efforts()
@@ -122,36 +114,21 @@ def test_a_ball_joints_error_is_the_angle_between_its_two_rotations(
     assert figures["joint_error_mean_rad"] == pytest.approx(angle / 2.0, abs=1e-9)  # and the knee
 
 
-def test_a_hinges_error_is_the_absolute_difference() -> None:
+def test_errors_are_means_over_joints_and_ticks_of_angles_and_distances() -> None:
     figures = measured(
         [
-            (entries(knee=-0.5), entries(knee=0.3), NONE),
-            (entries(knee=4.0), entries(knee=-2.0), NONE),  # a hinge that turns knows its turns
+            # a hinge that turns knows its turns; the root's turn is none of a joint
+            (entries(knee=4.0, turn=(0.0, 0.0, 1.0)), entries(knee=-2.0), NONE),
+            (entries(root=(3.0, 4.0, 1.0), slider=7.0), entries(chest=(0.0, 0.6, 0.8)), NONE),
+            (entries(root=(0.0, 0.0, 2.0), knee=-0.5), entries(knee=0.3, slider=2.0), NONE),
         ]
     )
 
-    assert figures["joint_error_mean_rad"] == pytest.approx((0.8 / 2.0 + 6.0 / 2.0) / 2.0)
-
-
-def test_every_joint_counts_once_and_sliders_and_the_root_are_no_angles() -> None:
-    position = entries(root=(1.0, 2.0, 3.0), turn=(0.0, 0.0, 1.0), slider=7.0)
-    desired = entries(chest=(0.0, 0.6, 0.8), knee=0.5)
-
-    figures = measured([(position, desired, NONE)])
-
-    assert figures["joint_error_mean_rad"] == pytest.approx((1.0 + 0.5) / 2.0)
-
-
-def test_the_roots_error_is_a_distance() -> None:
-    figures = measured(
-        [
-            (entries(root=(3.0, 4.0, 1.0)), entries(), NONE),
-            (entries(root=(0.0, 0.0, 2.0)), entries(), NONE),
-        ]
-    )
-
-    assert figures["root_error_mean_m"] == pytest.approx(3.0)
+    assert figures["joint_error_mean_rad"] == pytest.approx((6.0 + 1.0 + 0.8) / 2.0 / 3.0)
+    assert figures["root_error_mean_m"] == pytest.approx((0.0 + 5.0 + 1.0) / 3.0)
     assert figures["root_error_max_m"] == pytest.approx(5.0)
+    assert figures["slider_error_mean_m"] == pytest.approx((0.0 + 7.0 + 2.0) / 3.0)
+    assert figures["slider_error_max_m"] == pytest.approx(7.0)
 
 
 def test_ticks_without_a_reference_have_no_error_but_count() -> None:
@@ -170,24 +147,18 @@ def test_ticks_without_a_reference_have_no_error_but_count() -> None:
     assert figures["saturated_fraction"] == pytest.approx(1.0 / 9.0)
 
 
-def test_without_any_reference_there_is_no_error_to_tell() -> None:
-    figures = measured([(entries(), None, NONE)])
-
-    assert figures["joint_error_mean_rad"] is None
-    assert figures["root_error_mean_m"] is figures["root_error_max_m"] is None
-    assert figures["fell"] is None
-
-
-def test_what_a_character_does_not_have_is_not_measured() -> None:
+def test_what_cannot_be_measured_is_none() -> None:
     layout = JointLayout([("height", JointType.PRISMATIC)])
-    known = replace(KNOWN, layout=layout, effort_limits=np.array([5.0]))
+    slider = replace(KNOWN, layout=layout, effort_limits=np.array([5.0]))
+    of_reference = ("joint_error_mean_rad", "root_error_mean_m", "root_error_max_m", "fell")
 
-    figures = measured([(np.array([0.5]), np.array([1.0]), np.array([5.0]))], known)
+    alone = measured([(np.array([0.5]), np.array([1.0]), np.array([5.0]))], slider)
+    for figures in (measured([(entries(), None, NONE)]), measured([]), alone):
+        assert all(figures[name] is None for name in of_reference)
 
-    for name in ("joint_error_mean_rad", "root_error_mean_m", "root_error_max_m"):
-        assert figures[name] is None
-    assert figures["assist_force_mean_n"] is figures["fell"] is None
-    assert figures["saturated_fraction"] == 1.0
+    assert alone["assist_force_mean_n"] is None
+    assert (alone["saturated_fraction"], alone["slider_error_mean_m"]) == (1.0, 0.5)
+    assert measured([])["saturated_fraction"] is measured([])["slider_error_max_m"] is None
 
 
 # Efforts
@@ -196,7 +167,7 @@ def test_what_a_character_does_not_have_is_not_measured() -> None:
 def test_assistance_is_the_length_of_the_roots_force_and_weight_is_the_bodys() -> None:
     figures = measured(
         [
-            (entries(), entries(), efforts(root=(0.0, 3.0, -4.0), turn=(9.0, 9.0, 9.0))),
+            (entries(), entries(), entries((0.0, 3.0, -4.0), turn=(9.0, 9.0, 9.0))),
             (entries(), entries(), efforts(root=(2.0, 0.0, 0.0))),
         ]
     )
@@ -218,6 +189,20 @@ def test_a_joint_at_its_limit_is_saturated_and_a_ball_joint_by_its_length() -> N
     assert figures["saturated_fraction"] == pytest.approx(2.0 / 12.0)  # three joints, four ticks
 
 
+@pytest.mark.parametrize(
+    ("commanded", "count", "of_root"), [(["root", "knee"], 7, 6), (["chest", "knee"], 4, 0)]
+)
+def test_actuators_are_the_commanded_degrees_of_freedom(
+    commanded: list[str], count: int, of_root: int
+) -> None:
+    known = replace(KNOWN, parameters={**KNOWN.parameters, "commanded_joints": commanded})
+
+    figures = measured([], known)
+
+    assert (figures["actuators"], figures["root_actuators"]) == (count, of_root)
+    assert figures["degrees_of_freedom"] == 11
+
+
 # The fall
 
 
@@ -228,7 +213,7 @@ def test_a_joint_at_its_limit_is_saturated_and_a_ball_joint_by_its_length() -> N
         (0.46, 0.9, False),
         (0.45, 0.9, False),  # half is not below half
         (-1.0, 0.9, True),
-        (0.1, 0.5, False),  # a reference at 0.5 m or below lies of its own will
+        (0.1, 0.5, False),  # a reference at 0.5 m or below lies by intention
         (0.2, 0.51, True),
         (0.0, 0.3, False),
     ],
@@ -242,29 +227,36 @@ def test_it_fell_if_the_root_is_below_half_of_a_reference_that_stands(
     assert measured([upright, now, upright])["fell"] is fell
 
 
+@pytest.mark.parametrize(
+    ("centre", "lost"),
+    [
+        ((0.59, 0.0, 0.9), False),
+        ((0.0, 0.61, 0.9), True),
+        ((0.0, 0.0, 0.46), False),
+        ((0.0, 0.0, 0.44), True),
+    ],
+)
+def test_a_motion_is_lost_where_the_centre_of_mass_is_far_or_low(
+    centre: tuple[float, ...], lost: bool
+) -> None:
+    assert is_lost(np.array(centre), np.array((0.0, 0.0, 0.9))) is lost
+
+
 # Time
 
 
-def test_simulated_time_is_that_between_the_first_and_the_last_state() -> None:
-    figures = measured([(entries(), entries(), NONE)] * 50, wall_time=0.125)
+@pytest.mark.parametrize(
+    ("count", "wall_time", "factor"), [(50, 0.125, 4.0), (1, 0.0, None), (0, 1.0, 0.0)]
+)
+def test_simulated_time_is_that_between_the_first_and_the_last_state(
+    count: int, wall_time: float, factor: float | None
+) -> None:
+    figures = measured([(entries(), entries(), NONE)] * count, wall_time=wall_time)
 
-    assert figures["ticks"] == 50
-    assert figures["sim_time_s"] == pytest.approx(0.5)
-    assert figures["wall_time_s"] == 0.125
-    assert figures["real_time_factor"] == pytest.approx(4.0)
-
-
-def test_no_wall_time_gives_no_factor() -> None:
-    assert measured([(entries(), entries(), NONE)], wall_time=0.0)["real_time_factor"] is None
-
-
-def test_a_run_without_a_tick_has_figures_too() -> None:
-    figures = measured([])
-
-    assert figures["ticks"] == 0
-    assert figures["sim_time_s"] == 0.0
-    assert figures["saturated_fraction"] is figures["joint_error_mean_rad"] is None
-    assert figures["fell"] is None
+    assert figures["ticks"] == count
+    assert figures["sim_time_s"] == pytest.approx(count / RATE)
+    assert figures["wall_time_s"] == wall_time
+    assert figures["real_time_factor"] == (None if factor is None else pytest.approx(factor))
 
 
 @pytest.mark.parametrize("count", [255, 256, 257, 513])
@@ -290,17 +282,18 @@ def test_where_one_block_ends_and_the_next_begins_does_not_matter(count: int) ->
 
 def test_the_series_has_one_row_a_tick_and_looking_at_it_changes_nothing() -> None:
     measurement = Measurement(KNOWN)
-    measurement.add_state(state(1, entries(), None))
     for tick in range(1, 301):
-        measurement.add_state(state(tick + 1, entries()))
-        desired = None if tick == 3 else reference(tick, entries(knee=0.5))
-        now = state(tick, entries(knee=0.01 * tick))
-        measurement.add_tick(Tick(now, state(tick + 1, entries()), desired))
+        desired = None if tick == 3 else reference(tick, entries(knee=0.5, slider=2.0))
+        now = state(tick, entries(knee=0.01 * tick, slider=1.0))
+        measurement.add(Tick(now, state(tick + 1, entries(), efforts(slider=3.0)), desired))
         if tick in (1, 100, 256):
-            assert len(measurement.series()) == tick
+            assert len(measurement.series()["time_s"]) == tick
 
-    columns = dict(zip(COLUMNS, measurement.series().T, strict=True))
+    columns = measurement.series()
 
+    sliders = ("position.slider", "reference_position.slider", "effort.slider")
+    assert tuple(columns) == (*COLUMNS, *sliders)
+    assert [columns[name][-1] for name in sliders] == [1.0, 2.0, 3.0]
     assert columns["time_s"] == pytest.approx(np.arange(300) / RATE)
     assert math.isnan(columns["joint_error_mean_rad"][2])
     assert columns["joint_error_max_rad"][99] == pytest.approx(0.5)
@@ -348,8 +341,8 @@ def test_the_smallest_difference_gives_another_hash() -> None:
 # Putting states and references together
 
 
-def assembled(order: Iterable[StampedState | StampedReference]) -> tuple[dict[str, object], int]:
-    """The figures and the number of missing ticks, whatever order things have come in."""
+def take(order: Iterable[StampedState | StampedReference]) -> tuple[TickAssembler, Measurement]:
+    """An assembler that has got all of these, in their order, and its measurement."""
     measurement = Measurement(KNOWN)
     assembler = TickAssembler(measurement, RATE)
     for thing in order:
@@ -358,6 +351,12 @@ def assembled(order: Iterable[StampedState | StampedReference]) -> tuple[dict[st
         else:
             assembler.add_reference(thing)
     assembler.finish()
+    return assembler, measurement
+
+
+def assembled(order: Iterable[StampedState | StampedReference]) -> tuple[dict[str, object], int]:
+    """The figures and the number of missing ticks."""
+    assembler, measurement = take(order)
     return measurement.summary(1.0), assembler.missing_ticks
 
 
@@ -377,24 +376,23 @@ def test_each_state_meets_its_reference_and_the_effort_that_the_next_state_tells
     assert figures["state_hash"] == hash_of(*STATES[:3])
 
 
-def test_a_reference_may_come_before_its_state_or_long_after() -> None:
-    pairs = zip(STATES, REFERENCES, strict=True)
-    in_turn, _ = assembled([thing for pair in pairs for thing in pair])
+PAIRS = list(zip(STATES, REFERENCES, strict=True))
+ORDERS = {
+    "states first": [*STATES, *REFERENCES],
+    "references first": [*REFERENCES, *STATES],
+    "references backwards": [*STATES, *reversed(REFERENCES)],
+    "each three times": [thing for pair in PAIRS for thing in 3 * pair],
+    "all twice": [*STATES, *STATES, *REFERENCES, *REFERENCES],
+}
 
-    assert in_turn["ticks"] == 9
-    assert in_turn["joint_error_mean_rad"] == pytest.approx(0.1 * 5.0 / 2.0)
-    assert assembled([*STATES, *REFERENCES])[0] == in_turn
-    assert assembled([*REFERENCES, *STATES])[0] == in_turn
-    assert assembled([*STATES, *reversed(REFERENCES)])[0] == in_turn
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_order_and_repetition_change_nothing(order: str) -> None:
+    in_turn = assembled([thing for pair in PAIRS for thing in pair])
 
-def test_what_comes_again_counts_once() -> None:
-    once = assembled([*STATES, *REFERENCES])
-
-    repeated = [thing for pair in zip(STATES, REFERENCES, strict=True) for thing in 3 * pair]
-
-    assert assembled(repeated) == once
-    assert assembled([*STATES, *STATES, *REFERENCES, *REFERENCES]) == once
+    assert in_turn[0]["ticks"] == 9
+    assert in_turn[0]["joint_error_mean_rad"] == pytest.approx(0.1 * 5.0 / 2.0)
+    assert assembled(ORDERS[order]) == in_turn
 
 
 def test_missing_ticks_are_counted() -> None:
@@ -404,13 +402,27 @@ def test_missing_ticks_are_counted() -> None:
     assert assembled(STATES)[1] == 0
 
 
-def test_a_reference_that_never_comes_leaves_the_others_their_ticks() -> None:
-    figures, missing = assembled([*STATES, *REFERENCES[:4], *REFERENCES[5:]])
+RESET = [*STATES[:5], replace(STATES[5], effort=None), *STATES[6:]]
+
+
+@pytest.mark.parametrize(
+    ("states", "references", "measured_ticks"),
+    [
+        (STATES, [*REFERENCES[:4], *REFERENCES[5:]], (1, 2, 3, 4, 6, 7, 8, 9)),
+        (RESET, REFERENCES, (1, 2, 3, 4, 6, 7, 8, 9)),
+    ],
+    ids=["a reference never comes", "between two episodes there is no tick"],
+)
+def test_a_tick_that_cannot_be_measured_leaves_the_others_theirs(
+    states: list[StampedState], references: list[StampedReference], measured_ticks: tuple[int, ...]
+) -> None:
+    figures, missing = assembled([*states, *references])
 
     assert missing == 0
-    assert figures["ticks"] == 9
-    errors = [0.1 * tick / 2.0 for tick in (1, 2, 3, 4, 6, 7, 8, 9)]
+    assert figures["ticks"] == (9 if states is STATES else 8)
+    errors = [0.1 * tick / 2.0 for tick in measured_ticks]
     assert figures["joint_error_mean_rad"] == pytest.approx(np.mean(errors))
+    assert figures["state_hash"] == hash_of(*states)
 
 
 def test_references_wait_only_for_the_states_that_they_belong_to() -> None:
@@ -423,40 +435,19 @@ def test_references_wait_only_for_the_states_that_they_belong_to() -> None:
     for order in ([*STATES, *strange, *REFERENCES], [*strange, *STATES, *REFERENCES]):
         assert assembled(order) == sound
     gap = [one for index, one in enumerate(STATES) if index != 4]
-    assembler = dropping([*REFERENCES, *gap, *far])
+    assembler, _ = take([*REFERENCES, *gap, *far])
     assert assembler.dropped_references == len(far) + 1
 
 
 def test_a_flood_of_references_takes_a_bounded_memory_and_is_counted() -> None:
     flood = [reference(tick, entries(knee=1.0)) for tick in range(1, 40_000)]
 
-    assert dropping(flood).dropped_references == 39_999 - 11_000
-    assembler = dropping([*STATES, *flood])
+    assert take(flood)[0].dropped_references == 39_999 - 11_000
+    assembler, _ = take([*STATES, *flood])
     assert assembler.dropped_references == 39_999 - 10 - MOST_AHEAD
     assembler.add_state(replace(STATES[0], stamp_ns=reference(30_000, entries()).stamp_ns))
     assembler.finish()
     assert assembler.dropped_references == 39_999 - 10
-
-
-def dropping(order: Iterable[StampedState | StampedReference]) -> TickAssembler:
-    """What has taken these things."""
-    assembler = TickAssembler(Measurement(KNOWN), RATE)
-    for thing in order:
-        if isinstance(thing, StampedState):
-            assembler.add_state(thing)
-        else:
-            assembler.add_reference(thing)
-    return assembler
-
-
-def test_between_two_episodes_there_is_no_tick() -> None:
-    states = [*STATES[:5], replace(STATES[5], effort=None), *STATES[6:]]
-
-    figures, missing = assembled([*states, *REFERENCES])
-
-    assert missing == 0
-    assert figures["ticks"] == 8
-    assert figures["state_hash"] == hash_of(*states)
 
 
 def test_a_state_that_is_no_tick_is_an_error() -> None:
@@ -472,19 +463,17 @@ Message = tuple[str, bytes, int]
 SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
 STATE, TORQUE = topics.JOINT_STATES.name, topics.JOINT_TORQUES.name
 REFERENCE = topics.REFERENCE.of(CONTROLLER).name
+CONFIGURATION = topics.CONFIGURATION.of(SIMULATOR).name
 MILLISECOND = 10**6
-PENDULUM_NAMES = character("pendulum").layout.dof_names
+
+
+@cache
+def pendulum(**simulator: object) -> Made:
+    return make_run("pendulum", 20 / 240, **simulator)
 
 
 def configuration_message(**given: object) -> Message:
-    whole = character("pendulum")
-    values = resolve(PARAMETERS + character_parameters(whole), given)
-    text = configuration.describe(whole, values)
-    return (
-        topics.CONFIGURATION.of(SIMULATOR).name,
-        serialize_message(String(data=text)),
-        0,
-    )
+    return CONFIGURATION, said_configuration(pendulum(**given).plan)[1], 0
 
 
 def report(name: str, published_ns: int, **values: object) -> Message:
@@ -493,31 +482,16 @@ def report(name: str, published_ns: int, **values: object) -> Message:
     return topics.DIAGNOSTICS.name, serialize_message(message), published_ns
 
 
-def pendulum_messages(ticks: int = 20) -> list[Message]:
-    """What a pendulum's run says: in each ms a state, its reference and its torque."""
-    encoder = JointStateEncoder(PENDULUM_NAMES)
-    messages: list[Message] = []
-    with simulation("pendulum") as run:
-        for now, effort, wanted in run_together(run, controller("pendulum"), ticks):
-            told_ns = (len(messages) // 3 + 1) * MILLISECOND
-            applied = () if now.effort is None else (now.effort,)
-            messages += [
-                (
-                    STATE,
-                    encoder.encode(now.stamp_ns, now.position, now.velocity, *applied),
-                    told_ns,
-                ),
-                (
-                    REFERENCE,
-                    encoder.encode(now.stamp_ns, wanted.position, wanted.velocity),
-                    told_ns,
-                ),
-                (TORQUE, encoder.encode(now.stamp_ns, effort=effort), told_ns + 1000),
-            ]
-        last = run.state
-    assert last.effort is not None
-    raw = encoder.encode(last.stamp_ns, last.position, last.velocity, last.effort)
-    return [*messages, (STATE, raw, (ticks + 1) * MILLISECOND)]
+def pendulum_messages() -> list[Message]:
+    """What a recorder hears of a pendulum: in each ms a state, and its reference; and a torque."""
+    made = pendulum()
+    references = [tick.reference for tick in made.ticks if tick.reference is not None]
+    states = enumerate(said_states(made.plan, made.states), start=1)
+    desired = enumerate(said_references(made.plan, references), start=1)
+    messages = [(REFERENCE, raw, at * MILLISECOND) for at, (_, raw) in desired]
+    messages += [(STATE, raw, at * MILLISECOND) for at, (_, raw) in states]
+    messages.append((TORQUE, b"", MILLISECOND + 1000))
+    return sorted(messages, key=lambda message: message[2])
 
 
 def heard(messages: Iterable[Message]) -> MetricsCollector:
@@ -541,35 +515,19 @@ def test_a_listener_gives_the_figures_of_the_run_that_it_hears() -> None:
     assert figures["rejected_commands"] is figures["duplicate_commands"] is None  # nobody said
     mass_kg = character("pendulum").mass
     assert figures["body_weight_n"] == pytest.approx(9.81 * mass_kg)
-    assert series.shape == (20, len(COLUMNS))
-    driver = controller("pendulum")
-    with simulation("pendulum") as run:
-        states = [now for now, _, _ in run_together(run, driver, 20)]
-        assert figures["state_hash"] == hash_of(*states, run.state)
+    assert list(series) == list(COLUMNS)
+    assert {len(column) for column in series.values()} == {20}
+    assert figures["state_hash"] == hash_of(*pendulum().states)
 
 
-def test_what_came_before_the_configuration_is_not_lost() -> None:
-    early = heard([*pendulum_messages(), configuration_message()])
-
-    assert early.results()[0] == heard([configuration_message(), *pendulum_messages()]).results()[0]
-
-
-def test_a_second_configuration_starts_nothing_anew() -> None:
-    messages = pendulum_messages()
-    twice = heard(
-        [configuration_message(), *messages[:30], configuration_message(), *messages[30:]]
-    )
-
-    assert twice.results()[0] == heard([configuration_message(), *messages]).results()[0]
-
-
-def test_a_repeated_state_counts_once_and_does_not_lengthen_the_wall_time() -> None:
-    messages = pendulum_messages()
+def test_early_and_repeated_messages_change_nothing() -> None:
+    messages, configured = pendulum_messages(), configuration_message()
     topic, raw, _ = messages[-1]
+    figures = heard([configured, *messages]).results()[0]
 
-    figures = heard([configuration_message(), *messages, (topic, raw, 10**12)]).results()[0]
-
-    assert figures == heard([configuration_message(), *messages]).results()[0]
+    assert heard([*messages, configured]).results()[0] == figures
+    assert heard([configured, *messages[:30], configured, *messages[30:]]).results()[0] == figures
+    assert heard([configured, *messages, (topic, raw, 10**12)]).results()[0] == figures
 
 
 def test_commands_are_counted_as_the_simulator_reports_them_last() -> None:
@@ -598,7 +556,7 @@ def test_without_a_simulator_there_are_no_figures() -> None:
         heard(pendulum_messages()).results()[0]
 
 
-@pytest.mark.parametrize("topic", [STATE, REFERENCE, topics.DIAGNOSTICS.name])
+@pytest.mark.parametrize("topic", [STATE, REFERENCE, topics.DIAGNOSTICS.name, CONFIGURATION])
 @pytest.mark.parametrize("raw", [b"", b"\x00\x01\x00\x00\xff\xff\xff\xff"], ids=["no", "some"])
 def test_bytes_that_are_no_message_are_an_error_of_the_projects_own(topic: str, raw: bytes) -> None:
     listener = heard([configuration_message(), *pendulum_messages()])
@@ -608,37 +566,3 @@ def test_bytes_that_are_no_message_are_an_error_of_the_projects_own(topic: str, 
         listener.take(topic, raw, 0)
 
     assert listener.results()[0] == before
-
-
-def test_bytes_that_are_no_configuration_are_an_error_of_the_projects_own() -> None:
-    with pytest.raises(ActuatedCharactersError):
-        MetricsCollector().take(topics.CONFIGURATION.of(SIMULATOR).name, b"\x00\x01", 0)
-
-
-# What a listener must know
-
-
-@pytest.mark.parametrize("name", shipped_characters())
-def test_a_configuration_is_json_that_any_language_reads_and_says_the_same(name: str) -> None:
-    whole = character(name)
-    values = resolve(PARAMETERS + character_parameters(whole), {"session": "/a#1"})
-
-    text = configuration.describe(whole, values, session="/b#2")
-
-    json.loads(text, parse_constant=pytest.fail)  # JSON knows no Infinity and no NaN
-    known = configuration.parse(text)
-    assert known.layout.dof_names == whole.layout.dof_names
-    assert known.effort_limits.tolist() == whole.effort_limits().tolist()
-    del values["session"]  # which is of no influence
-    assert known.parameters == values
-    assert known.session == "/b#2"
-
-
-@pytest.mark.parametrize("name", shipped_characters())
-def test_a_controllers_configuration_is_json_that_any_language_reads(name: str) -> None:
-    whole = character(name)
-    values = resolve(for_controller.PARAMETERS + for_controller.character_parameters(whole), {})
-
-    text = configuration.describe(whole, values)
-
-    assert json.loads(text, parse_constant=pytest.fail)["character"] == name

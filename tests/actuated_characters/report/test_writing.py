@@ -1,10 +1,12 @@
 """The page about a run: whole, by itself, and with the numbers that the messages give."""
 
+import base64
 import re
-from dataclasses import dataclass, field
-from html.parser import HTMLParser
+from dataclasses import replace
+from html import escape
 from io import BytesIO
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -16,63 +18,47 @@ from actuated_characters.bags.recording import read_recording
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
 from actuated_characters.metrics.recording_metrics import contact_series, measure_recording
+from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.report.decimation import decimated, span_maxima, span_means
-from actuated_characters.report.page import Chapter, Section, Table, render_page
+from actuated_characters.report.page import NOT_KNOWN, Chapter, Section, Table, render_page
+from actuated_characters.report.sections import NAMES
 from actuated_characters.report.writing import default_directory, write_report
 from actuated_characters.runs.run_directory import prepare_directory
 from msgs_config.errors import RecordingError
-from msgs_config.messages import topics
+from msgs_config.messages import configuration, topics
 from msgs_config.messages.topics import Topic
-from tests.support.bags import Made, add_to, make_run, said_configuration, said_states, write_bag
+from tests.support.bags import (
+    Made,
+    add_to,
+    make_run,
+    said_configuration,
+    said_references,
+    said_states,
+    write_bag,
+)
 from tests.support.eventful import Eventful, add_timed, eventful_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 HOSTILE = "/<script>alert('x')</script>&amp;"
-VOID = {"meta", "img"}
 TICKS = 120
 RESET_AFTER = 70
 WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
 
 
-@dataclass
-class Page(HTMLParser):
-    """What a browser would find: an element that is not closed is an error."""
+class Page:
+    """The elements of a page; one that is not closed is an error."""
 
-    text: str
-    open: list[str] = field(default_factory=list)
-    links: list[str] = field(default_factory=list)
-    pictures: list[str] = field(default_factory=list)
-    cells: list[list[str]] = field(default_factory=list)
-    headings: list[str] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        super().__init__()
-        self.feed(self.text)
-        self.close()
-        assert not self.open
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        assert tag != "script"
-        if tag not in VOID:
-            self.open.append(tag)
-        given = dict(attrs)
-        self.links += [str(given[name]) for name in ("src", "href") if name in given]
-        if tag == "img":
-            self.pictures.append(str(given["src"]))
-        elif tag == "tr":
-            self.cells.append([])
-        elif tag in ("td", "th"):
-            self.cells[-1].append("")
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if self.open and self.open[-1] in ("td", "th"):
-            self.cells[-1][-1] += data
-        elif self.open and self.open[-1] in ("h2", "h3", "p"):
-            self.headings.append(data)
+    def __init__(self, text: str) -> None:
+        self.text = text
+        root = ElementTree.fromstring(text.partition("\n")[2])  # without the document's type
+        every = list(root.iter())
+        assert not any(each.tag == "script" for each in every)
+        texts = {each: "".join(each.itertext()) for each in every}
+        self.links = [each.attrib[k] for each in every for k in ("src", "href") if k in each.attrib]
+        self.pictures = [each.attrib["src"] for each in root.iter("img")]
+        self.cells = [[texts[cell] for cell in row] for row in root.iter("tr")]
+        self.headings = [texts[each] for each in every if each.tag in ("h2", "h3", "p")]
 
     def rows(self, name: str) -> list[list[str]]:
         """The rows that begin with a name."""
@@ -129,12 +115,36 @@ def test_names_from_the_bag_are_texts(page: Page) -> None:
 def test_the_pictures_lie_beside_the_page(run: Path, page: Page) -> None:
     names = {path.name for path in (run / "report").iterdir()} - {"index.html"}
 
-    kinds = ("strip", "errors", "efforts", "root", "contacts", "ticks")
-    assert names == {f"{kind}.png" for kind in kinds}
+    assert names == {f"{name}.png" for name in NAMES if name != "plans"}
     assert len(page.pictures) == len(names)
     for name in names:
-        content = (run / "report" / name).read_bytes()
-        assert imread(BytesIO(content)).std() > 0.0
+        assert imread(BytesIO((run / "report" / name).read_bytes())).std() > 0.0
+
+
+def test_the_page_begins_with_picture_verdict_and_errors_and_ends_with_the_topics(
+    run: Path, page: Page
+) -> None:
+    strip = base64.b64encode((run / "report" / "strip.png").read_bytes()).decode()
+    verdict = f"It tracked its reference for {TICKS / 240:.4g} s without a fall"
+    parts = [strip, verdict, "mean joint error", "tracking error", "events", "the bag", HOSTILE]
+
+    places = [page.text.rindex(escape(part)) for part in parts]
+
+    assert "<h1>humanoid: walk</h1>" in page.text
+    assert places == sorted(places)
+
+
+def test_a_fall_is_in_the_verdict(tmp_path: Path) -> None:
+    made = make_run("humanoid", 0.1, WALK)
+    fallen = made.ticks[12].state.position.copy()
+    fallen[2] = 0.4
+    states = [replace(s, position=fallen) if n == 12 else s for n, s in enumerate(made.states)]
+    references = [tick.reference for tick in made.ticks if tick.reference is not None]
+    messages = [*said_states(made.plan, states), *said_references(made.plan, references)]
+
+    page = write_report(write_bag(tmp_path / "bag", [said_configuration(made.plan), *messages]))
+
+    assert "It fell at 0.05 s of 0.1 s." in page.read_text(encoding="utf-8")
 
 
 def test_the_table_of_errors_is_that_of_the_messages(page: Page, walk: Eventful) -> None:
@@ -163,13 +173,18 @@ def test_the_table_of_efforts_is_that_of_the_messages(page: Page, walk: Eventful
         assert row[5:] == [f"{limit:g}", f"{100.0 * np.mean(sizes >= limit):.3g} %"]
 
 
-def test_the_table_of_contacts_is_that_of_the_messages(page: Page, walk: Eventful) -> None:
-    touched = [wrenches.links for wrenches in walk.contacts]
-    ever = {link for links in touched for link in links}
-    assert "right_ankle" in ever
-    for link in ever:
-        share = sum(link in links for links in touched) / len(touched)
-        assert [link, f"{100.0 * share:.3g} %"] in page.cells
+def test_contacts_are_those_of_the_messages(page: Page, walk: Eventful, run: Path) -> None:
+    recording = read_recording(run)
+
+    series = contact_series(recording.character, recording.contacts)
+
+    assert series is not None and "right_ankle" in series.links
+    expected = [wrenches.wrenches[:, 2].sum() for wrenches in walk.contacts]
+    np.testing.assert_array_equal(series.vertical_force, expected)
+    assert set(series.links) == {link for wrenches in walk.contacts for link in wrenches.links}
+    for link, touching in zip(series.links, series.touching.T, strict=True):
+        assert touching.tolist() == [link in wrenches.links for wrenches in walk.contacts]
+        assert [link, f"{100.0 * touching.mean():.3g} %"] in page.cells
 
 
 def test_what_happened_is_listed(page: Page) -> None:
@@ -183,17 +198,16 @@ def test_what_happened_is_listed(page: Page) -> None:
 def test_the_figures_are_those_of_the_run(tmp_path: Path) -> None:
     made = make_run("humanoid", 0.1, WALK)
     recording = read_recording(write_bag(tmp_path / "bag", made.messages()))
+    known = configuration.parse(configuration.describe(made.plan.character, made.plan.simulator))
+    measurement = Measurement(known)
+    for tick in made.ticks:
+        measurement.add(tick)
 
     summary, series = measure_recording(recording)
 
-    knees = [
-        abs(t.state.position[10] - t.reference.position[10]) for t in made.ticks if t.reference
-    ]
-    assert summary["ticks"] == len(made.ticks) == len(knees) == len(series)
-    assert summary["sim_time_s"] == pytest.approx(0.1)
-    assert summary["wall_time_s"] == pytest.approx(24e-9)  # as tests/support/bags.py stamps them
-    again = measure_recording(recording)[0]
-    assert summary["state_hash"] == again["state_hash"]
+    assert summary == measurement.summary(wall_time=24e-9)  # as tests/support/bags.py stamps them
+    for name, column in measurement.series().items():
+        np.testing.assert_array_equal(series[name], column)
 
 
 # What is not there is said
@@ -208,12 +222,12 @@ def test_what_a_recording_lacks_is_said(tmp_path: Path) -> None:
 
     for words in (
         "The recording has no reference.",
-        "The base is fixed.",
         "The recording has no contacts",
         "Pushes were not recorded.",
     ):
         assert any(words in heading for heading in page.headings)
     assert (tmp_path / "bag-report" / "efforts.png").is_file()
+    assert "A run of 0.05 s without a reference." in page.text and "root" not in page.headings
 
 
 def test_one_state_is_enough(tmp_path: Path) -> None:
@@ -245,7 +259,7 @@ def test_each_of_several_characters_has_its_chapter(tmp_path: Path) -> None:
 
 
 def test_a_report_is_replaced_and_nothing_else_is(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], pendulum: Made
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], pendulum: Made
 ) -> None:
     bag = write_bag(tmp_path / "bag", pendulum.messages())
     directory = default_directory(bag)
@@ -259,6 +273,33 @@ def test_a_report_is_replaced_and_nothing_else_is(
     assert main(["report", str(bag)]) == 1
     said = capsys.readouterr().err
     assert "holds other files than a report's: mine.txt" in said and said.count("\n") == 1
+    (directory / "mine.txt").unlink()
+    (directory / "index.html").write_text("<!DOCTYPE html><p>mine</p>")
+    with pytest.raises(RecordingError, match=r"than a report's: index\.html"):
+        write_report(bag)
+    assert "mine" in (directory / "index.html").read_text()
+
+
+@pytest.mark.parametrize("after", [0, 3, 7])
+def test_an_interrupted_report_leaves_the_old_one(
+    tmp_path: Path, pendulum: Made, after: int
+) -> None:
+    bag = write_bag(tmp_path / "bag", pendulum.messages())
+    page = write_report(bag, stills=0)
+    before = {file.name: file.read_bytes() for file in page.parent.iterdir()}
+    told: list[int] = []
+
+    def interrupt(done: int, total: int) -> None:
+        told.append(done)
+        assert total == 7
+        if done == after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_report(bag, stills=1, progress=interrupt)
+
+    assert told == list(range(after + 1))
+    assert {file.name: file.read_bytes() for file in page.parent.iterdir()} == before
 
 
 def test_a_report_is_one_of_a_runs_results(tmp_path: Path, pendulum: Made) -> None:
@@ -268,16 +309,6 @@ def test_a_report_is_one_of_a_runs_results(tmp_path: Path, pendulum: Made) -> No
     prepare_directory(tmp_path, overwrite=True)
 
     assert not (tmp_path / "report").exists()
-
-
-def test_a_page_of_somebody_else_is_not_replaced(pendulum: Made, tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / "bag", pendulum.messages())
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "index.html").write_text("<!DOCTYPE html><p>mine</p>")
-
-    with pytest.raises(RecordingError, match="other files"):
-        write_report(bag, tmp_path / "site")
-    assert "mine" in (tmp_path / "site" / "index.html").read_text()
 
 
 @pytest.fixture(scope="module")
@@ -310,6 +341,14 @@ def test_texts_are_escaped_wherever_they_are() -> None:
     assert not re.search(r"onerror=alert\(1\)>", page.text)
 
 
+def test_a_column_without_a_value_is_left_out() -> None:
+    table = Table([("a", NOT_KNOWN, "1"), ("b", NOT_KNOWN, NOT_KNOWN)], ("joint", "limit", "p"))
+
+    page = Page(render_page("page", [Chapter("", [Section("", tables=[table])])]))
+
+    assert page.cells == [["joint", "p"], ["a", "1"], ["b", NOT_KNOWN]]
+
+
 def test_a_long_series_keeps_its_extremes() -> None:
     times = np.arange(100_000) / 1000.0
     values = np.random.default_rng(1).normal(size=(100_000, 2))
@@ -331,15 +370,3 @@ def test_spans_have_their_largest_and_their_mean() -> None:
     assert span_maxima(values, 3)[:, 0].tolist() == [4.0, 10.0, 18.0]
     assert span_means(values, 5)[:, 1].tolist() == [2.0, 6.0, 10.0, 14.0, 18.0]
     assert span_means(values, 50).tolist() == values.tolist()
-
-
-def test_the_ground_bears_what_all_links_say(walk: Eventful, run: Path) -> None:
-    recording = read_recording(run)
-
-    series = contact_series(recording.character, recording.contacts)
-
-    assert series is not None
-    expected = [wrenches.wrenches[:, 2].sum() for wrenches in walk.contacts]
-    np.testing.assert_array_equal(series.vertical_force, expected)
-    column = series.links.index("right_ankle")
-    assert series.touching[:, column].tolist() == ["right_ankle" in w.links for w in walk.contacts]

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuated_characters.metrics.error_measures import fall_time, joint_errors
 from actuated_characters.studies import assistance, clips, delay, gains
 from actuated_characters.studies.framework.study import Cell, RunResult, RunSpec, StudyResult
 from actuated_characters.studies.framework.tracking import (
     delayed_spectral_radius,
-    errors_by_joint,
-    fall_time,
     inertialess_response,
     lag,
     overshoot,
@@ -50,7 +49,7 @@ def test_a_joints_error_is_the_angle_of_the_turn_between() -> None:
         angles.append(angle)
     desired[:, :6] += 1.0  # the root is no joint
 
-    errors = errors_by_joint(layout, position, desired)
+    errors = joint_errors(layout, position, desired)
 
     np.testing.assert_allclose(errors, np.tile(angles, (5, 1)), atol=1e-12)
 

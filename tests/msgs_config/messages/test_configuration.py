@@ -4,10 +4,12 @@ import json
 
 import pytest
 
-from controller_node.parameters import PARAMETERS
+from controller_node.parameters import PARAMETERS, character_parameters
+from msgs_config.character.file import shipped_characters
 from msgs_config.errors import MessageError
 from msgs_config.messages import configuration
 from msgs_config.parameters import resolve
+from sim_node import parameters as simulator
 from tests.support.physics import character
 
 
@@ -26,3 +28,24 @@ def test_of_both_names_of_a_parameter_one_counts() -> None:
     content["parameters"] |= {"balance": True}
 
     assert "balance" not in configuration.parse(json.dumps(content)).parameters
+
+
+@pytest.mark.parametrize("name", shipped_characters())
+def test_a_configuration_is_json_that_any_language_reads_and_says_the_same(name: str) -> None:
+    whole = character(name)
+    values = resolve(
+        simulator.PARAMETERS + simulator.character_parameters(whole), {"session": "/a#1"}
+    )
+    of_controller = resolve(PARAMETERS + character_parameters(whole), {})
+
+    text = configuration.describe(whole, values, session="/b#2")
+
+    json.loads(text, parse_constant=pytest.fail)  # JSON knows no Infinity and no NaN
+    known = configuration.parse(text)
+    assert known.layout.dof_names == whole.layout.dof_names
+    assert known.effort_limits.tolist() == whole.effort_limits().tolist()
+    del values["session"]  # which is of no influence
+    assert known.parameters == values
+    assert known.session == "/b#2"
+    text = configuration.describe(whole, of_controller)
+    assert json.loads(text, parse_constant=pytest.fail)["character"] == name
