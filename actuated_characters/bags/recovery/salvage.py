@@ -111,7 +111,10 @@ class Salvage:
     ) -> Iterator[StoredMessage]:
         """What records from the file's position on hold, up to one that is cut off."""
         while (begin := file.tell()) < size:
-            kind, length = _HEAD.unpack(file.read(_HEAD.size).ljust(_HEAD.size, b"\0"))
+            head = file.read(_HEAD.size)
+            if size - begin <= _HEAD.size:  # what a kill before a record's content leaves
+                return
+            kind, length = _HEAD.unpack(head)
             if (kind, length) in _ENDS:
                 return
             if not kind or file.tell() + length > size:  # the format has no kind 0

@@ -37,8 +37,9 @@ def test_a_truncated_file_of_ros2_bag_record_is_recovered_up_to_the_cut(
     bag: Path, compression: CompressionType
 ) -> None:
     file = write_mcap(bag / "bag_0.mcap", SAID, compression=compression, chunk_size=150)
-    size = file.stat().st_size
-    os.truncate(file, size // 2)
+    chunks = [each for each in records(file.read_bytes()) if each[0] == CHUNK]
+    _, begin, end = chunks[len(chunks) // 2]
+    os.truncate(file, (begin + end) // 2)
 
     recovered = recover(bag)
 
@@ -179,6 +180,20 @@ def test_what_nobody_needs_may_be_damaged(bag: Path) -> None:
     recovered = recover(bag)
 
     assert texts(bag) == SAID and recovered.contents.lost == []
+
+
+@pytest.mark.parametrize("left", [1, 8, 9, 10])
+def test_the_head_of_a_record_without_its_content_is_no_loss(bag: Path, left: int) -> None:
+    """A killed recorder may have written the nine bytes alone: no message was behind them."""
+    file = plain(bag)
+    begins = [begin for kind, begin, _ in records(file.read_bytes()) if kind == CHUNK]
+    os.truncate(file, begins[-1] + left)
+
+    recovered = recover(bag)
+
+    read = texts(bag)
+    assert read == SAID[: len(read)] and len(read) > len(SAID) // 2
+    assert recovered.contents.lost == ([] if left < 10 else ["bag_0.mcap: bytes cut off (10)"])
 
 
 def test_a_tail_of_zeros_is_no_record(bag: Path) -> None:
