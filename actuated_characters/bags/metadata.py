@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-from actuated_characters.bags.storage import MCAP, SUFFIXES, ZSTD, reason
+from actuated_characters.bags.storage import CDR, MCAP, SUFFIXES, ZSTD, reason
 from actuated_characters.runs.run_directory import BAG
 from msgs_config import files
 from msgs_config.errors import RecordingError, one_of
@@ -14,7 +14,6 @@ FILE, MESSAGE = "file", "message"  # what rosbag2 compressed; within MCAP the fi
 _LATEST_VERSION = 9  # of Jazzy
 _MOST = 1 << 22  # characters; of a hundred topics it has some 100,000
 _MOST_OF_VALUE = 1 << 16  # characters; rosbag2 wrote all of a topic's publishers into one text
-CDR = "cdr"  # the only serialisation that ROS 2 has
 
 
 class BagMetadata(NamedTuple):

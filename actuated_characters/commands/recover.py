@@ -11,7 +11,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.bags.recovery.recover import Recovered
+    from actuated_characters.bags.recovery import Recovered
 
 _NS_PER_S = 10**9
 
@@ -36,7 +36,7 @@ def add_recover(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
 
 
 def _recover(options: argparse.Namespace) -> None:
-    from actuated_characters.bags.recovery.recover import recover
+    from actuated_characters.bags.recovery import recover
 
     with _progress_bar() as bar:
         task = bar.add_task("")

@@ -216,7 +216,7 @@ def test_another_serialisation_is_refused_by_name(bag: Path) -> None:
 
 
 def test_an_mcap_file_of_no_ros_and_a_file_of_another_kind_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="Profile is not ros2"):
+    with pytest.raises(RecordingError, match="its profile is not 'ros2'"):
         texts(write_mcap(tmp_path / "other.mcap", SAID, profile="x"))
     (tmp_path / "notes.txt").write_text("hello")
     with pytest.raises(RecordingError, match=r"notes.txt is no .mcap or .db3 file"):

@@ -15,7 +15,7 @@ from std_msgs.msg import String
 from actuated_characters import cli
 from actuated_characters.bags.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.recovery.recover import recover
+from actuated_characters.bags.recovery import recover
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.runs.run_directory import SUMMARY, read_figures, write_figures
