@@ -4,14 +4,13 @@ import heapq
 import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rclpy.serialization import deserialize_message
 
 from actuated_characters.bags import limits, metadata, storage
+from actuated_characters.bags.definitions import find_message_type
 from actuated_characters.bags.mcap_file import McapFile
 from actuated_characters.bags.sqlite_file import SqliteFile
 from msgs_config.errors import RecordingError, one_of
@@ -32,9 +31,7 @@ class RecordedMessage(NamedTuple):
             RecordingError: The class is not installed, or the bytes are no such message.
         """
         try:
-            return deserialize_message(self.raw, _message_class(self.type_name))
-        except (ImportError, AttributeError) as error:
-            raise RecordingError(f"message type {self.type_name} is not installed") from error
+            return deserialize_message(self.raw, find_message_type(self.type_name))
         except RuntimeError as error:
             raise RecordingError(
                 f"message on '{self.topic}' at {self.log_time_ns} ns is no {self.type_name}"
@@ -136,9 +133,3 @@ def _naming(path: Path, file: Path) -> Iterator[None]:
     except Exception as error:
         name = "" if path == file else f"{file.name}: "
         raise ValueError(f"{name}{storage.reason(error)}") from error
-
-
-@cache
-def _message_class(type_name: str) -> Any:
-    *module, name = type_name.split("/")
-    return getattr(import_module(".".join(module)), name)
