@@ -1,4 +1,4 @@
-"""Reading: only the chosen topics, clear errors for others; and definitions as ROS installs them."""
+"""Reading the chosen topics, clear errors for others, and definitions as ROS installs them."""
 
 import json
 from importlib import import_module
@@ -40,7 +40,7 @@ def test_only_the_chosen_topics_are_read(recording: Path) -> None:
 def test_a_topic_that_was_not_recorded_is_an_error_that_names_those_that_were(
     recording: Path,
 ) -> None:
-    with pytest.raises(RecordingError, match="unknown topic '/torques'; .*: /a, /b, /silent"):
+    with pytest.raises(RecordingError, match=r"unknown topic '/torques'; .*: /a, /b, /silent"):
         list(read_messages(recording, ["/torques"]))
 
 

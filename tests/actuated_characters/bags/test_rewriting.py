@@ -1,4 +1,4 @@
-"""Files that were cut off, damaged, split or compressed: what of them `recover` finds, and says."""
+"""Files that were cut off, damaged, split or compressed: the parts that `recover` finds."""
 
 import os
 from collections.abc import Iterator
@@ -169,13 +169,18 @@ def test_a_record_of_another_kind_ends_nothing(bag: Path, kind: int, bit: int) -
     assert bool(recovered.contents.lost) == (bit == 4)
 
 
-def test_what_nobody_needs_may_be_damaged(bag: Path) -> None:
-    file = plain(bag)
+@pytest.mark.parametrize("kind", [MESSAGE_INDEX, FOOTER])
+def test_a_record_that_no_message_needs_may_be_damaged(bag: Path, kind: int) -> None:
+    """The lengths in the indices of chunks, and where the summary begins."""
+    file = write_mcap(bag / "bag_0.mcap", SAID, chunk_size=150)
     data = bytearray(file.read_bytes())
-    for kind, begin, _ in list(records(bytes(data))):
-        if kind == MESSAGE_INDEX:
+    for found, begin, _ in list(records(bytes(data))):
+        if found == kind == MESSAGE_INDEX:
             data[begin + ENTRIES_LENGTH + 3] ^= 0x40
+        elif found == kind:
+            data[begin + 9 : begin + 17] = (8).to_bytes(8, "little")  # among the messages
     file.write_bytes(data)
+    (bag / "metadata.yaml").write_text("cut off")
 
     recovered = recover(bag)
 
@@ -205,18 +210,6 @@ def test_a_tail_of_zeros_is_no_record(bag: Path) -> None:
 
     assert texts(bag) == SAID
     assert recovered.contents.lost == [f"bag_0.mcap: bytes cut off ({1 << 30})"]
-
-
-def test_a_summary_that_begins_among_the_messages_unpacks_nothing(bag: Path) -> None:
-    file = write_mcap(bag / "bag_0.mcap", SAID, chunk_size=150)
-    data = bytearray(file.read_bytes())
-    _, footer, _ = next(each for each in records(bytes(data)) if each[0] == FOOTER)
-    data[footer + 9 : footer + 17] = (8).to_bytes(8, "little")
-    file.write_bytes(data)
-
-    recovered = recover(bag)
-
-    assert texts(bag) == SAID and recovered.contents.lost == []
 
 
 def test_a_message_that_is_cut_off_swallows_none_behind_it(bag: Path) -> None:
