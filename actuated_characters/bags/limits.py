@@ -33,6 +33,11 @@ def check_size(what: str, size: int, limit: int) -> None:
         )
 
 
+def unpack_message(stored: bytes, *, packed: bool) -> bytes:
+    """Return a message as it was serialised; `packed` if zstd compressed it. Raises as `unpack`."""
+    return unpack("a message", stored, ZSTD if packed else "", MOST_OF_MESSAGE)
+
+
 def unpack(what: str, packed: bytes, compression: str, limit: int) -> bytes:
     """Unpack one frame of `zstd` or `lz4`, or nothing where `compression` is empty.
 

@@ -80,9 +80,7 @@ def _messages(
         if not is_bag:  # no metadata says it
             packed = stored.startswith(storage.ZSTD_MAGIC)
         try:
-            raw = limits.unpack(
-                "a message", stored, storage.ZSTD if packed else "", limits.MOST_OF_MESSAGE
-            )
+            raw = limits.unpack_message(stored, packed=packed)
         except limits.LimitError as error:
             raise ValueError(f"on '{topic.name}' {error}") from error
         yield RecordedMessage(topic.name, log_time_ns, raw, topic.type_name)

@@ -119,23 +119,23 @@ def _salvage(
             for count, message in enumerate(file.messages()):
                 if count % _REPORT_PERIOD == 0:
                     progress("recovering", (number + file.fraction) / len(files))
+                packed = message.raw.startswith(storage.ZSTD_MAGIC)
+                file.is_compressed |= packed
                 try:
-                    topic, raw = _checked(message, types), _unpacked(file, message.raw)
+                    _check(message, types)
+                    raw = limits.unpack_message(message.raw, packed=packed)
                 except limits.DAMAGED as error:
                     file.lost[str(error)] += 1
                 else:
-                    yield topic, raw, message.log_time_ns
+                    yield message.topic, raw, message.log_time_ns
         except RecordingError as error:  # another file may be sound
             contents.lost.append(str(error))
         if file.damage:
             contents.lost.append(f"{file.path.name}: {file.damage}")
 
 
-def _checked(message: StoredMessage, types: dict[str, str]) -> StoredTopic:
-    """Return the topic of a message that a bag can hold; raises ValueError for another.
-
-    `types` has the type of each topic so far: a bag has one of each.
-    """
+def _check(message: StoredMessage, types: dict[str, str]) -> None:
+    """Raise ValueError for a message that a bag cannot hold; `types` has its topics so far."""
     topic = message.topic
     if topic.serialization != CDR:
         raise ValueError(f"message on '{topic.name}' as {topic.serialization}, not as {CDR}")
@@ -143,15 +143,6 @@ def _checked(message: StoredMessage, types: dict[str, str]) -> StoredTopic:
         raise ValueError(f"message on '{topic.name}' of another type, {topic.type_name}")
     if message.log_time_ns > storage.LATEST_NS:
         raise ValueError("message of an impossible time")
-    return topic
-
-
-def _unpacked(file: McapFile, stored: bytes) -> bytes:
-    """Return a message as it was serialised, or raise an error of `limits.DAMAGED`."""
-    packed = stored.startswith(storage.ZSTD_MAGIC)
-    file.is_compressed |= packed
-    compression = storage.ZSTD if packed else ""
-    return limits.unpack("a message", stored, compression, limits.MOST_OF_MESSAGE)
 
 
 def _announce(topic: StoredTopic, bag: BagWriter, announced: set[str]) -> None:

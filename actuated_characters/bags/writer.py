@@ -7,7 +7,6 @@ import shutil
 import sqlite3
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -122,18 +121,15 @@ class BagWriter:
         self.announce(topic, read_definition(message_type), [_offered(qos)])
 
     def announce(self, topic: str, definition: MessageDefinition, offered: Sequence[Qos]) -> None:
-        """Announce a topic of a type that need not be installed.
-
-        Raises:
-            RecordingError: The recording is closed or has the topic already, or the disk refuses
-                the data.
-        """
+        """Announce a topic of a type that need not be installed. Raises as `add_topic`."""
         self._check_new(topic)
-        add = partial(
-            self._writer.add_connection, msgdef=definition.text, rihs01=definition.type_hash
-        )
         self._connections[topic] = self._attempt(
-            partial(add, offered_qos_profiles=offered), topic, definition.type_name
+            self._writer.add_connection,
+            topic,
+            definition.type_name,
+            msgdef=definition.text,
+            rihs01=definition.type_hash,
+            offered_qos_profiles=offered,
         )
 
     def write(self, topic: str, raw: bytes, log_time_ns: int) -> None:
@@ -197,10 +193,10 @@ class BagWriter:
         if topic in self._connections:
             raise RecordingError(f"recording {self.path} has topic '{topic}' already")
 
-    def _attempt(self, act: Callable[..., _T], *arguments: Any) -> _T:
+    def _attempt(self, act: Callable[..., _T], *arguments: Any, **options: Any) -> _T:
         """Write, or give up the file, whose end is undefined then: without index and metadata."""
         try:
-            return act(*arguments)
+            return act(*arguments, **options)
         except _DISK_ERRORS as error:
             self._is_open = False
             with suppress(*_DISK_ERRORS):  # it flushes once more, to the same full disk

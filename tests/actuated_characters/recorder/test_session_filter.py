@@ -3,7 +3,7 @@
 import json
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
@@ -64,6 +64,7 @@ _any_messages = st.lists(
 )
 
 
+@settings(deadline=None)
 @given(_any_messages)
 def test_of_any_interleaving_all_of_one_simulator_is_kept_and_nothing_of_others(
     messages: list[Heard],
@@ -82,6 +83,7 @@ def test_of_any_interleaving_all_of_one_simulator_is_kept_and_nothing_of_others(
     assert len({read_session(message) for message in passed} - {None}) <= 1
 
 
+@settings(deadline=None)
 @given(_any_messages)
 def test_a_session_that_is_given_is_the_only_one_from_the_first_message_on(
     messages: list[Heard],
