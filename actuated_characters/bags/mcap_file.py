@@ -39,7 +39,7 @@ _LEAST_HELD = 200  # bytes that a message takes in memory beside its own
 
 
 class McapFile:
-    """An MCAP file, and what of it could not be read so far.
+    """An MCAP file, and the damage that was found in it so far.
 
     A chunk whose checksum or compression is wrong is left out whole; nothing is found after a
     record that is cut off.
@@ -243,7 +243,7 @@ class _CutOffError(ValueError):
     """A record ends behind the end of its file or chunk."""
 
     def __init__(self, size: int) -> None:
-        """`size` is what there is of it, bytes."""
+        """`size` is that of the part that is there, bytes."""
         super().__init__(f"{_CUT_OFF} ({size})")
         self.size = size
 

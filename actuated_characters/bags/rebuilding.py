@@ -1,4 +1,4 @@
-"""Builds the character of a recording from the texts in it, not from what is installed today."""
+"""Builds the character of a recording from the texts in it, not from today's files."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -155,7 +155,7 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
     Raises:
         RecordingError: there is no complete bag; it holds no states, those of several simulators
             in one namespace, or not every tick; or its character cannot be rebuilt.
-        ActuatedCharactersError: a message is not what its topic should carry.
+        ActuatedCharactersError: a message has not its topic's type and meaning.
     """
     bag = find_bag(path)
     characters, worlds = _collect(bag)
@@ -288,5 +288,5 @@ def _references(stamps: IntArray, found: States, size: int) -> tuple[FloatArray,
 
 
 def _at(stamps: list[int], found: Mapping[int, _T], missing: Any) -> tuple[_T, ...]:
-    """What was found at each stamp, and `missing` at others; empty if nothing ever was."""
+    """The value of each stamp, `missing` where there is none; empty if there are no values."""
     return tuple(found.get(stamp, missing) for stamp in stamps) if found else ()

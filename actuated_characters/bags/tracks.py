@@ -99,7 +99,7 @@ class WorldTimeline:
         """Take a message on one of `TOPICS`.
 
         Raises:
-            MessageError: it is not what the topic should carry.
+            MessageError: it is no message of the topic's type and meaning.
         """
         if name == topics.THROW.name:
             self.throws_sent += 1
@@ -168,7 +168,7 @@ class CharacterTimeline:
         """Take a message on one of `TOPICS`.
 
         Raises:
-            ActuatedCharactersError: it is not what the topic should carry.
+            ActuatedCharactersError: it is no message of the topic's type and meaning.
         """
         if name == CONFIGURATION:
             self._configure(raw)
@@ -185,7 +185,7 @@ class CharacterTimeline:
             self._take[name](raw, published_ns)
 
     def finish(self) -> Rebuilt:
-        """Check that there are states of each tick; return what they are of.
+        """Check that there are states of each tick; return their character.
 
         Raises:
             RecordingError: there are none, or not all of them, or no first one of an episode.

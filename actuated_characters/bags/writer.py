@@ -208,7 +208,7 @@ class BagWriter:
 
 
 def _offered(qos: QoSProfile) -> Qos:
-    """The profile for rosbags; what is left open, as a publisher announces it (rosbag2 does so)."""
+    """The profile for rosbags; open values are those that a publisher announces, as in rosbag2."""
     return Qos(
         history=QosHistory(qos.history),
         depth=qos.depth,

@@ -54,10 +54,10 @@ PARAMETERS = [
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
-_LONGEST_END = 20.0  # s that what is on its way at the stop may take
+_LONGEST_END = 20.0  # s for the messages that are on their way at the stop
 _AT_ONCE = 1000  # messages of a topic, between flushes and answers to services
 _SERVICE_PERIOD = 0.1  # s between turns of the executor, which looks at each of many topics
-_FLUSH_PERIOD = 0.5  # s: what was published longer ago outlives even a kill of the recorder
+_FLUSH_PERIOD = 0.5  # s: messages that are older outlive even a kill of the recorder
 _SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
 
 
@@ -106,7 +106,7 @@ class RecorderNode(Node):
         self._readers.append(TopicReader(self, recorded))
 
     def run(self, stop: StopSignal) -> None:
-        """Record until `stop`, then take what is still on its way and write the figures.
+        """Record until `stop`, then take the messages on their way and write the figures.
 
         Raises:
             RecordingError: ticks were missing, or the bag could not be written.
@@ -131,7 +131,7 @@ class RecorderNode(Node):
         self._conclude()
 
     def _drain_rest(self) -> None:
-        """Take what was there at the stop, as far as that is done in a reasonable time."""
+        """Take the messages that were there at the stop, within a reasonable time."""
         deadline = time.monotonic() + _LONGEST_END
         for _ in range(topics.LISTENING_DEPTH // _AT_ONCE):  # no more was there
             if not self._drain(gives_way=False):

@@ -113,7 +113,7 @@ def _recorded(node: Node, topic: Topic, character: str | None) -> RecordedTopic:
 
 
 class NamedTopics:
-    """Looks for topics by their names alone: the publishers say type and quality of service."""
+    """Looks for topics by their names alone; publishers have the type and quality of service."""
 
     def __init__(self, node: Node, names: Sequence[str], known: Collection[str]) -> None:
         """Look for all names, resolved, but those that are known.
@@ -128,7 +128,7 @@ class NamedTopics:
         """Names of which no publisher was seen so far."""
 
     def look(self) -> Iterator[tuple[RecordedTopic, QoSProfile]]:
-        """Those that have a publisher now, each once, with what the first one offers.
+        """Yield topics that have a publisher now, each once, with the QoS of the first publisher.
 
         A type that is not installed is logged, and the topic not looked for any more.
         """
@@ -148,7 +148,7 @@ class NamedTopics:
 
 
 def fitting_qos(offers: Sequence[QoSProfile]) -> QoSProfile:
-    """The most that a subscription can ask for and still hear all of these publishers."""
+    """The strictest quality of service with which a subscription fits all of these publishers."""
     reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in offers)
     latched = all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
     return QoSProfile(

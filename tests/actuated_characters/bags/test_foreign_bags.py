@@ -201,14 +201,9 @@ def test_metadata_that_is_none_is_one_clear_line(bag: Path, text: str) -> None:
         texts(bag)
 
 
-def test_another_serialisation_is_refused_by_name(bag: Path) -> None:
-    file = write_mcap(bag / "bag_0.mcap", SAID, serialization="json")
-
+def test_a_file_of_no_ros_or_of_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="'/b' is serialised as json, not as cdr"):
-        texts(file)
-
-
-def test_an_mcap_file_of_no_ros_and_a_file_of_another_kind_are_refused(tmp_path: Path) -> None:
+        texts(write_mcap(tmp_path / "json.mcap", SAID, serialization="json"))
     with pytest.raises(RecordingError, match="its profile is not 'ros2'"):
         texts(write_mcap(tmp_path / "other.mcap", SAID, profile="x"))
     (tmp_path / "notes.txt").write_text("hello")

@@ -135,23 +135,25 @@ def test_names_may_come_in_any_order(walk: Made, tmp_path: Path) -> None:
     assert np.isnan(recording.reference_position).all()
 
 
-def test_a_state_that_was_published_again_counts_once(pendulum: Made, tmp_path: Path) -> None:
-    states = said_states(pendulum.plan, pendulum.states)
+def published_again(made: Made) -> list[Said]:
+    configuration, *states = without_rows(made)
     again = [states[0], *states[:3], states[1], states[2], *states[3:], states[-1]]
+    return [configuration, *again]
 
-    recording = read_recording(
-        write_bag(tmp_path / "bag", [said_configuration(pendulum.plan), *again])
-    )
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        published_again,
+        lambda made: [*made.messages()[1:], made.messages()[0]],  # the configuration at the end
+    ],
+)
+def test_a_repeated_state_counts_once_and_an_early_one_counts_too(
+    pendulum: Made, tmp_path: Path, make: Callable[[Made], list[Said]]
+) -> None:
+    recording = read_recording(write_bag(tmp_path / "bag", make(pendulum)))
 
     assert_same_states(recording, pendulum)
-
-
-def test_what_comes_before_the_configuration_counts_too(pendulum: Made, tmp_path: Path) -> None:
-    configuration, *rest = pendulum.messages()
-
-    assert_same_states(
-        read_recording(write_bag(tmp_path / "bag", [*rest, configuration])), pendulum
-    )
 
 
 def test_a_tick_that_was_a_reset_has_no_effort(pendulum: Made, tmp_path: Path) -> None:
