@@ -307,3 +307,20 @@ def test_an_sqlite_file_needs_no_recovering(bag: Path) -> None:
         recover(bag)
 
     assert [message.raw for message in read_messages(bag / "bag_0.db3")] == [s.cdr for s in SAID]
+
+
+def test_messages_that_a_bag_cannot_hold_are_left_out_and_named(bag: Path) -> None:
+    write_mcap(bag / "bag_0.mcap", SAID[:2])
+    write_mcap(bag / "bag_1.mcap", SAID[2:4], serialization="json")
+    other = write_mcap(bag / "bag_2.mcap", SAID[4:5], compression=CompressionType.NONE, close=False)
+    data = other.read_bytes().replace(b"std_msgs/msg/String", b"own_msgs/msg/Sample")
+    other.write_bytes(_without_checksums(data))
+
+    recovered = recover(bag)
+
+    assert texts(bag) == SAID[:2]
+    assert recovered.contents.lost == [
+        "bag_1.mcap: message on '/a' as json, not as cdr (1), "
+        "message on '/b' as json, not as cdr (1)",
+        "bag_2.mcap: message on '/a' of another type, own_msgs/msg/Sample (1)",
+    ]
