@@ -1,23 +1,39 @@
-"""Message definitions as a recording holds them, from the packages that are installed."""
+"""Message types and their definitions, from the packages that are installed."""
 
 import json
+from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from msgs_config.errors import RecordingError
 
 
 class MessageDefinition(NamedTuple):
-    """What a reader that knows nothing of a message type needs to decode it."""
+    """A message type as a bag describes it, so that any reader can decode it."""
 
     type_name: str  # as "sensor_msgs/msg/JointState"
     text: str  # the .msg file, then the .msg files of all types in it, each below its name
     type_hash: str  # of REP 2016, "RIHS01_" and 64 hexadecimal digits
 
 
+@cache
+def find_message_type(name: str) -> Any:
+    """Return the class of a type such as `std_msgs/msg/String`.
+
+    Raises:
+        RecordingError: it is not installed.
+    """
+    *namespace, last = name.split("/")
+    try:
+        return getattr(import_module(".".join(namespace)), last)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise RecordingError(f"message type {name} is not installed") from error
+
+
 def read_definition(message_type: type) -> MessageDefinition:
-    """The definition of a message type from the package that it is installed with.
+    """Read the definition of a message type from the package that it is installed with.
 
     Raises:
         RecordingError: A file of the definition is not installed.

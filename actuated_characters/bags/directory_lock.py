@@ -1,8 +1,8 @@
-"""A mark on a recording's directory that somebody is writing there, gone with its process."""
+"""A lock on a recording's directory while it is written, which ends with its process."""
 
 import fcntl
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,10 +11,10 @@ class DirectoryLock:
     """Holds a directory until `release`, or until its process ends, however that happens."""
 
     def __init__(self, directory: Path) -> None:
-        """Claim a directory.
+        """Lock a directory.
 
         Raises:
-            BlockingIOError: another claim holds it.
+            BlockingIOError: another lock holds it.
             OSError: there is no such directory, or no permission to look into it.
         """
         self._descriptor: int | None = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
@@ -23,38 +23,32 @@ class DirectoryLock:
         except BlockingIOError:
             self.release()
             raise
-        except OSError:  # a file system without locks: then nobody is told, and nobody is stopped
+        except OSError:  # a file system without locks: then nothing is locked
             self.release()
 
     def release(self) -> None:
-        """Let others claim it; releasing again does nothing."""
+        """Let others lock it; releasing again does nothing."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             with suppress(OSError):
                 os.close(descriptor)
 
 
-def writer_of(files: Collection[Path]) -> int | None:
-    """The number of a process that has one of some files open to write, None if there is none.
+def find_writer(files: Collection[Path]) -> int | None:
+    """Return the number of a process that has one of some files open to write, None if none has.
 
-    What other users' processes have open is seen by the superuser alone.
+    The superuser alone sees the files of other users' processes.
     """
     wanted = {(status.st_dev, status.st_ino) for status in map(os.stat, files)}
-    return next((number for number in _processes() if _writes(number, wanted)), None)
-
-
-def _processes() -> Iterator[int]:
-    return (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdecimal())
-
-
-def _writes(process: int, wanted: Collection[tuple[int, int]]) -> bool:
-    with suppress(OSError):  # it has ended, or is another user's
-        for descriptor in Path(f"/proc/{process}/fd").iterdir():
-            with suppress(OSError):  # it was closed meanwhile
-                status = descriptor.stat()
-                if (status.st_dev, status.st_ino) in wanted and _is_writable(descriptor):
-                    return True
-    return False
+    for process in Path("/proc").iterdir():
+        if process.name.isdecimal():
+            with suppress(OSError):  # it has ended, or is another user's
+                for descriptor in (process / "fd").iterdir():
+                    with suppress(OSError):  # it was closed meanwhile
+                        status = descriptor.stat()
+                        if (status.st_dev, status.st_ino) in wanted and _is_writable(descriptor):
+                            return int(process.name)
+    return None
 
 
 def _is_writable(descriptor: Path) -> bool:

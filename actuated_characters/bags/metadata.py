@@ -1,24 +1,23 @@
-"""What `metadata.yaml` says of a rosbag2 directory, whichever version of rosbag2 wrote it."""
+"""Reads the `metadata.yaml` of a rosbag2 directory, of any version of rosbag2."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-from actuated_characters.bags.storage import MCAP, SUFFIXES, ZSTD, reason
+from actuated_characters.bags.storage import CDR, MCAP, SUFFIXES, ZSTD, reason
 from actuated_characters.runs.run_directory import BAG
 from msgs_config import files
 from msgs_config.errors import RecordingError, one_of
 
 METADATA = "metadata.yaml"
-FILE, MESSAGE = "file", "message"  # what rosbag2 compressed; within MCAP the file itself tells
+FILE, MESSAGE = "file", "message"  # that rosbag2 compressed; MCAP's chunks tell themselves
 _LATEST_VERSION = 9  # of Jazzy
 _MOST = 1 << 22  # characters; of a hundred topics it has some 100,000
 _MOST_OF_VALUE = 1 << 16  # characters; rosbag2 wrote all of a topic's publishers into one text
-CDR = "cdr"  # the only serialisation that ROS 2 has
 
 
 class BagMetadata(NamedTuple):
-    """What a reader needs to know before it opens the files."""
+    """The files and topics of a bag."""
 
     files: tuple[Path, ...]  # in the order in which they were written
     topics: tuple[str, ...]
@@ -51,7 +50,7 @@ def read_metadata(bag: Path) -> BagMetadata:
 
 
 def load_metadata(bag: Path) -> Any:
-    """What `metadata.yaml` says, unchecked.
+    """Read the content of `metadata.yaml`, unchecked.
 
     Raises:
         RecordingError: it is no YAML, or too large.
@@ -67,35 +66,34 @@ def load_metadata(bag: Path) -> Any:
 
 
 def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
-    storage, paths = content["storage_identifier"], content["relative_file_paths"]
+    paths = content["relative_file_paths"]
     topics = [topic["topic_metadata"] for topic in content["topics_with_message_count"]]
+    others = {topic["serialization_format"] for topic in topics} - {CDR}
     mode = (content.get("compression_mode") or "").lower()  # rosbag2 writes it in capitals
     mode = "" if mode == "none" else mode
-    problem = None
-    if storage not in SUFFIXES:
-        problem = one_of("storage", storage, list(SUFFIXES))
-    elif mode not in ("", FILE, MESSAGE):
-        problem = one_of("compression mode", mode, [FILE, MESSAGE])
-    elif mode and content["compression_format"] != ZSTD:
-        problem = one_of("compression", content["compression_format"], [ZSTD])
-    elif any(topic["serialization_format"] != CDR for topic in topics):
-        problem = f"its messages are not serialised as {CDR}"
-    if problem is not None:
-        raise RecordingError(f"cannot read recording {bag}: {problem}")
+    found: dict[str, tuple[Any, Collection[str]]] = {
+        "storage": (content["storage_identifier"], SUFFIXES),
+        "compression mode": (mode, dict.fromkeys(["", FILE, MESSAGE])),
+        "compression": (content["compression_format"] if mode else ZSTD, {ZSTD}),
+        "serialisation": (max(others, default=CDR), {CDR}),
+    }
+    for what, (value, choices) in found.items():
+        if value not in choices:
+            problem = one_of(what, value, [choice for choice in choices if choice])
+            raise RecordingError(f"cannot read recording {bag}: {problem}")
     present = tuple(bag / PurePath(path).name for path in paths)  # once relative to `bag`'s parent
-    names = tuple(str(topic["name"]) for topic in topics)
-    return BagMetadata(present, names, mode)
+    return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode)
 
 
 def recover_hint(bag: Path, does: str) -> str:
-    """What follows in an error of a bag: what the command `recover` does, if it can."""
+    """The end of an error about a bag: what the command `recover` does, if it can do anything."""
     run = bag.parent if bag.name == BAG else bag
     can = bag.is_dir() and any(file.suffix == SUFFIXES[MCAP] for file in bag.iterdir())
     return f"; 'actuated_characters recover {run}' {does}" if can else ""
 
 
 def _missing(bag: Path) -> str:
-    """Why there is no metadata file, and what would help."""
+    """The reason why there is no metadata file, and a remedy."""
     if not bag.is_dir():
         return "there is no such directory"
     return f"it has no {METADATA}{recover_hint(bag, 'makes one')}"

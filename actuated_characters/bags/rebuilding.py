@@ -1,4 +1,4 @@
-"""Builds the character of a recording from the texts in it, not from what is installed today."""
+"""Builds the character of a recording from the texts in it, not from today's files."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,12 +32,12 @@ class RecordedWorld:
     namespace: str = ""  # of its simulator, without the leading slash
     name: str = ""  # the character's in it, where there were several
     characters: tuple[str, ...] = ()  # the names of all of them, in the order of their entry
-    terrain: UrdfOptions | None = None  # what lay there, beside the plane
+    terrain: UrdfOptions | None = None  # beside the plane
 
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """What a simulator's `~/configuration` says, rebuilt."""
+    """A simulator's `~/configuration`, and the character and world that are built from it."""
 
     character: Character
     known: RunConfiguration

@@ -1,28 +1,26 @@
-"""Reads what a bag says of a run, as arrays."""
+"""Reads the recordings of characters from a bag, as arrays."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
 from actuated_characters.bags.plans import PlanArrays
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rebuilding import RecordedWorld
+from actuated_characters.bags.storage import SUFFIXES
 from actuated_characters.bags.tracks import (
     CONFIGURATION,
-    MODE,
-    PLAN,
     CharacterTimeline,
     CommandArrays,
     ControllerSettings,
     ModeChange,
-    integers,
-    matrix,
+    States,
+    WorldTimeline,
 )
-from actuated_characters.bags.world_track import WORLD_TOPICS, WorldTrack
 from actuated_characters.runs.run_directory import BAG
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointLayout
@@ -44,26 +42,13 @@ __all__ = [
     "read_recordings",
 ]
 
-_READ = (
-    CONFIGURATION,
-    topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name,
-    topics.REFERENCE.of(topics.CONTROLLER_NODE).name,
-    MODE,
-    PLAN,
-    topics.JOINT_STATES.name,
-    topics.JOINT_TORQUES.name,
-    topics.CONTACTS.name,
-    topics.APPLIED_WRENCH.name,
-    topics.EXTERNAL_WRENCH.name,
-)
-_STORAGE = (".mcap", ".db3")  # rosbag2's files, compressed or not
-
 Wrenches: TypeAlias = tuple[WrenchArrays | None, ...]
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """What a bag says of a run of n degrees of freedom: t ticks, and the t + 1 states around them.
+    """A character of n degrees of freedom in a bag: t ticks, and the t + 1 states around them.
 
     Tick k leads from state k to state k + 1. Units and frames: docs/design.md, "Names, states and
     torques".
@@ -80,17 +65,16 @@ class Recording:
     effort: FloatArray  # (t, n), as really applied in each tick; NaN in one that was a reset
     reference_position: FloatArray  # (t + 1, n), NaN where there was none
     reference_velocity: FloatArray  # (t + 1, n)
-    contacts: Wrenches  # (t,): in each tick, None where nothing was said; () if never
+    contacts: Wrenches  # (t,): in each tick, None where no message came; () if never
     applied_wrench: Wrenches  # likewise: pushes
     commands: tuple[tuple[CommandArrays, ...], ...]  # (t + 1,): that answer each state, in order
     controller: tuple[ControllerSettings, ...] = ()  # one after another
-    modes: tuple[ModeChange, ...] = ()  # what it did, one after another
-    plans: tuple[PlanArrays, ...] = ()  # what a planner expected, one after another
+    modes: tuple[ModeChange, ...] = ()  # of the controller, one after another
+    plans: tuple[PlanArrays, ...] = ()  # of a planner, one after another
     unstamped_commands: tuple[CommandArrays, ...] = ()  # that answer no state, in real time
     pushes_sent: int = 0  # messages on `external_wrench`
-    throws: tuple[
-        tuple[ProjectileThrow, ...], ...
-    ] = ()  # (t,): what each tick began with; () if nothing
+    # (t,): those that each tick began with; () if there were none
+    throws: tuple[tuple[ProjectileThrow, ...], ...] = ()
     balls: tuple[BallStates | None, ...] = ()  # (t + 1,): where they are; () if there are none
     throws_sent: int = 0  # messages on `throw`
     skipped_states: int = 0  # of an episode whose first state is not in the bag
@@ -114,6 +98,21 @@ class Recording:
             return np.zeros(1, dtype=np.intp)
         resets = np.flatnonzero(np.isnan(self.effort).all(axis=1)) + 1
         return np.concatenate(([0], resets))
+
+    def rows(self, rows: slice) -> "Recording":
+        """Return the recording of some of its states, and of the ticks between them.
+
+        Args:
+            rows: First state, and the one behind the last.
+        """
+        ticks = slice(rows.start, rows.stop - 1)
+        by_state = (
+            *("stamps_ns", "published_ns", "position", "velocity", "balls", "commands"),
+            *("reference_position", "reference_velocity"),
+        )
+        by_tick = ("effort", "contacts", "applied_wrench", "throws")
+        cut = {name: getattr(self, name)[rows] for name in by_state}
+        return replace(self, **cut, **{name: getattr(self, name)[ticks] for name in by_tick})
 
 
 def read_recording(path: Path, character: str | None = None) -> Recording:
@@ -147,8 +146,8 @@ def read_recording(path: Path, character: str | None = None) -> Recording:
 def read_recordings(path: Path) -> tuple[Recording, ...]:
     """Read every character's part of the bag in a run's directory, or of a bag itself.
 
-    They come in the order in which they are in their world. What comes before the first state of
-    an episode is left out.
+    They come in the order in which they are in their world. Messages before the first state of an
+    episode are left out.
 
     Args:
         path: The directory that a run, a recorder or `ros2 bag record` has left.
@@ -156,24 +155,24 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
     Raises:
         RecordingError: there is no complete bag; it holds no states, those of several simulators
             in one namespace, or not every tick; or its character cannot be rebuilt.
-        ActuatedCharactersError: a message is not what its topic should carry.
+        ActuatedCharactersError: a message has not its topic's type and meaning.
     """
     bag = find_bag(path)
-    found, worlds = _read(bag)
-    tracks = [track for track in found if track.rebuilt is not None]
-    if not tracks:
+    characters, worlds = _collect(bag)
+    known = [timeline for timeline in characters if timeline.rebuilt is not None]
+    if not known:
         raise RecordingError(
             f"recording {bag} has nothing on '{CONFIGURATION}', which says what its states mean"
         )
     recordings = []
-    for track in tracks:
-        with _named(bag, track.namespace):
-            recordings.append(_recording(track, worlds))
+    for timeline in known:
+        with _naming(bag, timeline):
+            recordings.append(_make_recording(timeline, worlds))
     return tuple(sorted(recordings, key=_place))
 
 
 def find_bag(path: Path) -> Path:
-    """The bag in a run's directory, or the bag itself.
+    """Return the bag in a run's directory, or the bag itself.
 
     Raises:
         RecordingError: there is none.
@@ -181,13 +180,10 @@ def find_bag(path: Path) -> Path:
     if not path.exists():
         raise RecordingError(f"no run or recording at {path}")
     bag = path / BAG if (path / BAG).is_dir() else path
-    if path.is_dir() and bag == path and not any(_is_storage(file) for file in path.iterdir()):
+    is_run = path.is_dir() and bag == path
+    if is_run and not any({*file.suffixes} & {*SUFFIXES.values()} for file in path.iterdir()):
         raise RecordingError(f"no recording in {path}: it is no bag, and the run there left none")
     return bag
-
-
-def _is_storage(file: Path) -> bool:
-    return any(suffix in _STORAGE for suffix in file.suffixes)
 
 
 def _place(recording: Recording) -> tuple[str, int, str]:
@@ -198,117 +194,99 @@ def _place(recording: Recording) -> tuple[str, int, str]:
 
 
 @contextmanager
-def _named(bag: Path, namespace: str) -> Iterator[None]:
-    """Say of which recording an error is."""
+def _naming(bag: Path, timeline: CharacterTimeline | WorldTimeline) -> Iterator[None]:
+    """Let errors begin with the bag and the namespace."""
     try:
         yield
     except ActuatedCharactersError as error:
-        where = f"{bag}, '{namespace}'" if namespace else f"{bag}"
+        where = f"{bag}, '{timeline.namespace}'" if timeline.namespace else f"{bag}"
         raise type(error)(f"recording {where}: {error}") from error
 
 
-def _read(bag: Path) -> tuple[list[CharacterTimeline], dict[str, WorldTrack]]:
-    """What is said in each namespace, of topics that have the contract's names."""
-    tracks: dict[str, CharacterTimeline] = {}
-    worlds: dict[str, WorldTrack] = {}
-    places: dict[
-        str, tuple[CharacterTimeline, str] | tuple[WorldTrack, str] | None
-    ] = {}  # by topic
+def _collect(bag: Path) -> tuple[list[CharacterTimeline], dict[str, WorldTimeline]]:
+    """Collect the messages of each namespace, on topics that have the contract's names."""
+    characters: dict[str, CharacterTimeline] = {}
+    worlds: dict[str, WorldTimeline] = {}
+    # by topic, its namespace's timeline and its name there
+    places: dict[str, tuple[CharacterTimeline | WorldTimeline, str] | None] = {}
     for message in read_messages(bag):
         topic = message.topic
         if topic not in places:
-            places[topic] = _world_of(topic, worlds) or _track_of(topic, tracks)
-        place = places[topic]
-        if place is None:
-            continue
-        track, name = place
-        try:
-            if isinstance(track, WorldTrack):
-                track.take(name, message.raw)
-            else:
-                track.take(name, message.raw, message.log_time_ns)
-        except ActuatedCharactersError:
-            with _named(bag, "" if isinstance(track, WorldTrack) else track.namespace):
-                raise
-    return list(tracks.values()), worlds
+            places[topic] = _timeline(topic, WorldTimeline, worlds) or _timeline(
+                topic, CharacterTimeline, characters
+            )
+        if (place := places[topic]) is not None:
+            timeline, name = place
+            try:
+                timeline.take(name, message.raw, message.log_time_ns)
+            except ActuatedCharactersError:
+                with _naming(bag, timeline):
+                    raise
+    return list(characters.values()), worlds
 
 
-def _world_of(topic: str, worlds: dict[str, WorldTrack]) -> tuple[WorldTrack, str] | None:
-    for name in WORLD_TOPICS:
+_Timeline = TypeVar("_Timeline", CharacterTimeline, WorldTimeline)
+
+
+def _timeline(
+    topic: str, kind: type[_Timeline], timelines: dict[str, _Timeline]
+) -> tuple[_Timeline, str] | None:
+    """The timeline that takes a topic's messages, and its name there; None if none of a kind."""
+    for name in kind.TOPICS:
         if f"/{topic}".endswith(f"/{name}"):
             namespace = topic.removesuffix(name).strip("/")
-            return worlds.setdefault(namespace, WorldTrack()), name
+            return timelines.setdefault(namespace, kind(namespace)), name
     return None
 
 
-def _track_of(
-    topic: str, tracks: dict[str, CharacterTimeline]
-) -> tuple[CharacterTimeline, str] | None:
-    for name in _READ:
-        if f"/{topic}".endswith(f"/{name}"):
-            namespace = topic.removesuffix(name).strip("/")
-            return tracks.setdefault(namespace, CharacterTimeline(namespace)), name
-    return None
-
-
-def _recording(track: CharacterTimeline, worlds: Mapping[str, WorldTrack]) -> Recording:
-    """What a track has collected. Raises RecordingError if it is not whole."""
-    track.finish()
-    assert track.rebuilt is not None
-    rebuilt, states, size = track.rebuilt, track.states, track.rebuilt.known.layout.size
-    stamps = integers(states.stamps_ns)
-    count = len(stamps)
-    reference_position, reference_velocity = _references(stamps, track)
-    world, known = worlds.get(rebuilt.world.namespace, WorldTrack()), set(stamps.tolist())
+def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimeline]) -> Recording:
+    """Turn a timeline into arrays. Raises RecordingError if it is not whole."""
+    rebuilt = timeline.finish()
+    known, states, size = rebuilt.known, timeline.states, rebuilt.known.layout.size
+    world = worlds.get(rebuilt.world.namespace, WorldTimeline(""))
+    stamps = states.integers("stamps_ns")
+    stamp_list = stamps.tolist()
+    ends, plans = stamp_list[1:], timeline.plans
+    reference_position, reference_velocity = _references(stamps, timeline.references, size)
     return Recording(
         character=rebuilt.character,
-        name=track.namespace,
-        parameters=rebuilt.known.parameters,
-        versions=rebuilt.known.versions,
+        name=timeline.namespace,
+        parameters=known.parameters,
+        versions=known.versions,
         stamps_ns=stamps,
-        published_ns=integers(states.published_ns),
-        position=matrix(states.position, size, count),
-        velocity=matrix(states.velocity, size, count),
-        effort=matrix(states.effort, size, count)[1:],  # the first state has none
+        published_ns=states.integers("published_ns"),
+        position=states.rows("position", size),
+        velocity=states.rows("velocity", size),
+        effort=states.rows("effort", size)[1:],  # the first state has none
         reference_position=reference_position,
         reference_velocity=reference_velocity,
-        contacts=_by_tick(stamps, track.contacts),
-        applied_wrench=_by_tick(stamps, track.applied_wrench),
-        commands=tuple(tuple(track.commands.get(stamp, ())) for stamp in stamps.tolist()),
-        controller=tuple(track.controller),
-        modes=tuple(track.modes),
-        plans=tuple(plan for stamp, plan in sorted(track.plans.items()) if stamp in known),
-        unstamped_commands=tuple(track.commands.get(0, ())),
-        pushes_sent=track.pushes_sent,
-        throws=_throws(stamps, world),
-        balls=tuple(map(world.balls.get, stamps.tolist())) if world.balls else (),
+        contacts=_at(ends, timeline.wrenches[topics.CONTACTS.name], None),
+        applied_wrench=_at(ends, timeline.wrenches[topics.APPLIED_WRENCH.name], None),
+        commands=tuple(tuple(timeline.commands.get(stamp, ())) for stamp in stamp_list),
+        controller=tuple(timeline.controller),
+        modes=tuple(timeline.modes),
+        plans=tuple(plans[stamp] for stamp in sorted(plans.keys() & set(stamp_list))),
+        unstamped_commands=tuple(timeline.commands.get(0, ())),
+        pushes_sent=timeline.pushes_sent,
+        throws=_at(ends, world.throws, ()),
+        balls=_at(stamp_list, world.balls, None),
         throws_sent=world.throws_sent,
-        skipped_states=track.skipped_states,
+        skipped_states=timeline.skipped_states,
         world=rebuilt.world,
     )
 
 
-def _references(stamps: IntArray, track: CharacterTimeline) -> tuple[FloatArray, FloatArray]:
+def _references(stamps: IntArray, found: States, size: int) -> tuple[FloatArray, FloatArray]:
     """Position and velocity (t + 1, n) of the reference at each state, NaN where there is none."""
-    size, said = track.size, track.references
-    at = integers(said.stamps_ns)
+    at = found.integers("stamps_ns")
     rows = np.minimum(np.searchsorted(stamps, at), len(stamps) - 1)
     known = stamps[rows] == at
-    found = []
-    for numbers in (said.position, said.velocity):
-        values = np.full((len(stamps), size), np.nan)
-        values[rows[known]] = matrix(numbers, size, len(at))[known]
-        found.append(values)
-    return found[0], found[1]
+    position, velocity = (np.full((len(stamps), size), np.nan) for _ in range(2))
+    position[rows[known]] = found.rows("position", size)[known]
+    velocity[rows[known]] = found.rows("velocity", size)[known]
+    return position, velocity
 
 
-def _by_tick(stamps: IntArray, said: dict[int, WrenchArrays]) -> Wrenches:
-    """What acted in each tick, as it was said with the stamp of the state after it."""
-    return tuple(said.get(stamp) for stamp in stamps.tolist()[1:]) if said else ()
-
-
-def _throws(stamps: IntArray, world: WorldTrack) -> tuple[tuple[ProjectileThrow, ...], ...]:
-    """What each tick began with, as it was said with the stamp of the state after it."""
-    if not world.throws:
-        return ()
-    return tuple(tuple(world.throws.get(stamp, ())) for stamp in stamps.tolist()[1:])
+def _at(stamps: list[int], found: Mapping[int, _T], missing: Any) -> tuple[_T, ...]:
+    """The value of each stamp, `missing` where there is none; empty if there are no values."""
+    return tuple(found.get(stamp, missing) for stamp in stamps) if found else ()

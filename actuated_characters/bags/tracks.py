@@ -1,11 +1,11 @@
-"""Collects what a bag says of one character, message by message, as arrays that grow."""
+"""Collects the messages of a bag on one character or one world, as arrays that grow."""
 
 import json
 from array import array
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from std_msgs.msg import String
@@ -13,27 +13,30 @@ from std_msgs.msg import String
 from actuated_characters.bags.plans import PlanArrays, decode_plan
 from actuated_characters.bags.rebuilding import Rebuilt, rebuild
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.errors import LayoutError, MessageError, RecordingError
+from msgs_config.errors import CommandError, LayoutError, MessageError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder, decode, state_in_layout
+from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
 from msgs_config.messages.session import ANONYMOUS, session_of
+from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
 from msgs_config.parameters import with_present_names
 from msgs_config.shared_parameters import RATE
 
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 _CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name
-MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
-PLAN = topics.PLAN.of(topics.CONTROLLER_NODE).name
+_MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
+_PLAN = topics.PLAN.of(topics.CONTROLLER_NODE).name
 _REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
+_UNREADABLE = (ValueError, KeyError, TypeError, RecursionError)  # JSON of another controller
 _MOST_EARLY = 50_000  # messages before the configuration, which is latched and comes first
 _MOST_NAMED = 3  # gaps
 
 
 @dataclass(frozen=True, slots=True)
 class CommandArrays:
-    """A command as it was sent, in the sender's order; what was made of it is another matter."""
+    """A command as it was sent, in the sender's order, whether the simulator took it or not."""
 
     names: tuple[str, ...]  # (m,)
     efforts: FloatArray  # (m,) N m or N
@@ -50,7 +53,7 @@ class ControllerSettings:
 
 @dataclass(frozen=True)
 class ModeChange:
-    """What a controller does from a state on, and what led to it."""
+    """The mode of a controller from a state on, and the facts that led to it."""
 
     stamp_ns: int
     mode: str
@@ -59,7 +62,7 @@ class ModeChange:
 
 @dataclass
 class States:
-    """States of consecutive ticks, as they come."""
+    """States one after another, their numbers in one row."""
 
     stamps_ns: "array[int]" = field(default_factory=lambda: array("q"))
     published_ns: "array[int]" = field(default_factory=lambda: array("q"))
@@ -67,78 +70,122 @@ class States:
     velocity: "array[float]" = field(default_factory=lambda: array("d"))
     effort: "array[float]" = field(default_factory=lambda: array("d"))
 
+    def integers(self, name: str) -> IntArray:
+        """Stamps or times of publishing (t,), ns."""
+        return np.frombuffer(getattr(self, name), dtype=np.int64)
 
-def matrix(numbers: "array[float]", columns: int, rows: int) -> FloatArray:
-    """Rows of numbers that came one after another, (rows, columns)."""
-    return np.frombuffer(numbers, dtype=float).reshape(rows, columns)
+    def rows(self, name: str, size: int) -> FloatArray:
+        """Positions, velocities or efforts (t, size)."""
+        return np.frombuffer(getattr(self, name)).reshape(len(self.stamps_ns), size)
 
 
-def integers(numbers: "array[int]") -> IntArray:
-    """Whole numbers that came one after another."""
-    return np.frombuffer(numbers, dtype=np.int64)
+class WorldTimeline:
+    """All messages on the balls in one namespace."""
+
+    TOPICS: ClassVar = tuple(
+        topic.name for topic in (topics.THROW, topics.APPLIED_THROW, topics.THROWN)
+    )
+
+    def __init__(self, namespace: str) -> None:
+        """`namespace` is without the leading slash."""
+        self.namespace = namespace
+        # by the stamp of the state after the tick
+        self.throws: dict[int, tuple[ProjectileThrow, ...]] = {}
+        self.balls: dict[int, BallStates] = {}  # by stamp
+        self.throws_sent = 0
+        self._codec = ThrowCodec()
+
+    def take(self, name: str, raw: bytes, published_ns: int) -> None:
+        """Take a message on one of `TOPICS`.
+
+        Raises:
+            MessageError: it is no message of the topic's type and meaning.
+        """
+        if name == topics.THROW.name:
+            self.throws_sent += 1
+        elif name == topics.THROWN.name:
+            balls = decode_balls(raw)
+            self.balls[balls.stamp_ns] = balls
+        else:
+            try:
+                stamp_ns, throw = self._codec.decode(raw)
+            except CommandError as error:
+                raise MessageError(f"'{name}' has a throw that cannot be: {error}") from error
+            self.throws[stamp_ns] = (*self.throws.get(stamp_ns, ()), throw)
 
 
 class CharacterTimeline:
-    """All that is said in one namespace.
+    """All messages on one character, which is in one namespace.
 
-    What a message means is known with the simulator's configuration; what comes before it is kept.
-    States before the first one of an episode are left out.
+    The simulator's configuration says what a message means; messages before it are kept until it
+    comes. States before the first one of an episode are left out.
     """
+
+    TOPICS: ClassVar = (
+        CONFIGURATION,
+        _CONTROLLER,
+        _REFERENCE,
+        _MODE,
+        _PLAN,
+        topics.JOINT_STATES.name,
+        topics.JOINT_TORQUES.name,
+        topics.CONTACTS.name,
+        topics.APPLIED_WRENCH.name,
+        topics.EXTERNAL_WRENCH.name,
+    )
 
     def __init__(self, namespace: str) -> None:
         """`namespace` is without the leading slash."""
         self.namespace = namespace
         self.rebuilt: Rebuilt | None = None
-        self.states = States()
-        self.references = States()
-        self.contacts: dict[int, WrenchArrays] = {}  # by stamp, as all that follows
-        self.applied_wrench: dict[int, WrenchArrays] = {}
-        self.commands: dict[int, list[CommandArrays]] = {}
+        self.states, self.references = States(), States()
+        self.wrenches: dict[str, dict[int, WrenchArrays]] = {  # by topic and stamp
+            topics.CONTACTS.name: {},
+            topics.APPLIED_WRENCH.name: {},
+        }
+        self.commands: dict[int, list[CommandArrays]] = {}  # by stamp
         self.controller: list[ControllerSettings] = []
         self.modes: list[ModeChange] = []
-        self.plans: dict[int, PlanArrays] = {}
+        self.plans: dict[int, PlanArrays] = {}  # by stamp
         self.pushes_sent = 0
-        self._controller_text = self._configuration_text = ""
+        self.skipped_states = 0  # before the first one of an episode
+        self._configuration_text = self._controller_text = ""
         self._early: list[tuple[str, bytes, int]] = []
         self._early_lost = False
         self._gaps: list[tuple[int, int]] = []
         self._last_tick = 0
-        self.skipped_states = 0  # before the first one of an episode
         self._decoder, self._references, self._commands = (JointStateDecoder() for _ in range(3))
         self._take: dict[str, Callable[[bytes, int], None]] = {
             topics.JOINT_STATES.name: self._take_state,
             topics.JOINT_TORQUES.name: self._take_command,
-            topics.CONTACTS.name: self._take_contacts,
-            topics.APPLIED_WRENCH.name: self._take_applied,
-            topics.EXTERNAL_WRENCH.name: self._take_push,
             _REFERENCE: self._take_reference,
             _CONTROLLER: self._take_controller,
-            MODE: self._take_mode,
-            PLAN: self._take_plan,
+            _MODE: self._take_mode,
+            _PLAN: self._take_plan,
         }
 
-    @property
-    def size(self) -> int:
-        """Number of degrees of freedom."""
-        return self._layout.size
-
     def take(self, name: str, raw: bytes, published_ns: int) -> None:
-        """Take a message on the topic of that name, relative to the namespace.
+        """Take a message on one of `TOPICS`.
 
         Raises:
-            ActuatedCharactersError: it is not what the topic should carry.
+            ActuatedCharactersError: it is no message of the topic's type and meaning.
         """
         if name == CONFIGURATION:
             self._configure(raw)
-        elif self.rebuilt is not None:
-            self._take[name](raw, published_ns)
-        elif len(self._early) < _MOST_EARLY:
+        elif self.rebuilt is None and len(self._early) < _MOST_EARLY:
             self._early.append((name, raw, published_ns))
-        else:
+        elif self.rebuilt is None:
             self._early_lost = True
+        elif name in self.wrenches:
+            wrenches = decode_wrenches(raw)
+            self.wrenches[name][wrenches.stamp_ns] = wrenches
+        elif name == topics.EXTERNAL_WRENCH.name:
+            self.pushes_sent += 1
+        else:
+            self._take[name](raw, published_ns)
 
-    def finish(self) -> None:
-        """Check that there are states of each tick.
+    def finish(self) -> Rebuilt:
+        """Check that there are states of each tick; return their character.
 
         Raises:
             RecordingError: there are none, or not all of them, or no first one of an episode.
@@ -152,9 +199,11 @@ class CharacterTimeline:
             )
         if self._gaps:
             ranges = [f"{a} to {b}" if b > a else f"{a}" for a, b in self._gaps[:_MOST_NAMED]]
-            more = f" and {len(self._gaps) - _MOST_NAMED} more times"
-            tail = more if len(self._gaps) > _MOST_NAMED else ""
+            more = len(self._gaps) - _MOST_NAMED
+            tail = f" and {more} more times" if more > 0 else ""
             raise RecordingError(f"the states of ticks {', '.join(ranges)}{tail} are missing")
+        assert self.rebuilt is not None
+        return self.rebuilt
 
     def _configure(self, raw: bytes) -> None:
         text = decode(raw, String).data
@@ -165,12 +214,12 @@ class CharacterTimeline:
         if self._early_lost:
             raise RecordingError(f"'{CONFIGURATION}' comes only after {_MOST_EARLY} other messages")
         self.rebuilt, self._configuration_text = rebuild(text, self.namespace), text
-        rate = self.rebuilt.known.parameters.get(RATE.name)
+        known = self.rebuilt.known
+        rate = known.parameters.get(RATE.name)
         if not isinstance(rate, int):
             raise RecordingError(f"the simulator's 'rate' is {rate}, not a number")
-        self._session = self.rebuilt.known.session
-        self._layout, self._clock = self.rebuilt.known.layout, TickClock(rate)
-        self._nothing = np.full(self._layout.size, np.nan).tobytes()
+        self._layout, self._clock = known.layout, TickClock(rate)
+        self._no_effort = np.full(self._layout.size, np.nan).tobytes()
         early, self._early = self._early, []
         for message in early:
             self.take(*message)
@@ -197,16 +246,14 @@ class CharacterTimeline:
         kept.published_ns.append(published_ns)
         kept.position.frombytes(state.position.tobytes())
         kept.velocity.frombytes(state.velocity.tobytes())
-        kept.effort.frombytes(self._nothing if state.effort is None else state.effort.tobytes())
+        kept.effort.frombytes(self._no_effort if state.effort is None else state.effort.tobytes())
 
     def _check_repeated(self, tick: int, content: bytes) -> None:
-        """A state that is published again, as in a pause, is the same one."""
+        """Check that a state that is published again, as in a pause, is the same one."""
         row, size = tick - self._clock.tick(self.states.stamps_ns[0]), self._layout.size
-        if row < 0 or self._gaps:
-            return
         entries = slice(row * size, (row + 1) * size)
         known = self.states.position[entries].tobytes() + self.states.velocity[entries].tobytes()
-        if content != known:
+        if row >= 0 and not self._gaps and content != known:
             raise RecordingError(f"two states of tick {tick}; was its simulator restarted?")
 
     def _take_reference(self, raw: bytes, published_ns: int) -> None:
@@ -216,36 +263,23 @@ class CharacterTimeline:
         kept.velocity.frombytes(state.velocity.tobytes())
 
     def _take_command(self, raw: bytes, published_ns: int) -> None:
-        with suppress(MessageError):  # nor did the simulator take it
+        assert self.rebuilt is not None
+        with suppress(MessageError):  # the simulator did not take it either
             sent = self._commands.decode(raw)
-            if session_of(sent.frame_id) not in (ANONYMOUS, self._session):
-                return
-            command = CommandArrays(sent.names, sent.effort, published_ns)
-            self.commands.setdefault(sent.stamp_ns, []).append(command)
-
-    def _take_contacts(self, raw: bytes, published_ns: int) -> None:
-        wrenches = decode_wrenches(raw)
-        self.contacts[wrenches.stamp_ns] = wrenches
-
-    def _take_applied(self, raw: bytes, published_ns: int) -> None:
-        wrenches = decode_wrenches(raw)
-        self.applied_wrench[wrenches.stamp_ns] = wrenches
-
-    def _take_push(self, raw: bytes, published_ns: int) -> None:
-        self.pushes_sent += 1
+            if session_of(sent.frame_id) in (ANONYMOUS, self.rebuilt.known.session):
+                command = CommandArrays(sent.names, sent.effort, published_ns)
+                self.commands.setdefault(sent.stamp_ns, []).append(command)
 
     def _take_controller(self, raw: bytes, published_ns: int) -> None:
         text = decode(raw, String).data
         if text == self._controller_text:  # latched, it comes to each new listener
             return
         self._controller_text = text
-        with suppress(ValueError, KeyError, TypeError, RecursionError):  # of another controller
+        with suppress(*_UNREADABLE):
             content = json.loads(text)
-            settings = ControllerSettings(
-                with_present_names(dict(content["parameters"])),
-                content.get("parameters_after_stamp_ns"),
-            )
-            self.controller.append(settings)
+            parameters = with_present_names(dict(content["parameters"]))
+            since_ns = content.get("parameters_after_stamp_ns")
+            self.controller.append(ControllerSettings(parameters, since_ns))
 
     def _take_plan(self, raw: bytes, published_ns: int) -> None:
         with suppress(MessageError):  # of another controller
@@ -253,7 +287,7 @@ class CharacterTimeline:
             self.plans[plan.stamp_ns] = plan
 
     def _take_mode(self, raw: bytes, published_ns: int) -> None:
-        with suppress(ValueError, KeyError, TypeError, RecursionError):  # of another controller
+        with suppress(*_UNREADABLE):
             facts = dict(json.loads(decode(raw, String).data))
             change = ModeChange(int(facts.pop("stamp_ns")), str(facts.pop("mode")), facts)
             if change not in self.modes[-1:]:  # latched, it comes to each new listener

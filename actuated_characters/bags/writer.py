@@ -1,10 +1,14 @@
 """Writes recordings: rosbag2 directories of serialised messages, without ROS' rosbag2.
 
-What is written is version 9, as ROS 2 Jazzy's `ros2 bag record` writes it.
+They are of version 9, as ROS 2 Jazzy's `ros2 bag record` writes them; rosbags writes the files.
 """
 
+import shutil
+import sqlite3
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Self
+from typing import Any, Self, TypeVar
 
 from rclpy.duration import Duration, Infinite
 from rclpy.qos import LivelinessPolicy, QoSProfile
@@ -17,37 +21,88 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer, WriterError
+from rosbags.rosbag2.storage_mcap import McapWriter
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 
-from actuated_characters.bags.definitions import read_definition
-from actuated_characters.bags.storage import MCAP, NONE, BagFiles
-from msgs_config.errors import RecordingError, one_of
+from actuated_characters.bags.definitions import MessageDefinition, read_definition
+from actuated_characters.bags.directory_lock import DirectoryLock
+from actuated_characters.bags.storage import (
+    COMPRESSIONS,
+    LATEST_NS,
+    MCAP,
+    NONE,
+    SQLITE3,
+    STORAGES,
+    ZSTD,
+    reason,
+)
+from msgs_config.errors import ConfigurationError, RecordingError, one_of
 
-LATEST_NS = 2**63 - 1  # rosbag2 holds times in int64
+_PLUGINS = {MCAP: StoragePlugin.MCAP, SQLITE3: StoragePlugin.SQLITE3}
+_MODES = {MCAP: CompressionMode.STORAGE, SQLITE3: CompressionMode.MESSAGE}
+_DISK_ERRORS = (OSError, sqlite3.Error)  # raised by a write to a disk that is full or gone
 _NS_PER_S = 10**9
+_T = TypeVar("_T")
 
 
-class BagWriter(BagFiles):
+class BagWriter:
     """Writes serialised messages into a new rosbag2 directory.
 
     `close` makes the recording complete. Leaving the `with` block closes it after an error too:
-    what came before an error is what explains it. For one thread only. A signal handler must not
-    raise into `write` or `close`, which would leave half a record behind: let it set a flag.
+    the messages before an error are those that explain it. For one thread only. A signal handler
+    must not raise into `write` or `close`, which would leave half a record: let it set a flag.
     """
 
     def __init__(self, path: Path, *, storage: str = MCAP, compression: str = NONE) -> None:
-        """Create the directory `path`, and its parents.
+        """Create the directory `path`, and its parents; nothing stays of it where that fails.
 
         Args:
             path: Where the recording goes.
             storage: `mcap`, or `sqlite3` as ROS 2 Humble has it by default.
-            compression: `none` or `zstd`: about half the size.
+            compression: `none` or `zstd`, of MCAP's chunks or of each message: half the size.
 
         Raises:
             ConfigurationError: There is no such storage or compression.
             RecordingError: `path` exists already or cannot be created.
         """
-        super().__init__(path, storage, compression)
+        if storage not in STORAGES:
+            raise ConfigurationError(one_of("storage", storage, list(STORAGES)))
+        if compression not in COMPRESSIONS:
+            raise ConfigurationError(one_of("compression", compression, list(COMPRESSIONS)))
+        wrong = next((character for character in "?#%" if character in str(path)), None)
+        if storage == SQLITE3 and wrong is not None:  # SQLite takes it for a part of a URI
+            raise RecordingError(
+                f"recording {path}: storage sqlite3 allows no '{wrong}' in its path"
+            )
+        self.path = path
         self._connections: dict[str, Connection] = {}
+        try:
+            self._writer = Writer(path, version=9, storage_plugin=_PLUGINS[storage])
+            if compression == ZSTD:
+                self._writer.set_compression(_MODES[storage], CompressionFormat.ZSTD)
+            self._open()
+        except WriterError as error:
+            raise RecordingError(
+                f"recording {path} exists already; remove it or choose another directory"
+            ) from error
+        except _DISK_ERRORS as error:
+            raise RecordingError(f"cannot create recording {path}: {reason(error)}") from error
+        self._is_open = True
+
+    def _open(self) -> None:
+        try:
+            self._writer.open()
+            self._lock = DirectoryLock(self.path)  # against a recovery meanwhile
+        except _DISK_ERRORS:
+            with suppress(*_DISK_ERRORS):
+                self._writer.abort()
+            shutil.rmtree(self.path, ignore_errors=True)  # it was not there before
+            raise
+        storage = self._writer.storage
+        if isinstance(storage, Sqlite3Writer):
+            # A process that is killed loses nothing by it, and a commit does not wait for the disk.
+            storage.conn.execute("PRAGMA synchronous=OFF")
 
     def __enter__(self) -> Self:
         return self
@@ -62,11 +117,20 @@ class BagWriter(BagFiles):
             RecordingError: The recording is closed or has the topic already, the definition of
                 the message type is not installed, or the disk refuses the data.
         """
-        self.check_open()
-        if topic in self._connections:
-            raise RecordingError(f"recording {self.path} has topic '{topic}' already")
-        definition = read_definition(message_type)
-        self._connections[topic] = self.add(topic, definition, [_offered(qos)])
+        self._check_new(topic)
+        self.announce(topic, read_definition(message_type), [_offered(qos)])
+
+    def announce(self, topic: str, definition: MessageDefinition, offered: Sequence[Qos]) -> None:
+        """Announce a topic of a type that need not be installed. Raises as `add_topic`."""
+        self._check_new(topic)
+        self._connections[topic] = self._attempt(
+            self._writer.add_connection,
+            topic,
+            definition.type_name,
+            msgdef=definition.text,
+            rihs01=definition.type_hash,
+            offered_qos_profiles=offered,
+        )
 
     def write(self, topic: str, raw: bytes, log_time_ns: int) -> None:
         """Append a message, serialised as CDR; `log_time_ns` is when it was published, ns.
@@ -75,16 +139,76 @@ class BagWriter(BagFiles):
             RecordingError: The recording is closed, the topic was never added, the time is out of
                 range, or the disk refuses the data, which closes the recording.
         """
-        self.check_open()
+        self._check_open()
         if topic not in self._connections:
             raise RecordingError(one_of("topic", topic, list(self._connections)))
         if not 0 <= log_time_ns <= LATEST_NS:
             raise RecordingError(f"log time {log_time_ns} ns is not within 0 to {LATEST_NS} ns")
-        self.append(self._connections[topic], raw, log_time_ns)
+        self._attempt(self._writer.write, self._connections[topic], log_time_ns, raw)
+
+    def flush(self) -> None:
+        """Hand all that was written to the operating system.
+
+        Flushed data outlives this process, however that ends: `actuated_characters recover` makes
+        a recording of MCAP's, and SQLite's file can be read alone. Without it a killed recorder
+        loses up to the last MiB of MCAP, and all of SQLite.
+
+        Raises:
+            RecordingError: The recording is closed, or the disk refuses the data, which closes it.
+        """
+        self._check_open()
+        self._attempt(self._flush)
+
+    def _flush(self) -> None:
+        """rosbags has no public way to do it: this is the one place that knows its insides."""
+        storage = self._writer.storage
+        if isinstance(storage, McapWriter):
+            if storage.chunk.msgs:  # an empty chunk would be a record for nothing
+                storage.close_chunk()
+            storage.bio.flush()
+        elif isinstance(storage, Sqlite3Writer):
+            storage.conn.commit()
+
+    def close(self) -> None:
+        """Complete the recording: the rest of the messages, the index and the metadata.
+
+        Closing again does nothing.
+
+        Raises:
+            RecordingError: The disk refuses the data.
+        """
+        if self._is_open:
+            self._is_open = False
+            try:
+                self._attempt(self._writer.close)
+            finally:
+                self._lock.release()
+
+    def _check_open(self) -> None:
+        if not self._is_open:
+            raise RecordingError(f"recording {self.path} is closed")
+
+    def _check_new(self, topic: str) -> None:
+        self._check_open()
+        if topic in self._connections:
+            raise RecordingError(f"recording {self.path} has topic '{topic}' already")
+
+    def _attempt(self, act: Callable[..., _T], *arguments: Any, **options: Any) -> _T:
+        """Write, or give up the file, whose end is undefined then: without index and metadata."""
+        try:
+            return act(*arguments, **options)
+        except _DISK_ERRORS as error:
+            self._is_open = False
+            with suppress(*_DISK_ERRORS):  # it flushes once more, to the same full disk
+                self._writer.abort()
+            self._lock.release()
+            raise RecordingError(
+                f"recording {self.path} is incomplete, cannot write: {reason(error)}"
+            ) from error
 
 
 def _offered(qos: QoSProfile) -> Qos:
-    """The profile for rosbags; what is left open, as a publisher announces it (rosbag2 does so)."""
+    """The profile for rosbags; open values are those that a publisher announces, as in rosbag2."""
     return Qos(
         history=QosHistory(qos.history),
         depth=qos.depth,

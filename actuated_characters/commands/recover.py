@@ -12,7 +12,7 @@ from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.common.tables import make_table
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.bags.recovery.recover import Recovered
+    from actuated_characters.bags.recovery import Recovered
 
 _NS_PER_S = 10**9
 
@@ -36,7 +36,7 @@ def add_recover(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 
 def _recover(options: argparse.Namespace) -> None:
-    from actuated_characters.bags.recovery.recover import recover
+    from actuated_characters.bags.recovery import recover
 
     with progress_bar("", 1.0) as bar:
 

@@ -8,7 +8,7 @@ class LossCount:
 
     The numbers do not say which publisher they are of. A number that follows none of the last ones
     is the first of another publisher as long as there are more publishers than are known, and comes
-    after a gap otherwise. What was published before the first number that came is not missed.
+    after a gap otherwise. Messages before the first number that came are not missed.
     """
 
     def __init__(self, count_publishers: Callable[[], int]) -> None:
@@ -29,7 +29,7 @@ class LossCount:
         last.append(number)
 
     def _forget(self, number: int) -> None:
-        """Forget the last number of the publisher whose next one is this; count what is between."""
+        """Forget the last number of the publisher whose next one is this; count the gap."""
         last = self._last
         if number - 1 in last:
             last.remove(number - 1)

@@ -1,4 +1,4 @@
-"""`recorder`: writes what goes over the topics into a bag, and measures it."""
+"""`recorder`: writes the messages on the topics into a bag, and measures the run."""
 
 import os
 import time
@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from actuated_characters.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, MetricsCollector
-from actuated_characters.recorder.session_filter import Heard, SessionFilter, session_in
+from actuated_characters.recorder.session_filter import Heard, SessionFilter, read_session
 from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import (
     NamedTopics,
@@ -54,15 +54,15 @@ PARAMETERS = [
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
 ]
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
-_LONGEST_END = 20.0  # s that what is on its way at the stop may take
+_LONGEST_END = 20.0  # s for the messages that are on their way at the stop
 _AT_ONCE = 1000  # messages of a topic, between flushes and answers to services
 _SERVICE_PERIOD = 0.1  # s between turns of the executor, which looks at each of many topics
-_FLUSH_PERIOD = 0.5  # s: what was published longer ago outlives even a kill of the recorder
+_FLUSH_PERIOD = 0.5  # s: messages that are older outlive even a kill of the recorder
 _SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
 
 
 class RecorderNode(Node):
-    """Listens to everything and says nothing, so that it is never in the way of the loop."""
+    """Subscribes to all topics and publishes nothing, so that it never delays the loop."""
 
     def __init__(self, **options: Any) -> None:
         """Open the bag and the subscriptions; `options` are rclpy's own of every node.
@@ -78,7 +78,7 @@ class RecorderNode(Node):
         self._failure: str | None = None
         self._once_logger = OnceLogger(self)
         self._filter = SessionFilter(given_session(values), self._once_logger.log_once)
-        self._inboxes: list[TopicReader] = []
+        self._readers: list[TopicReader] = []
         characters = values.texts("characters") or ("",)
         wanted = contract_topics(
             self, characters, values.texts("exclude"), measured_only=not values.flag("write_bag")
@@ -103,20 +103,20 @@ class RecorderNode(Node):
         """Record a topic from now on, whose publishers offer this."""
         if self._bag is not None:
             self._bag.add_topic(recorded.name, recorded.topic.message_type, offered)
-        self._inboxes.append(TopicReader(self, recorded))
+        self._readers.append(TopicReader(self, recorded))
 
     def run(self, stop: StopSignal) -> None:
-        """Record until `stop`, then take what is still on its way and write the figures.
+        """Record until `stop`, then take the messages on their way and write the figures.
 
         Raises:
             RecordingError: ticks were missing, or the bag could not be written.
         """
-        spinner = PollingExecutor(self, _SERVICE_PERIOD)
+        executor = PollingExecutor(self, _SERVICE_PERIOD)
         due = {self._search: 0.0, self._flush: 0.0, self._tell_progress: 0.0}
         try:
             while not stop:
                 self._drain()
-                spinner.serve()
+                executor.serve()
                 now = time.monotonic()
                 for act, at in due.items():
                     if at <= now:
@@ -124,13 +124,14 @@ class RecorderNode(Node):
                 time.sleep(_DRAIN_PERIOD)
             self._drain_rest()
         finally:
-            spinner.close()
-            self._keep_all(self._filter.finish())
-            self._close_bag()
+            executor.close()
+            for message in self._filter.finish():
+                self._keep(message)
+            self._to_bag(lambda bag: bag.close())
         self._conclude()
 
     def _drain_rest(self) -> None:
-        """Take what was there at the stop, as far as that is done in a reasonable time."""
+        """Take the messages that were there at the stop, within a reasonable time."""
         deadline = time.monotonic() + _LONGEST_END
         for _ in range(topics.LISTENING_DEPTH // _AT_ONCE):  # no more was there
             if not self._drain(gives_way=False):
@@ -149,15 +150,19 @@ class RecorderNode(Node):
         return _SEARCH_PERIOD if self._named.missing else float("inf")
 
     def _flush(self) -> float:
+        if self._to_bag(lambda bag: bag.flush()) and self._progress_period > 0.0:
+            print(f"flushed {self._last_tick}", flush=True)
+        return _FLUSH_PERIOD
+
+    def _to_bag(self, act: Callable[[BagWriter], None]) -> bool:
+        """Do something with the bag; where it fails the run goes on, and is measured, without."""
         if self._bag is not None:
             try:
-                self._bag.flush()
+                act(self._bag)
             except RecordingError as error:
-                self._lose_bag(error)
-            else:
-                if self._progress_period > 0.0:
-                    print(f"flushed {self._last_tick}", flush=True)
-        return _FLUSH_PERIOD
+                self._fail(str(error))
+                self._bag = None
+        return self._bag is not None
 
     def _tell_progress(self) -> float:
         if self._progress_period == 0.0:
@@ -177,29 +182,22 @@ class RecorderNode(Node):
         or a flood from others would hold it up.
         """
         batch = [
-            Heard(inbox.recorded, raw, published_ns)
-            for inbox in self._inboxes
-            for published_ns, raw in inbox.take(_AT_ONCE)
+            Heard(reader.recorded, raw, published_ns)
+            for reader in self._readers
+            for published_ns, raw in reader.take(_AT_ONCE)
         ]
         batch.sort(key=lambda message: message.published_ns)
         for message in batch:
             if kept := self._filter.take(message):
-                self._keep_all(kept)
+                for each in kept:
+                    self._keep(each)
                 if gives_way:
                     os.sched_yield()
         return len(batch)
 
-    def _keep_all(self, messages: list[Heard]) -> None:
-        for message in messages:
-            self._keep(message)
-
     def _keep(self, message: Heard) -> None:
         recorded, raw, published_ns = message
-        try:
-            if self._bag is not None:
-                self._bag.write(recorded.name, raw, published_ns)
-        except RecordingError as error:  # the run goes on, and is measured, without its bag
-            self._lose_bag(error)
+        self._to_bag(lambda bag: bag.write(recorded.name, raw, published_ns))
         if recorded.own_name not in HEARD:
             return
         for name, collector in self._collectors.items():
@@ -209,70 +207,51 @@ class RecorderNode(Node):
                 collector.take(recorded.own_name, raw, published_ns)
             except ActuatedCharactersError as error:
                 sentence = f"cannot measure '{recorded.name}': {error}"
-                if self._filter.bound and session_in(message) is None:  # it may be from any node
+                if self._filter.bound and read_session(message) is None:  # it may be from any node
                     self._once_logger.log_once(sentence)
                 else:
                     self._fail(sentence)
 
-    def _lose_bag(self, error: RecordingError) -> None:
-        self._fail(str(error))
-        self._bag = None
-
-    def _close_bag(self) -> None:
-        try:
-            if self._bag is not None:
-                self._bag.close()
-        except RecordingError as error:
-            self._fail(str(error))
-
     def _conclude(self) -> None:
-        """Write the figures and say what was lost.
+        """Write the figures, and log which messages were lost.
 
         Raises:
             RecordingError: something failed, or states are missing.
         """
-        for inbox in self._inboxes:
-            if inbox.lost:
-                self.get_logger().warning(f"'{inbox.recorded.name}': {inbox.lost} messages lost")
+        for reader in self._readers:
+            if reader.lost:
+                self.get_logger().warning(f"'{reader.recorded.name}': {reader.lost} messages lost")
         for name in sorted(self._named.missing):
             self.get_logger().warning(f"nobody published on '{name}'")
         for name, collector in self._collectors.items():
-            of_it = f" of '{name}'" if name else ""
-            try:
-                figures, series = collector.results()
-                if dropped := figures["dropped_references"]:
-                    self.get_logger().warning(f"{dropped} references{of_it} belong to no state")
-                lost = {
-                    "lost_messages": self._counts(name, lambda inbox: inbox.lost),
-                    "foreign_messages": self._counts(name, self._dropped),
-                }
-                directory = figures_directory(self._directory, name, is_alone=not name)
-                write_figures(directory, figures | lost, series)
-            except RecordingError as error:
-                self._fail(f"{error}{of_it}")
-            if collector.last_tick <= FIRST_TICK and self._filter.dropped(self._states_of(name)):
-                self._fail(
-                    f"session {named(self._filter.bound)}{of_it} was recorded and never answered, "
-                    f"while others published states, too; {REMEDY}, or set '{SESSION.name}'"
-                )
-            if collector.missing_ticks:
-                self._fail(f"{collector.missing_ticks} ticks{of_it} were missed")
+            self._conclude_character(name, collector)
         if self._failure is not None:
             raise RecordingError(self._failure)
 
-    def _states_of(self, character: str) -> str:
-        return self.resolve_topic_name(topics.JOINT_STATES.under(character).name)
-
-    def _dropped(self, inbox: TopicReader) -> int:
-        return self._filter.dropped(inbox.recorded.name)
-
-    def _counts(self, character: str, count: Callable[[TopicReader], int]) -> dict[str, int]:
-        """By topic of a character, how many messages were lost or dropped, where any were."""
-        return {
-            inbox.recorded.name: count(inbox)
-            for inbox in self._inboxes
-            if count(inbox) and inbox.recorded.character in (None, character)
-        }
+    def _conclude_character(self, name: str, collector: MetricsCollector) -> None:
+        of_it = f" of '{name}'" if name else ""
+        try:
+            figures, series = collector.results()
+            if dropped := figures["dropped_references"]:
+                self.get_logger().warning(f"{dropped} references{of_it} belong to no state")
+            own = [each for each in self._readers if each.recorded.character in (None, name)]
+            foreign = {each.recorded.name: self._filter.dropped(each.recorded.name) for each in own}
+            figures |= {
+                "lost_messages": {each.recorded.name: each.lost for each in own if each.lost},
+                "foreign_messages": {topic: count for topic, count in foreign.items() if count},
+            }
+            directory = figures_directory(self._directory, name, is_alone=not name)
+            write_figures(directory, figures, series)
+        except RecordingError as error:
+            self._fail(f"{error}{of_it}")
+        states = self.resolve_topic_name(topics.JOINT_STATES.under(name).name)
+        if collector.last_tick <= FIRST_TICK and self._filter.dropped(states):
+            self._fail(
+                f"session {named(self._filter.bound)}{of_it} was recorded and never answered, "
+                f"while others published states, too; {REMEDY}, or set '{SESSION.name}'"
+            )
+        if collector.missing_ticks:
+            self._fail(f"{collector.missing_ticks} ticks{of_it} were missed")
 
     def _fail(self, sentence: str) -> None:
         if self._failure is None:

@@ -11,9 +11,14 @@ from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import decode, frame_id_of
-from msgs_config.messages.session import ForeignSessions, episode_session, session_of
+from msgs_config.messages.session import (
+    ANONYMOUS,
+    ForeignSessions,
+    episode_session,
+    session_of,
+)
 
-_MOST_HELD = 1000  # messages before the first state: few topics speak then
+_MOST_HELD = 1000  # messages before the first state; few topics have any then
 
 _ALWAYS_NAMED = {
     topic.name
@@ -42,31 +47,30 @@ class Heard(NamedTuple):
     published_ns: int
 
 
-def session_in(message: Heard) -> str | None:
-    """The session that a message is of; None if it may be of any."""
+def read_session(message: Heard) -> str | None:
+    """Return the session that a message is of; None if it may be of any."""
     name = message.recorded.own_name
     try:
-        if name in _ALWAYS_NAMED:
-            return session_of(frame_id_of(message.raw))
-        if name in _SOMETIMES_NAMED:
-            return session_of(frame_id_of(message.raw)) or None
+        if name in _ALWAYS_NAMED or name in _SOMETIMES_NAMED:
+            session = session_of(frame_id_of(message.raw))
+            return session or (None if name in _SOMETIMES_NAMED else session)
         if name == topics.EPISODE.name:
             return episode_session(frame_id_of(message.raw))
         if name == _CONFIGURATION:
             return session_of(str(json.loads(decode(message.raw, String).data)["session"]))
     except (MessageError, ValueError, KeyError, TypeError, RecursionError):
-        return None if name in _SOMETIMES_NAMED else session_of("")
+        return None if name in _SOMETIMES_NAMED else ANONYMOUS
     return None
 
 
 class SessionFilter:
     """Belongs to the session that is given, or to the first whose state comes, and to no other.
 
-    What others say is dropped and counted. What comes before the first state is held until then.
+    Messages of others are dropped and counted; messages before the first state are held until then.
     """
 
     def __init__(self, given: str, tell: Callable[[str], None]) -> None:
-        """`tell` is told a line for each session that is dropped."""
+        """`tell` gets a line for each session that is dropped."""
         self.bound: str | None = given or None
         self._foreign = ForeignSessions()
         self._tell = tell
@@ -78,7 +82,7 @@ class SessionFilter:
 
     def take(self, message: Heard) -> list[Heard]:
         """The messages to record now that this one has come, in their order."""
-        session = session_in(message)
+        session = read_session(message)
         if session is None:
             return [message]
         if self.bound is None and message.recorded.own_name == topics.JOINT_STATES.name:
@@ -92,7 +96,7 @@ class SessionFilter:
         return [message]
 
     def finish(self) -> list[Heard]:
-        """What is left to record at the end: that of the only simulator, if it had no state yet."""
+        """The rest to record at the end: that of the only simulator, if it had no state yet."""
         sessions = {session for session, _ in self._held}
         return self._bind(sessions.pop()) if len(sessions) == 1 else []
 

@@ -1,4 +1,4 @@
-"""One topic as the recorder hears it: every message once, in order, and how many never came."""
+"""Reads one topic for the recorder: every message once, in order; counts those that are lost."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,7 @@ class TopicReader:
     """Takes all messages of a topic, with a queue that outlasts long pauses."""
 
     def __init__(self, node: Node, recorded: RecordedTopic) -> None:
-        """Subscribe. Publishers whose quality of service does not fit are said, once."""
+        """Subscribe. Publishers whose quality of service does not fit are logged, once."""
         self._node = node
         self.recorded = recorded
         self._loss = LossCount(lambda: int(node.count_publishers(recorded.name)))
@@ -32,10 +32,10 @@ class TopicReader:
         return self._loss.lost
 
     def take(self, most: int) -> Iterator[tuple[int, bytes]]:
-        """What is there: wall time in ns at which it was published, and the message.
+        """Yield the messages that are there, with the wall time of publishing, ns.
 
-        No more than `most`: who publishes faster than this can take would otherwise never let it
-        end. The wall clock may be set back; the times of a topic are not.
+        No more than `most`: otherwise a publisher that is faster than this would never let it end.
+        The wall clock may be set back; the times of a topic are not.
         """
         for _ in range(most):
             received = self._subscription.take_received()

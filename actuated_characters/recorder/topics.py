@@ -3,35 +3,42 @@
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.validate_topic_name import validate_topic_name
 
+from actuated_characters.bags.definitions import find_message_type
 from actuated_characters.metrics.collector import HEARD
-from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.topics import Topic
 
-_OF_ALL = [topics.CLOCK, topics.DIAGNOSTICS]
-_OF_WORLD = [topics.THROW, topics.APPLIED_THROW, topics.THROWN]
+_OF_CONTROLLER = [
+    topics.INITIAL_STATE,
+    topics.JOINT_TRAJECTORY,
+    topics.ACTIVE_TRAJECTORY,
+    topics.STRENGTH,
+    topics.ACTIVE_STRENGTH,
+    topics.MODE,
+    topics.PLAN,
+]
+_OF_ALL = [
+    topics.CLOCK,
+    topics.DIAGNOSTICS,
+    topics.THROW,
+    topics.APPLIED_THROW,
+    topics.THROWN,
+]
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
 _OF_EACH = [
     topics.EPISODE,
     topics.ROBOT_DESCRIPTION,
     topics.CONFIGURATION.of(topics.SIM_NODE),
     topics.CONFIGURATION.of(topics.CONTROLLER_NODE),
-    topics.INITIAL_STATE.of(topics.CONTROLLER_NODE),
     topics.EXTERNAL_WRENCH,
-    topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE),
-    topics.ACTIVE_TRAJECTORY.of(topics.CONTROLLER_NODE),
-    topics.STRENGTH.of(topics.CONTROLLER_NODE),
-    topics.ACTIVE_STRENGTH.of(topics.CONTROLLER_NODE),
-    topics.MODE.of(topics.CONTROLLER_NODE),
-    topics.PLAN.of(topics.CONTROLLER_NODE),
+    *(topic.of(topics.CONTROLLER_NODE) for topic in _OF_CONTROLLER),
     topics.CONTACTS,
     topics.APPLIED_WRENCH,
     topics.ODOM,
@@ -41,25 +48,23 @@ _OF_EACH = [
     topics.JOINT_TORQUES,
     topics.JOINT_STATES,
 ]
-EXCLUDABLE = sorted(
-    {topic.name for topic in (*_OF_ALL, *_OF_WORLD, *_OF_EACH)}
-    - {
-        topics.JOINT_STATES.name,  # without them nothing can be measured or repeated,
-        topics.JOINT_TORQUES.name,  # and controllers wait for who listens
-        topics.CONFIGURATION.of(topics.SIM_NODE).name,
-    }
-)
+_NEEDED = {  # nothing can be measured or repeated without; controllers wait for subscribers
+    topics.JOINT_STATES.name,
+    topics.JOINT_TORQUES.name,
+    topics.CONFIGURATION.of(topics.SIM_NODE).name,
+}
+EXCLUDABLE = sorted({topic.name for topic in (*_OF_ALL, *_OF_EACH)} - _NEEDED)
 """Topics that a recording may do without."""
 
 
 @dataclass(frozen=True)
 class RecordedTopic:
-    """A topic that the recorder listens to."""
+    """A topic that the recorder subscribes to."""
 
     topic: Topic  # its name below the recorder's namespace
     name: str  # in the bag, absolute
     own_name: str  # below its character
-    character: str | None  # whose it is; None if it is of all, or of nobody
+    character: str | None  # None if it is of all, or of none
 
 
 def contract_topics(
@@ -71,7 +76,7 @@ def contract_topics(
         node: The recorder, in whose namespace the characters are.
         characters: Their names; that of a character alone in its namespace is empty.
         exclude: Names of topics, below each character or resolved.
-        measured_only: Take only what the figures are made of.
+        measured_only: Take only the topics that the figures are made of.
 
     Raises:
         ConfigurationError: a name is of no topic that can be left out, or of no character.
@@ -80,7 +85,7 @@ def contract_topics(
     if twice:
         raise ConfigurationError(f"parameter 'characters' has '{twice[0]}' twice")
     _check_names("characters", characters)
-    found = [_recorded(node, topic, None) for topic in (*_OF_ALL, *_OF_WORLD)]
+    found = [_recorded(node, topic, None) for topic in _OF_ALL]
     found += [_recorded(node, topic, name) for topic in _OF_EACH for name in characters]
     left_out: list[RecordedTopic] = []
     for name in exclude:
@@ -108,7 +113,7 @@ def _recorded(node: Node, topic: Topic, character: str | None) -> RecordedTopic:
 
 
 class NamedTopics:
-    """Looks for topics by their names alone: the publishers say type and quality of service."""
+    """Looks for topics by their names alone; publishers have the type and quality of service."""
 
     def __init__(self, node: Node, names: Sequence[str], known: Collection[str]) -> None:
         """Look for all names, resolved, but those that are known.
@@ -123,20 +128,19 @@ class NamedTopics:
         """Names of which no publisher was seen so far."""
 
     def look(self) -> Iterator[tuple[RecordedTopic, QoSProfile]]:
-        """Those that have a publisher now, each once, with what the first one offers.
+        """Yield topics that have a publisher now, each once, with the QoS of the first publisher.
 
-        A type that is not installed is said, and the topic not looked for any more.
+        A type that is not installed is logged, and the topic not looked for any more.
         """
         for name in sorted(self.missing):
             offers = self._node.get_publishers_info_by_topic(name)
             if not offers:
                 continue
             self.missing.discard(name)
-            message_type = _message_type(offers[0].topic_type)
-            if message_type is None:
-                self._node.get_logger().error(
-                    f"'{name}' is not recorded: its type {offers[0].topic_type} is not installed"
-                )
+            try:
+                message_type = find_message_type(offers[0].topic_type)
+            except RecordingError as error:
+                self._node.get_logger().error(f"'{name}' is not recorded: {error}")
                 continue
             profiles = [offer.qos_profile for offer in offers]
             topic = Topic(name, message_type, fitting_qos(profiles))
@@ -144,7 +148,7 @@ class NamedTopics:
 
 
 def fitting_qos(offers: Sequence[QoSProfile]) -> QoSProfile:
-    """The most that a subscription can ask for and still hear all of these publishers."""
+    """The strictest quality of service with which a subscription fits all of these publishers."""
     reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in offers)
     latched = all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
     return QoSProfile(
@@ -163,12 +167,3 @@ def _check_names(parameter: str, names: Sequence[str]) -> None:
         except InvalidTopicNameException as error:
             reason = str(error).removeprefix("Invalid topic name: ").partition(":\n")[0]
             raise ConfigurationError(f"parameter '{parameter}' has {name!r}: {reason}") from error
-
-
-def _message_type(name: str) -> Any:
-    """The class of a type such as `std_msgs/msg/String`; None if it is not installed."""
-    *namespace, last = name.split("/")
-    try:
-        return getattr(import_module(".".join(namespace)), last)
-    except (ImportError, AttributeError, ValueError):
-        return None

@@ -1,7 +1,7 @@
 """What a bag sends in the controller's place, tick by tick. No ROS in here."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -40,28 +40,8 @@ def read_world(path: Path, number: int = 0) -> tuple[list[Recording], list[str]]
     """
     together = worlds(read_recordings(path))[number]
     rows, count = common_rows(together)
-    cut = [_cut(each, slice(row, row + count)) for each, row in zip(together, rows, strict=True)]
+    cut = [each.rows(slice(row, row + count)) for each, row in zip(together, rows, strict=True)]
     return cut, left_out(together, rows)
-
-
-def _cut(recording: Recording, rows: slice) -> Recording:
-    """Those rows of a recording alone."""
-    ticks = slice(rows.start, rows.stop - 1)
-    return replace(
-        recording,
-        stamps_ns=recording.stamps_ns[rows],
-        published_ns=recording.published_ns[rows],
-        position=recording.position[rows],
-        velocity=recording.velocity[rows],
-        effort=recording.effort[ticks],
-        reference_position=recording.reference_position[rows],
-        reference_velocity=recording.reference_velocity[rows],
-        contacts=recording.contacts[ticks],
-        applied_wrench=recording.applied_wrench[ticks],
-        throws=recording.throws[ticks],
-        balls=recording.balls[rows],
-        commands=recording.commands[rows],
-    )
 
 
 def make_scripts(together: Sequence[Recording]) -> list[Script]:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +14,7 @@ import pytest
 from lz4.frame import LZ4FrameCompressor
 from mcap.writer import CompressionType, IndexType
 
-from actuated_characters.bags import reader
+from actuated_characters.bags import limits
 from actuated_characters.bags.limits import MIB
 from actuated_characters.bags.reader import read_messages
 from msgs_config.errors import RecordingError
@@ -54,8 +55,7 @@ def lz4_bomb(size: int) -> bytes:
     return b"".join([*pieces, compressor.flush()])
 
 
-def messages(bag: Path, monkeypatch: pytest.MonkeyPatch, *, declared: bool) -> None:
-    del monkeypatch
+def messages(bag: Path, *, declared: bool) -> None:
     bomb = zstd_bomb(6 * GIB, declared=declared)
     sound = [Stored(TOPIC, each.log_time_ns, compressed(each.cdr)) for each in SOUND]
     write_jazzy_db3(bag / "bag_0.db3", [Stored(TOPIC, 0, bomb), *sound])  # type: ignore[list-item]
@@ -69,58 +69,45 @@ def compressed(raw: bytes) -> bytes:
 
 def chunks(
     bag: Path,
-    monkeypatch: pytest.MonkeyPatch,
     *,
     bomb: bytes,
-    codec: str = "zstandard",
+    compression: CompressionType = CompressionType.ZSTD,
     size: int | None = None,
     **options: Any,
 ) -> None:
-    """The first chunk is the bomb, and says that it stands for `size`, or for what it did."""
-    whole = mcap.writer.Chunk
-    made: list[object] = []
+    """The first chunk is the bomb, and declares `size`, or the size that it had before."""
+    sound, made = mcap.writer.Chunk, list[object]()
 
     def chunk(**fields: Any) -> mcap.writer.Chunk:
         made.append(fields)
         if len(made) == 1:
-            fields |= {"data": bomb}
-            fields |= {} if size is None else {"uncompressed_size": size}
-        return whole(**fields)
+            fields |= {"data": bomb, "uncompressed_size": size or fields["uncompressed_size"]}
+        return sound(**fields)
 
-    def index(**fields: Any) -> Any:
-        fields |= {"compressed_size": len(bomb)} if len(made) == 1 else {}
-        return plain(**fields)
-
-    plain = mcap.writer.ChunkIndex
-    monkeypatch.setattr(mcap.writer, "Chunk", chunk)
-    monkeypatch.setattr(mcap.writer, "ChunkIndex", index)
-    kind = CompressionType.ZSTD if codec == "zstandard" else CompressionType.LZ4
-    write_mcap(bag / "bag_0.mcap", SOUND, chunk_size=1, compression=kind, **options)
-    monkeypatch.undo()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mcap.writer, "Chunk", chunk)
+        write_mcap(bag / "bag_0.mcap", SOUND, chunk_size=1, compression=compression, **options)
     write_metadata(bag, 9, "mcap", ["bag_0.mcap"], [TOPIC])
 
 
-def overlapping(bag: Path, monkeypatch: pytest.MonkeyPatch, **options: Any) -> None:
+def overlapping(bag: Path) -> None:
     """Chunks whose messages are the first and the last in time: all would be open at once."""
-    del monkeypatch
     large = "0" * (60 * MIB)
     said = [
         Said(TOPIC, time, text) for _ in range(12) for time, text in ((100, "last"), (1, large))
     ]
-    write_mcap(bag / "bag_0.mcap", said, chunk_size=MIB, **options)
+    write_mcap(bag / "bag_0.mcap", said, chunk_size=MIB)
     write_metadata(bag, 9, "mcap", ["bag_0.mcap"], [TOPIC])
 
 
-def whole_file(bag: Path, monkeypatch: pytest.MonkeyPatch, *, declared: bool, size: int) -> None:
-    del monkeypatch
+def whole_file(bag: Path, *, declared: bool, size: int) -> None:
     (bag / "bag_0.db3.zstd").write_bytes(zstd_bomb(size, declared=declared))
     how = {"compression_format": "zstd", "compression_mode": "FILE"}
     write_metadata(bag, 9, "sqlite3", ["bag_0.db3.zstd"], [TOPIC], **how)
 
 
-def computed_column(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def computed_column(bag: Path) -> None:
     """An SQLite file whose messages are made when they are read."""
-    del monkeypatch
     with closing(sqlite3.connect(write_jazzy_db3(bag / "bag_0.db3", SOUND))) as database:
         database.executescript(
             "ALTER TABLE messages RENAME COLUMN data TO was;"
@@ -129,51 +116,44 @@ def computed_column(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_metadata(bag, 9, "sqlite3", ["bag_0.db3"], [TOPIC])
 
 
-Write = Callable[[Path, pytest.MonkeyPatch], None]
-KINDS: dict[str, tuple[Write, str]] = {
-    "message": (
-        lambda *to: messages(*to, declared=True),
-        "at least 6144 MiB, more than the limit of 64",
-    ),
+OF_CHUNK = "a chunk would unpack to more than the limit of 128 MiB"
+ZSTD_CHUNK = partial(chunks, bomb=zstd_bomb(6 * GIB, declared=False))
+KINDS: dict[str, tuple[Callable[[Path], None], str]] = {
+    "message": (partial(messages, declared=True), "at least 6144 MiB, more than the limit of 64"),
     "message undeclared": (
-        lambda *to: messages(*to, declared=False),
+        partial(messages, declared=False),
         "a message would unpack to more than the limit of 64 MiB",
     ),
     "chunk": (
-        lambda *to: chunks(*to, bomb=zstd_bomb(6 * GIB, declared=True), size=6 * GIB),
+        partial(chunks, bomb=zstd_bomb(6 * GIB, declared=True), size=6 * GIB),
         "at least 6144 MiB, more than the limit of 128 MiB",
     ),
-    "chunk that lies": (
-        lambda *to: chunks(*to, bomb=zstd_bomb(6 * GIB, declared=False)),
-        "a chunk would unpack to more than the limit of 128 MiB",
-    ),
+    "chunk that lies": (ZSTD_CHUNK, OF_CHUNK),
     "chunk of lz4": (
-        lambda *to: chunks(*to, bomb=lz4_bomb(GIB), codec="lz4"),
-        "a chunk would unpack to more than the limit of 128 MiB",
+        lambda bag: chunks(bag, bomb=lz4_bomb(GIB), compression=CompressionType.LZ4),
+        OF_CHUNK,
     ),
-    "chunk without an index": (
-        lambda *to: chunks(
-            *to, bomb=zstd_bomb(6 * GIB, declared=False), index_types=IndexType.NONE
-        ),
-        "a chunk would unpack to more than the limit of 128 MiB",
-    ),
+    "chunk without an index": (partial(ZSTD_CHUNK, index_types=IndexType.NONE), OF_CHUNK),
     "chunks of one time": (overlapping, "chunks would unpack to at least"),
     "file": (
-        lambda *to: whole_file(*to, declared=True, size=64 * GIB),
-        "its files would unpack to at least 65536 MiB, more than the limit of 8192 MiB",
+        partial(whole_file, declared=True, size=64 * GIB),
+        "bag_0.db3.zstd: it would unpack to at least 65536 MiB, more than the limit of 8192 MiB",
     ),
-    "computed column": (computed_column, "its table 'messages' is computed"),
+    "computed column": (
+        computed_column,
+        "bag_0.db3: a message is larger than the limit of 64 MiB",
+    ),
 }
 
 
 @pytest.fixture
-def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+def write(tmp_path: Path) -> Callable[[str], Path]:
     """Writes a bag of a kind."""
 
     def bag_of(kind: str) -> Path:
         bag = tmp_path / "bag"
         bag.mkdir()
-        KINDS[kind][0](bag, monkeypatch)
+        KINDS[kind][0](bag)
         assert sum(file.stat().st_size for file in bag.iterdir()) < 5 * MIB
         return bag
 
@@ -267,13 +247,10 @@ def test_recover_keeps_the_rest_and_says_what_it_left(
 def test_a_file_that_declares_nothing_is_unpacked_up_to_the_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reader, "MOST_OF_FILES", 20 * MIB)
-    whole_file(tmp_path, monkeypatch, declared=False, size=8 * GIB)
-    monkeypatch.setattr(reader, "MOST_OF_FILES", 20 * MIB)
+    monkeypatch.setattr(limits, "MOST_OF_FILE", 20 * MIB)
+    whole_file(tmp_path, declared=False, size=8 * GIB)
 
-    with pytest.raises(
-        RecordingError, match=r"its files would unpack to at least .*limit of 20 MiB"
-    ):
+    with pytest.raises(RecordingError, match=r"zstd: it would unpack to .*limit of 20 MiB"):
         list(read_messages(tmp_path))
 
 
@@ -282,9 +259,9 @@ def test_a_file_without_an_index_is_sorted_up_to_a_limit(
 ) -> None:
     write_mcap(tmp_path / "bag_0.mcap", SOUND * 100, index_types=IndexType.NONE)
     assert len(texts(tmp_path / "bag_0.mcap")) == 500
-    monkeypatch.setattr(reader, "MOST_SORTED", 10_000)
+    monkeypatch.setattr(limits, "MOST_SORTED", 10_000)
 
-    with pytest.raises(RecordingError, match="a file without an index would unpack to at least"):
+    with pytest.raises(RecordingError, match="a file without an index would unpack to more"):
         list(read_messages(tmp_path / "bag_0.mcap"))
 
 

@@ -5,7 +5,7 @@ A run of the middleware with messages that are really lost is in `test_recorder.
 
 from collections.abc import Iterable
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuated_characters.recorder.loss_count import LossCount
@@ -30,6 +30,7 @@ def test_of_one_publisher_every_gap_between_what_came_is_counted(
     assert lost(numbers) == numbers[-1] - first + 1 - len(numbers)
 
 
+@settings(deadline=None)
 @given(sizes=st.lists(st.integers(1, 20), min_size=2, max_size=4), data=st.data())
 def test_several_publishers_lose_nothing_however_theirs_are_mixed(
     sizes: list[int], data: st.DataObject

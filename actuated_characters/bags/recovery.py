@@ -1,16 +1,15 @@
-"""Makes a complete recording of what a killed recorder, a full disk or a broken copy has left."""
+"""Makes a complete bag of the files that a killed recorder, a full disk or a broken copy left."""
 
 import shutil
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from std_msgs.msg import String
 
-from actuated_characters.bags.directory_lock import DirectoryLock, writer_of
+from actuated_characters.bags.directory_lock import DirectoryLock, find_writer
 from actuated_characters.bags.metadata import METADATA
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.recovery.rewriting import Contents, Progress, rewrite, storage_files
+from actuated_characters.bags.rewriting import Contents, Progress, rewrite, storage_files
 from actuated_characters.bags.storage import reason
 from actuated_characters.metrics.collector import CONFIGURATION, HEARD, MetricsCollector
 from actuated_characters.runs.run_directory import BAG, SUMMARY, figures_directory, write_figures
@@ -25,81 +24,72 @@ _REPORT_PERIOD = 1000  # messages
 
 @dataclass
 class Recovered:
-    """What `recover` has found, and where it is."""
+    """The result of `recover`, and where it is."""
 
     bag: Path
     contents: Contents
     damaged: Path | None  # the original; None where the bag was complete and nothing was done
     measured: list[Path] = field(default_factory=list)  # directories with figures rebuilt
     kept: list[Path] = field(default_factory=list)  # with the recorder's own, of the whole run
-    unmeasured: str = ""  # why there are none, in a run's directory
+    unmeasured: str = ""  # why a run's directory got no figures
 
 
-def recover(path: Path, progress: Progress | None = None) -> Recovered:
+def recover(path: Path, progress: Progress = lambda stage, fraction: None) -> Recovered:
     """Make a bag complete that is not, in its place; the original stays beside it as `.damaged`.
 
     Every message of a chunk that is whole is kept, with its type's definition and its publishers'
     quality of service. A run's directory gets the figures that it lacks. A bag that is complete is
-    not touched. Being killed itself does no harm: the next call goes on.
+    not touched. A recovery that is killed does no harm: the next call goes on.
 
     Args:
         path: A run's directory, or a bag: the directory that its files lie in.
-        progress: Told how far it is.
+        progress: Gets the stage, and the fraction of it that is done if that is known.
 
     Raises:
         RecordingError: there is nothing to recover, the recorder is still at work, the disk is
             full, or the original of an earlier recovery is in the way.
     """
-    report = progress or (lambda what, fraction: None)
     try:
-        return _recover(path, report)
+        is_run = any((path / f"{BAG}{end}").is_dir() for end in ("", _DAMAGED))
+        bag = path / BAG if is_run else path
+        if bag.name in ("", ".."):
+            bag = bag.resolve()
+        _finish_swap(bag)
+        recovered = _recover_bag(bag, progress)
+        if is_run:
+            _measure(path, recovered, progress)
+        return recovered
     except OSError as error:
         raise RecordingError(f"cannot recover {path}: {reason(error)}") from error
 
 
-def _recover(path: Path, report: Progress) -> Recovered:
-    is_run = any((path / f"{BAG}{end}").is_dir() for end in ("", _DAMAGED))
-    bag = path / BAG if is_run else path
-    if bag.name in ("", ".."):
-        bag = bag.resolve()
-    _finish_swap(bag)
-    recovered = _recover_bag(bag, report)
-    if is_run:
-        _measure(path, recovered, report)
-    return recovered
-
-
-def _recover_bag(bag: Path, report: Progress) -> Recovered:
+def _recover_bag(bag: Path, progress: Progress) -> Recovered:
     if not bag.is_dir():
         hint = "; give the directory that it lies in" if bag.is_file() else ""
         raise RecordingError(f"nothing to recover: {bag} is no directory{hint}")
-    contents = _whole_contents(bag, report)
+    contents = _read_whole(bag, progress)
     if contents is not None:
         return Recovered(bag, contents, None)
     damaged, scratch = bag.with_name(bag.name + _DAMAGED), _scratch(bag)
     if damaged.exists():
         raise RecordingError(f"{damaged} is in the way: what an earlier recovery kept; move it")
-    claim = _claim(bag)
     try:
-        writer = writer_of(storage_files(bag))  # of another recorder, which makes no claim
+        lock = DirectoryLock(bag)
+    except BlockingIOError as error:
+        raise RecordingError(f"a recorder is still at work on {bag}; end it first") from error
+    try:
+        writer = find_writer(storage_files(bag))  # another recorder, which locks nothing
         if writer is not None:
             raise RecordingError(f"process {writer} is still writing to {bag}; end it first")
         shutil.rmtree(scratch, ignore_errors=True)  # of a recovery that was killed
-        contents = rewrite(bag, scratch / bag.name, report)
+        contents = rewrite(bag, scratch / bag.name, progress)
         bag.rename(damaged)
         _finish_swap(bag)
     finally:
-        claim.release()
+        lock.release()
         if bag.exists():
             shutil.rmtree(scratch, ignore_errors=True)
     return Recovered(bag, contents, damaged)
-
-
-def _claim(bag: Path) -> DirectoryLock:
-    try:
-        return DirectoryLock(bag)
-    except BlockingIOError as error:
-        raise RecordingError(f"a recorder is still at work on {bag}; end it first") from error
 
 
 def _scratch(bag: Path) -> Path:
@@ -114,10 +104,10 @@ def _finish_swap(bag: Path) -> None:
         shutil.rmtree(new.parent, ignore_errors=True)
 
 
-def _whole_contents(bag: Path, report: Progress) -> Contents | None:
-    """What is in a bag that can be read to its end; None for any other."""
+def _read_whole(bag: Path, progress: Progress) -> Contents | None:
+    """Count the messages of a bag that can be read to its end; None for any other."""
     contents = Contents()
-    report("checking", None)
+    progress("checking", None)
     try:
         for message in read_messages(bag):
             contents.add(message.topic, message.log_time_ns)
@@ -126,7 +116,7 @@ def _whole_contents(bag: Path, report: Progress) -> Contents | None:
     return contents
 
 
-def _measure(directory: Path, recovered: Recovered, report: Progress) -> None:
+def _measure(run: Path, recovered: Recovered, progress: Progress) -> None:
     """Make the figures of each character in a bag, as its recorder would have made them.
 
     Those that are there stay: a recorder whose disk is full measures on, to the run's end.
@@ -136,41 +126,36 @@ def _measure(directory: Path, recovered: Recovered, report: Progress) -> None:
         name.removesuffix(suffix) for name in recovered.contents.counts if name.endswith(suffix)
     ]
     try:
-        places = _places(directory, recovered.bag, namespaces)
+        is_alone = len(namespaces) == 1 and not _name_in_world(recovered.bag, namespaces[0])
+        places = {each: figures_directory(run, each, is_alone=is_alone) for each in namespaces}
         made = {each: place for each, place in places.items() if not (place / SUMMARY).exists()}
         if recovered.damaged is not None:
             recovered.kept = [place for each, place in places.items() if each not in made]
         collectors = {each: MetricsCollector(f"{each}/{topics.SIM_NODE}"[1:]) for each in made}
         if collectors:
-            _collect(recovered, collectors, report)
+            _collect(recovered, collectors, progress)
         for namespace, collector in collectors.items():
             write_figures(made[namespace], *collector.results())
             recovered.measured.append(made[namespace])
-        if not namespaces and not (directory / SUMMARY).exists():
+        if not namespaces and not (run / SUMMARY).exists():
             recovered.unmeasured = f"it has no '{CONFIGURATION}'"
     except ActuatedCharactersError as error:
         recovered.unmeasured = str(error)
 
 
-def _places(directory: Path, bag: Path, namespaces: Sequence[str]) -> dict[str, Path]:
-    """Where the figures of the characters in some namespaces are."""
-    names = dict.fromkeys(namespaces, "")
-    if len(namespaces) == 1:
-        message = next(read_messages(bag, [f"{namespaces[0]}/{CONFIGURATION}"]))
-        names[namespaces[0]] = parse_world(decode(message.raw, String).data).name
-    return {
-        each: figures_directory(directory, each, is_alone=len(namespaces) == 1 and not name)
-        for each, name in names.items()
-    }
+def _name_in_world(bag: Path, namespace: str) -> str:
+    """Return the name of the character in a namespace; empty if it has none in its world."""
+    message = next(read_messages(bag, [f"{namespace}/{CONFIGURATION}"]))
+    return parse_world(decode(message.raw, String).data).name
 
 
 def _collect(
-    recovered: Recovered, collectors: dict[str, MetricsCollector], report: Progress
+    recovered: Recovered, collectors: dict[str, MetricsCollector], progress: Progress
 ) -> None:
     total = recovered.contents.counts.total()
     for count, message in enumerate(read_messages(recovered.bag)):
         if count % _REPORT_PERIOD == 0:
-            report("measuring", count / total)
+            progress("measuring", count / total)
         for namespace, collector in collectors.items():
             shared = message.topic == topics.DIAGNOSTICS.name
             name = message.topic if shared else message.topic.removeprefix(f"{namespace}/")

@@ -1,4 +1,4 @@
-"""Files that were cut off, damaged, split or compressed: what of them `recover` finds, and says."""
+"""Files that were cut off, damaged, split or compressed: the parts that `recover` finds."""
 
 import os
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from std_msgs.msg import String
 
 from actuated_characters.bags.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.recovery.recover import recover
+from actuated_characters.bags.recovery import recover
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import (
     SAID,
@@ -37,8 +37,9 @@ def test_a_truncated_file_of_ros2_bag_record_is_recovered_up_to_the_cut(
     bag: Path, compression: CompressionType
 ) -> None:
     file = write_mcap(bag / "bag_0.mcap", SAID, compression=compression, chunk_size=150)
-    size = file.stat().st_size
-    os.truncate(file, size // 2)
+    chunks = [each for each in records(file.read_bytes()) if each[0] == CHUNK]
+    _, begin, end = chunks[len(chunks) // 2]
+    os.truncate(file, (begin + end) // 2)
 
     recovered = recover(bag)
 
@@ -168,17 +169,36 @@ def test_a_record_of_another_kind_ends_nothing(bag: Path, kind: int, bit: int) -
     assert bool(recovered.contents.lost) == (bit == 4)
 
 
-def test_what_nobody_needs_may_be_damaged(bag: Path) -> None:
-    file = plain(bag)
+@pytest.mark.parametrize("kind", [MESSAGE_INDEX, FOOTER])
+def test_a_record_that_no_message_needs_may_be_damaged(bag: Path, kind: int) -> None:
+    """The lengths in the indices of chunks, and where the summary begins."""
+    file = write_mcap(bag / "bag_0.mcap", SAID, chunk_size=150)
     data = bytearray(file.read_bytes())
-    for kind, begin, _ in list(records(bytes(data))):
-        if kind == MESSAGE_INDEX:
+    for found, begin, _ in list(records(bytes(data))):
+        if found == kind == MESSAGE_INDEX:
             data[begin + ENTRIES_LENGTH + 3] ^= 0x40
+        elif found == kind:
+            data[begin + 9 : begin + 17] = (8).to_bytes(8, "little")  # among the messages
     file.write_bytes(data)
+    (bag / "metadata.yaml").write_text("cut off")
 
     recovered = recover(bag)
 
     assert texts(bag) == SAID and recovered.contents.lost == []
+
+
+@pytest.mark.parametrize("left", [1, 8, 9, 10])
+def test_the_head_of_a_record_without_its_content_is_no_loss(bag: Path, left: int) -> None:
+    """A killed recorder may have written the nine bytes alone: no message was behind them."""
+    file = plain(bag)
+    begins = [begin for kind, begin, _ in records(file.read_bytes()) if kind == CHUNK]
+    os.truncate(file, begins[-1] + left)
+
+    recovered = recover(bag)
+
+    read = texts(bag)
+    assert read == SAID[: len(read)] and len(read) > len(SAID) // 2
+    assert recovered.contents.lost == ([] if left < 10 else ["bag_0.mcap: bytes cut off (10)"])
 
 
 def test_a_tail_of_zeros_is_no_record(bag: Path) -> None:
@@ -190,18 +210,6 @@ def test_a_tail_of_zeros_is_no_record(bag: Path) -> None:
 
     assert texts(bag) == SAID
     assert recovered.contents.lost == [f"bag_0.mcap: bytes cut off ({1 << 30})"]
-
-
-def test_a_summary_that_begins_among_the_messages_unpacks_nothing(bag: Path) -> None:
-    file = write_mcap(bag / "bag_0.mcap", SAID, chunk_size=150)
-    data = bytearray(file.read_bytes())
-    _, footer, _ = next(each for each in records(bytes(data)) if each[0] == FOOTER)
-    data[footer + 9 : footer + 17] = (8).to_bytes(8, "little")
-    file.write_bytes(data)
-
-    recovered = recover(bag)
-
-    assert texts(bag) == SAID and recovered.contents.lost == []
 
 
 def test_a_message_that_is_cut_off_swallows_none_behind_it(bag: Path) -> None:
@@ -299,3 +307,20 @@ def test_an_sqlite_file_needs_no_recovering(bag: Path) -> None:
         recover(bag)
 
     assert [message.raw for message in read_messages(bag / "bag_0.db3")] == [s.cdr for s in SAID]
+
+
+def test_messages_that_a_bag_cannot_hold_are_left_out_and_named(bag: Path) -> None:
+    write_mcap(bag / "bag_0.mcap", SAID[:2])
+    write_mcap(bag / "bag_1.mcap", SAID[2:4], serialization="json")
+    other = write_mcap(bag / "bag_2.mcap", SAID[4:5], compression=CompressionType.NONE, close=False)
+    data = other.read_bytes().replace(b"std_msgs/msg/String", b"own_msgs/msg/Sample")
+    other.write_bytes(_without_checksums(data))
+
+    recovered = recover(bag)
+
+    assert texts(bag) == SAID[:2]
+    assert recovered.contents.lost == [
+        "bag_1.mcap: message on '/a' as json, not as cdr (1), "
+        "message on '/b' as json, not as cdr (1)",
+        "bag_2.mcap: message on '/a' of another type, own_msgs/msg/Sample (1)",
+    ]

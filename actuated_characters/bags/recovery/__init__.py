@@ -1,1 +1,0 @@
-"""Bags that their writer never closed, made whole."""

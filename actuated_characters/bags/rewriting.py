@@ -1,0 +1,170 @@
+"""Writes a new bag of all messages that can still be read of a damaged one."""
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+from typing import TypeAlias
+
+from rosbags.interfaces import Qos
+from rosbags.rosbag2.metadata import parse_qos
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from actuated_characters.bags import limits, storage
+from actuated_characters.bags.definitions import MessageDefinition
+from actuated_characters.bags.mcap_file import McapFile
+from actuated_characters.bags.metadata import METADATA
+from actuated_characters.bags.storage import CDR, SUFFIXES, StoredMessage, StoredTopic
+from actuated_characters.bags.writer import BagWriter
+from msgs_config.errors import RecordingError
+
+Progress: TypeAlias = Callable[[str, float | None], None]
+"""Gets the stage of a recovery, and the fraction of it that is done, 0 to 1; None if unknown."""
+
+_UNKNOWN_HASH = "INVALID"  # as ROS 2 calls it
+_REPORT_PERIOD = 1000  # messages
+_MOST_NAMED = 3  # files in an error
+
+
+@dataclass
+class Contents:
+    """The messages of a bag, counted."""
+
+    counts: Counter[str] = field(default_factory=Counter)  # messages of each topic
+    last_log_time_ns: int = 0
+    lost: list[str] = field(default_factory=list)  # of each file, the parts that are unreadable
+
+    def add(self, topic: str, log_time_ns: int) -> None:
+        """Count a message."""
+        self.counts[topic] += 1
+        self.last_log_time_ns = max(self.last_log_time_ns, log_time_ns)
+
+
+def rewrite(damaged: Path, new: Path, progress: Progress) -> Contents:
+    """Write all that can be read of a damaged bag into a new one.
+
+    Args:
+        damaged: The directory of the damaged bag, which is not changed.
+        new: Where the new one goes.
+        progress: See `Progress`.
+
+    Raises:
+        RecordingError: there is nothing that can be read, or the new bag cannot be written.
+    """
+    files = [McapFile(file) for file in storage_files(damaged)]
+    contents = Contents()
+    messages = _salvage(files, contents, progress)
+    first = next(messages, None)
+    if first is None:
+        lost = f" (unreadable: {'; '.join(contents.lost)})" if contents.lost else ""
+        raise RecordingError(f"nothing to recover in {damaged}: no message reached the disk{lost}")
+    is_compressed = any(file.is_compressed for file in files)
+    with BagWriter(new, compression=storage.ZSTD if is_compressed else storage.NONE) as bag:
+        announced = set[str]()
+        for topic, raw, log_time_ns in chain((first,), messages):
+            _announce(topic, bag, announced)
+            bag.write(topic.name, raw, log_time_ns)
+            contents.add(topic.name, log_time_ns)
+        for topic in (topic for file in files for topic in file.topics.values()):
+            if topic.serialization == CDR:
+                _announce(topic, bag, announced)  # without messages, but a reader may ask for it
+    return contents
+
+
+def storage_files(bag: Path) -> list[Path]:
+    """Return the files of a bag in the order in which they were written: `_2` before `_10`.
+
+    Raises:
+        RecordingError: there are none, or of several recordings, or of another storage.
+    """
+    present = set(bag.iterdir())
+    files = sorted(
+        (file for file in present if file.suffix == SUFFIXES[storage.MCAP]),
+        key=lambda file: ([int(number) for number in re.findall("[0-9]+", file.name)], file.name),
+    )
+    for file in present:
+        if file.suffix == SUFFIXES[storage.SQLITE3]:
+            raise RecordingError(
+                f"cannot recover {bag}: {file.name} is SQLite's, which keeps what was committed; "
+                "give the file itself, or make the bag's metadata with 'ros2 bag reindex'"
+            )
+        if file.suffix == storage.ZSTD_SUFFIX and file.with_suffix("") not in present:
+            raise RecordingError(
+                f"cannot recover {bag}: {file.name} is compressed as a whole; 'zstd -d' unpacks it"
+            )
+    if not files:
+        raise RecordingError(
+            f"nothing to recover in {bag}: it has no {SUFFIXES[storage.MCAP]} file"
+        )
+    stems = {re.sub("_[0-9]+$", "", file.stem) for file in files}
+    if len(stems) > 1 and not (bag / METADATA).is_file():
+        names = ", ".join(file.name for file in files[:_MOST_NAMED])
+        raise RecordingError(
+            f"cannot recover {bag}: its files ({names}{', ...' * (len(files) > _MOST_NAMED)}) are "
+            "not those of one recording, NAME_0, NAME_1 and so on; give each a directory of its own"
+        )
+    return files
+
+
+def _salvage(
+    files: list[McapFile], contents: Contents, progress: Progress
+) -> Iterator[tuple[StoredTopic, bytes, int]]:
+    """Yield topic, content and log time (ns) of the messages of all files, one after the other."""
+    types: dict[str, str] = {}
+    for number, file in enumerate(files):
+        try:
+            for count, message in enumerate(file.messages()):
+                if count % _REPORT_PERIOD == 0:
+                    progress("recovering", (number + file.fraction) / len(files))
+                packed = message.raw.startswith(storage.ZSTD_MAGIC)
+                file.is_compressed |= packed
+                try:
+                    _check(message, types)
+                    raw = limits.unpack_message(message.raw, packed=packed)
+                except limits.DAMAGED as error:
+                    file.lost[str(error)] += 1
+                else:
+                    yield message.topic, raw, message.log_time_ns
+        except RecordingError as error:  # another file may be sound
+            contents.lost.append(str(error))
+        if file.damage:
+            contents.lost.append(f"{file.path.name}: {file.damage}")
+
+
+def _check(message: StoredMessage, types: dict[str, str]) -> None:
+    """Raise ValueError for a message that a bag cannot hold; `types` has its topics so far."""
+    topic = message.topic
+    if topic.serialization != CDR:
+        raise ValueError(f"message on '{topic.name}' as {topic.serialization}, not as {CDR}")
+    if types.setdefault(topic.name, topic.type_name) != topic.type_name:
+        raise ValueError(f"message on '{topic.name}' of another type, {topic.type_name}")
+    if message.log_time_ns > storage.LATEST_NS:
+        raise ValueError("message of an impossible time")
+
+
+def _announce(topic: StoredTopic, bag: BagWriter, announced: set[str]) -> None:
+    """Announce a topic in the new bag if it was not yet."""
+    if topic.name not in announced:
+        announced.add(topic.name)
+        type_hash = topic.type_hash or _compute_hash(topic)
+        definition = MessageDefinition(topic.type_name, topic.definition, type_hash)
+        bag.announce(topic.name, definition, _parse_offered(topic))
+
+
+def _compute_hash(topic: StoredTopic) -> str:
+    """The hash of a definition, where the file says none."""
+    if topic.definition.strip():
+        with suppress(Exception):  # the parser raises anything for a definition that is not sound
+            store = get_typestore(Stores.EMPTY)
+            store.register(get_types_from_msg(topic.definition, topic.type_name))
+            return store.hash_rihs01(topic.type_name)
+    return _UNKNOWN_HASH
+
+
+def _parse_offered(topic: StoredTopic) -> list[Qos]:
+    with suppress(Exception):  # likewise: the messages matter more
+        return parse_qos(topic.offered_qos)
+    return []

@@ -1,0 +1,58 @@
+"""Reads the SQLite files of bags by log time: the tables of rosbag2 since Foxy."""
+
+import sqlite3
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack, closing
+from pathlib import Path
+
+from actuated_characters.bags import limits
+from actuated_characters.bags.storage import StoredMessage, StoredTopic
+
+_LONGEST_ROW = limits.MOST_OF_MESSAGE + 1024  # bytes
+
+
+class SqliteFile:
+    """A file of SQLite without a journal."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.topics: dict[int, StoredTopic] = {}
+        """By number, those of the file: with messages or without."""
+
+    def open_closed(self, stack: ExitStack) -> None:
+        """Open the file until `stack` is closed; then `messages_by_time` can be read.
+
+        Raises:
+            ValueError, sqlite3.Error: it was not closed, is damaged, or is no bag's.
+        """
+        name = self._path.name
+        for journal in (self._path.with_name(name + end) for end in ("-journal", "-wal")):
+            if journal.is_file() and journal.stat().st_size > 0:
+                raise ValueError(
+                    "it was never closed, a journal lies beside it; "
+                    f"'sqlite3 {name} .tables' makes it whole"
+                )
+        uri = f"{self._path.absolute().as_uri()}?immutable=1"
+        self._tables = stack.enter_context(closing(sqlite3.connect(uri, uri=True)))
+        self._tables.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST_ROW)
+        rows = self._tables.execute("SELECT id, name, type, serialization_format FROM topics")
+        self.topics = {number: StoredTopic(*topic) for number, *topic in rows}
+
+    def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
+        """Yield the messages on some topics by log time.
+
+        Raises:
+            ValueError, sqlite3.Error: the file is damaged, or a message is too large.
+        """
+        chosen = [number for number, topic in self.topics.items() if topic.name in names]
+        try:
+            for number, log_time_ns, place, raw in self._tables.execute(
+                "SELECT topic_id, timestamp, id, CAST(data AS BLOB) FROM messages "
+                f"WHERE topic_id IN ({', '.join('?' * len(chosen))}) ORDER BY timestamp, id",
+                chosen,
+            ):
+                yield StoredMessage(log_time_ns, (place, 0), self.topics[number], raw)
+        except sqlite3.DataError as error:
+            raise limits.LimitError(
+                f"a message is larger than the limit of {limits.MOST_OF_MESSAGE >> 20} MiB"
+            ) from error
