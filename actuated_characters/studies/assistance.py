@@ -2,23 +2,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.stills import strip
-from actuated_characters.studies.framework.plots import label, make_panels, show_pictures
-from actuated_characters.studies.framework.study import RunSpec, StudyResult, StudyRunner
-from actuated_characters.studies.framework.tracking import errors_by_joint, fall_time
-from msgs_config.arrays import FloatArray
+from actuated_characters.studies.framework.plots import label
+from actuated_characters.studies.framework.result import StudyResult
+from actuated_characters.studies.framework.study import WALK, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.tracking import (
+    fall_time,
+    joint_errors,
+    root_force_share,
+)
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import ROOT_TORQUE, Character
-
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
 
 _CHARACTER = "humanoid"
 _STRENGTHS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)  # of root force and torque
@@ -40,40 +39,45 @@ class _Walk:
     force_share: float  # mean root force over the weight until the fall
 
 
-class AssistanceStudy:
-    """The humanoid walks; root force and torque get weaker, down to none."""
-
-    name = "assistance"
-    title = "the walk by strength of root force and torque"
-    runs = len(_STRENGTHS) + 1
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Walk with each strength, and with a root that nobody may command."""
-        character = load_character(_CHARACTER)
-        walks = [
-            _walk(runner, f"x {strength:g}", strength, weakened(character, strength))
-            for strength in _STRENGTHS
-        ]
-        walks.append(_walk(runner, "none", 0.0, {"root_assistance": False}))
-        return StudyResult(
-            columns=(
-                "root stiffness",
-                "falls at (s)",
-                "mean joint error until then (rad)",
-                "mean root error until then (m)",
-                "root force / weight until then",
-            ),
-            rows=[
-                (walk.name, walk.fall, walk.joint_error, walk.root_error, walk.force_share)
-                for walk in walks
-            ],
-            figures={
-                self.name: _draw(walks[:-1]),
-                "assistance_poses": show_pictures(_pictures(walks)),
-            },
-            curves={"assistance_height": _heights(walks)},
-            notes=_notes(walks),
-        )
+def _fill(runner: StudyRunner, result: StudyResult) -> None:
+    """Walk with each strength of root force and torque, and with a root without commands."""
+    character = load_character(_CHARACTER)
+    walks = [
+        _walk(runner, f"x {strength:g}", strength, weakened(character, strength))
+        for strength in _STRENGTHS
+    ]
+    walks.append(_walk(runner, "none", 0.0, {"root_assistance": False}))
+    result.rows += [
+        {
+            "root stiffness": walk.name,
+            "falls at (s)": walk.fall,
+            "mean joint error until then (rad)": walk.joint_error,
+            "mean root error until then (m)": walk.root_error,
+            "root force / weight until then": walk.force_share,
+        }
+        for walk in walks
+    ]
+    _draw(result, walks[:-1])
+    _draw_poses(result, walks[-1], walks[0])
+    longest = max((walk.run for walk in walks), key=lambda run: len(run.times))
+    result.add_curves(
+        "assistance_height",
+        {
+            "time_s": longest.times,
+            "reference_m": longest.reference_position[:, 2],
+            **{f"{walk.name.replace(' ', '')}_m": walk.run.position[:, 2] for walk in walks},
+        },
+    )
+    zero, none = walks[-2:]
+    same = np.array_equal(none.run.position, zero.run.position)
+    result.notes += [
+        f"without assistance it falls at {none.fall:.3g} s: 28 motors cannot hold 34 degrees of "
+        "freedom on a path that was not planned for them (underactuation)"
+        if none.fall is not None
+        else "without assistance it does not fall",
+        "root gains of zero and a root that may not be commanded: "
+        f"{'the same states' if same else 'other states'}",
+    ]
 
 
 def weakened(character: Character, strength: float) -> dict[str, object]:
@@ -90,40 +94,25 @@ def weakened(character: Character, strength: float) -> dict[str, object]:
 
 
 def _walk(runner: StudyRunner, name: str, strength: float, controller: dict[str, object]) -> _Walk:
-    reference = {"reference": "clip", "clip": "walk"}
-    label = name.replace(" ", "")
-    case = RunSpec(label, _CHARACTER, _DURATION, reference, controller=controller)
+    case = RunSpec(name.replace(" ", ""), _CHARACTER, _DURATION, WALK, controller=controller)
     run = runner.run(case).recording
-    position, desired = run.position[:-1], run.reference_position[:-1]
-    fall = fall_time(run.times[:-1], position[:, 2], desired[:, 2])
-    until = len(position) if fall is None else int(np.searchsorted(run.times, fall))
-    weight = run.character.mass * float(run.parameters["gravity"])
+    fall = fall_time(run)
+    until = len(run.effort) if fall is None else int(np.searchsorted(run.times, fall))
+    off = run.position[:until, :3] - run.reference_position[:until, :3]
     return _Walk(
         name,
         strength,
         run,
         fall,
-        float(errors_by_joint(run.layout, position[:until], desired[:until]).mean()),
-        float(np.linalg.norm(position[:until, :3] - desired[:until, :3], axis=1).mean()),
-        float(np.linalg.norm(run.effort[:until, :3], axis=1).mean()) / weight,
+        float(joint_errors(run)[:until].mean()),
+        float(np.linalg.norm(off, axis=1).mean()),
+        root_force_share(run, until),
     )
 
 
-def _notes(walks: Sequence[_Walk]) -> Sequence[str]:
-    none, zero = walks[-1], walks[-2]
-    same = np.array_equal(none.run.position, zero.run.position)
-    return (
-        f"without assistance it falls at {none.fall:.3g} s: 28 motors cannot hold 34 degrees of "
-        "freedom on a path that was not planned for them (underactuation)"
-        if none.fall is not None
-        else "without assistance it does not fall",
-        f"root gains of zero and a root that may not be commanded: "
-        f"{'the same states' if same else 'other states'}",
-    )
-
-
-def _draw(walks: Sequence[_Walk]) -> "Figure":
-    figure, panels = make_panels(2, 2, (12.0, 7.5))
+def _draw(result: StudyResult, walks: Sequence[_Walk]) -> None:
+    title = "the walk needs a force that no motor gives"
+    panels = result.add_panels(result.name, 2, 2, (12.0, 7.5), title=title)
     strengths = [max(walk.strength, _SMALLEST) for walk in walks]
     falls, errors, forces, heights = panels
     for walk, place in zip(walks, strengths, strict=True):
@@ -151,31 +140,22 @@ def _draw(walks: Sequence[_Walk]) -> "Figure":
     )
     label(heights, "time (s)", "root height (m)", legend="center right")
     heights.set_xlim(right=1.3 * _DURATION)  # for the legend
-    figure.suptitle("the walk needs a force that no motor gives")
-    return figure
 
 
-def _pictures(walks: Sequence[_Walk]) -> dict[str, Picture]:
+def _draw_poses(result: StudyResult, none: _Walk, full: _Walk) -> None:
     """The fall without assistance, and the same times with all of it."""
-    none, full = walks[-1], walks[0]
     end = min(1.5 * (none.fall or _DURATION), float(none.run.times[-2]))
     times = np.linspace(0.0, end, _PICTURES).tolist()
-    return {
+    pictures = {
         f"{named}; the reference in green": strip(walk.run, times, ghost=True, size=_SIZE)
         for named, walk in (("without assistance", none), ("with root force and torque", full))
     }
+    result.add_pictures("assistance_poses", pictures)
 
 
-def _heights(walks: Sequence[_Walk]) -> tuple[Sequence[str], FloatArray]:
-    """Height of the root over time; NaN after an end before the time."""
-    ticks = max(len(walk.run.times) for walk in walks)
-    longest = next(walk.run for walk in walks if len(walk.run.times) == ticks)
-    columns = [longest.times, longest.reference_position[:, 2]]
-    for walk in walks:
-        height = walk.run.position[:, 2]
-        columns.append(np.pad(height, (0, ticks - len(height)), constant_values=np.nan))
-    names = [f"{walk.name.replace(' ', '')}_m" for walk in walks]
-    return ["time_s", "reference_m", *names], np.column_stack(columns)
-
-
-STUDY = AssistanceStudy()
+STUDY = Study(
+    "assistance",
+    "the walk by strength of root force and torque",
+    runs=len(_STRENGTHS) + 1,
+    fill=_fill,
+)

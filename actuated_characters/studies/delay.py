@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from actuated_characters.studies.framework.plots import label, make_panels
-from actuated_characters.studies.framework.study import RunSpec, StudyResult, StudyRunner
+from actuated_characters.studies.framework.plots import label
+from actuated_characters.studies.framework.result import StudyResult
+from actuated_characters.studies.framework.study import WALK, RunSpec, Study, StudyRunner
 from actuated_characters.studies.framework.tracking import (
     delayed_spectral_radius,
-    errors_by_joint,
     fall_time,
+    joint_errors,
 )
 from controller_node import parameters as controller_parameters
 from controller_node.control_laws import GainArrays
@@ -20,10 +21,6 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.parameters import resolve
-
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _CHARACTER = "humanoid"
 _RATES = (120, 240, 480, 960)  # Hz, of control
@@ -54,7 +51,7 @@ class _Cell:
         return self.diverged or self.fall is not None
 
     @property
-    def said(self) -> str:
+    def text(self) -> str:
         """What became of it, in a few words."""
         if self.diverged:
             return f"diverges\n{self.end:.2f} s"
@@ -63,48 +60,31 @@ class _Cell:
         return f"{self.error:.3f}"
 
 
-class DelayStudy:
-    """The humanoid walks with root assistance; its commands come late by some ticks."""
-
-    name = "delay"
-    title = "tracking of the walk by control rate and delay, with root assistance"
-    runs = len(_RATES) * len(_DELAYS)
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Walk at each rate with each delay."""
-        character = load_character(_CHARACTER)
-        cells = [_measure(runner, character, rate, delay) for rate in _RATES for delay in _DELAYS]
-        return StudyResult(
-            columns=(
-                "rate (Hz)",
-                "delay (ticks)",
-                "delay (ms)",
-                "mean joint error (rad)",
-                "ends at (s)",
-                "diverged",
-                "falls at (s)",
-                "growth a tick by theory",
-            ),
-            rows=[
-                (
-                    cell.rate,
-                    cell.delay,
-                    cell.delay_ms,
-                    cell.error,
-                    cell.end,
-                    cell.diverged,
-                    cell.fall,
-                    cell.growth,
-                )
-                for cell in cells
-            ],
-            figures={self.name: _draw(cells)},
-            notes=(
-                "stable PD foresees its own period, not a late command: one tick of delay is "
-                "harmless from 480 Hz on, two ticks shake the character at any rate",
-                "the error of a run that diverged is that until then",
-            ),
-        )
+def _fill(runner: StudyRunner, result: StudyResult) -> None:
+    """Walk with root assistance at each rate, the commands late by each number of ticks."""
+    character = load_character(_CHARACTER)
+    cells = [_measure(runner, character, rate, delay) for rate in _RATES for delay in _DELAYS]
+    result.rows += [
+        {
+            "rate (Hz)": cell.rate,
+            "delay (ticks)": cell.delay,
+            "delay (ms)": cell.delay_ms,
+            "mean joint error (rad)": cell.error,
+            "ends at (s)": cell.end,
+            "diverged": cell.diverged,
+            "falls at (s)": cell.fall,
+            "growth a tick by theory": cell.growth,
+        }
+        for cell in cells
+    ]
+    lines, grid = result.add_panels(result.name, 1, 2, (13.0, 5.5))
+    _draw_lines(lines, cells)
+    _draw_map(grid, cells)
+    result.notes += [
+        "stable PD foresees its own period, not a late command: one tick of delay is "
+        "harmless from 480 Hz on, two ticks shake the character at any rate",
+        "the error of a run that diverged is that until then",
+    ]
 
 
 def small_deviations(
@@ -137,65 +117,45 @@ def small_deviations(
 
 def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -> _Cell:
     substeps = _ENGINE_RATE // rate
-    outcome = runner.run(
-        RunSpec(
-            f"{rate}Hz_{delay}ticks",
-            _CHARACTER,
-            _DURATION,
-            {"reference": "clip", "clip": "walk"},
-            {"rate": rate, "substeps": substeps, "command_delay_ticks": delay},
-        )
-    )
+    simulator = {"rate": rate, "substeps": substeps, "command_delay_ticks": delay}
+    case = RunSpec(f"{rate}Hz_{delay}ticks", _CHARACTER, _DURATION, WALK, simulator)
+    outcome = runner.run(case)
     run = outcome.recording
-    times, desired = run.times[:-1], run.reference_position[:-1]
     return _Cell(
         rate,
         delay,
-        float(errors_by_joint(run.layout, run.position[:-1], desired).mean()),
+        float(joint_errors(run)[:-1].mean()),
         float(run.times[-1]),
         bool(outcome.diverged),
-        fall_time(times, run.position[:-1, 2], desired[:, 2]),
+        fall_time(run),
         small_deviations(character, rate, delay, substeps, {"character": _CHARACTER}),
     )
 
 
-def _draw(cells: Sequence[_Cell]) -> "Figure":
-    figure, (lines, grid) = make_panels(1, 2, (13.0, 5.5))
+def _draw_lines(axes: Axes, cells: Sequence[_Cell]) -> None:
+    """The error over the delay, a line a rate; a cross where the walk fails."""
     for rate in _RATES:
-        own = [cell for cell in cells if cell.rate == rate]
-        held = [cell for cell in own if not cell.fails]
-        (line,) = lines.plot(
-            [cell.delay_ms for cell in held],
-            [cell.error for cell in held],
-            "o-",
-            label=f"{rate} Hz",
-        )
-        lost = [cell for cell in own if cell.fails]
-        lines.plot(
-            [cell.delay_ms for cell in lost],
-            [_WORST] * len(lost),
-            "x",
-            color=line.get_color(),
-            markersize=9,
-            markeredgewidth=2,
-        )
-    lines.plot([], [], "kx", label="diverges or falls")
-    lines.set_yscale("log")
-    lines.set_yticks([0.05, 0.1, 0.2, 0.4], ["0.05", "0.1", "0.2", "0.4"])
-    lines.set_yticks([], minor=True)
-    label(lines, "delay of commands (ms)", "mean joint error (rad)", "walk, 3 s, root assistance")
-    _draw_map(grid, cells)
-    return figure
+        of_rate = [cell for cell in cells if cell.rate == rate]
+        walked = [(cell.delay_ms, cell.error) for cell in of_rate if not cell.fails]
+        failed = [(cell.delay_ms, _WORST) for cell in of_rate if cell.fails]
+        (line,) = axes.plot(*np.reshape(walked, (-1, 2)).T, "o-", label=f"{rate} Hz")
+        (crosses,) = axes.plot(*np.reshape(failed, (-1, 2)).T, "x", color=line.get_color())
+        crosses.set(markersize=9, markeredgewidth=2)
+    axes.plot([], [], "kx", label="diverges or falls")
+    axes.set_yscale("log")
+    axes.set_yticks([0.05, 0.1, 0.2, 0.4], ["0.05", "0.1", "0.2", "0.4"])
+    axes.set_yticks([], minor=True)
+    label(axes, "delay of commands (ms)", "mean joint error (rad)", "walk, 3 s, root assistance")
 
 
-def _draw_map(axes: "Axes", cells: Sequence[_Cell]) -> None:
+def _draw_map(axes: Axes, cells: Sequence[_Cell]) -> None:
     errors: FloatArray = np.array([_WORST if cell.fails else cell.error for cell in cells])
     table = errors.reshape(len(_RATES), len(_DELAYS))
     axes.imshow(np.log(table), cmap="viridis_r", vmin=np.log(_BEST), vmax=np.log(_WORST))
     for number, cell in enumerate(cells):
         row, column = divmod(number, len(_DELAYS))
         dark = table[row, column] > (_WORST * _BEST) ** 0.5
-        text = f"{cell.said}\n(x {cell.growth:.3f})"
+        text = f"{cell.text}\n(x {cell.growth:.3f})"
         color = "white" if dark else "black"
         axes.text(column, row, text, ha="center", va="center", fontsize="small", color=color)
     axes.set_xticks(range(len(_DELAYS)), [str(delay) for delay in _DELAYS])
@@ -211,4 +171,9 @@ def _draw_map(axes: "Axes", cells: Sequence[_Cell]) -> None:
     axes.grid(visible=False)
 
 
-STUDY = DelayStudy()
+STUDY = Study(
+    "delay",
+    "tracking of the walk by control rate and delay, with root assistance",
+    runs=len(_RATES) * len(_DELAYS),
+    fill=_fill,
+)

@@ -3,34 +3,24 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.equation_of_motion import EquationOfMotion
 from actuated_characters.runs.plan import make_plan
-from actuated_characters.studies.framework.plots import label, make_panels
-from actuated_characters.studies.framework.study import (
-    Cell,
-    RunResult,
-    RunSpec,
-    StudyResult,
-    StudyRunner,
-)
+from actuated_characters.studies.framework.plots import label
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, Study, StudyRunner
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
-
 _DURATION = 3.0  # s
-_WALK: Mapping[str, object] = {"reference": "clip", "clip": "walk"}
 _CASES = (
-    RunSpec("walk", "humanoid", _DURATION, _WALK, contacts=True),
+    RunSpec("walk", "humanoid", _DURATION, WALK, contacts=True),
     RunSpec("stand", "humanoid", _DURATION, contacts=True),
     RunSpec("fall", "humanoid", _DURATION, controller={"root_assistance": False}, contacts=True),
 )
@@ -62,43 +52,40 @@ class TickTime:
         return self.over_topics - self.physics - self.control
 
 
-class EquationStudy:
-    """What went over the topics, put into `M (v' - v) / h + C = f + J^T lambda`."""
-
-    name = "equation"
-    title = "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part"
-    runs = len(_CASES)
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Walk, stand and fall; and time a walk part by part."""
-        outcomes = {case.label: runner.run(case) for case in _CASES}
-        closures = {name: close(outcome.recording) for name, outcome in outcomes.items()}
-        tick = _measure(outcomes["walk"])
-        rows = [_row(name, closure) for name, closure in closures.items()]
-        walk = closures["walk"]
-        return StudyResult(
-            columns=("run", "p50", "p99", "largest", "p50 without contacts"),
-            rows=rows,
-            figures={self.name: _draw(closures, tick)},
-            curves={
-                "equation_walk": (
-                    ("time_s", "relative_residual", "without_contacts"),
-                    np.column_stack((walk.times, walk.relative, walk.without_contacts)),
-                )
-            },
-            notes=(
-                "all forces are on the topics, and the equation closes to rounding; the efforts of "
-                "joint limits are on none, and are left out on those joints' own entries",
-                f"of a tick's {tick.over_topics:.0f} us over topics physics takes "
-                f"{tick.physics:.0f}, the control law {tick.control:.0f}, topics and recorder "
-                f"{tick.transport:.0f}",
-            ),
-        )
+def _fill(runner: StudyRunner, result: StudyResult) -> None:
+    """Walk, stand and fall; put what went over the topics into the equation; time a walk."""
+    outcomes = {case.label: runner.run(case) for case in _CASES}
+    closures = {name: close(outcome.recording) for name, outcome in outcomes.items()}
+    tick, walk = _measure(outcomes["walk"]), closures["walk"]
+    result.rows += [_row(name, closure) for name, closure in closures.items()]
+    _draw(result, closures, tick)
+    result.add_curves(
+        "equation_walk",
+        {
+            "time_s": walk.times,
+            "relative_residual": walk.relative,
+            "without_contacts": walk.without_contacts,
+        },
+    )
+    result.notes += [
+        "all forces are on the topics, and the equation closes to rounding; the efforts of "
+        "joint limits are on none, and are left out on those joints' own entries",
+        f"of a tick's {tick.over_topics:.0f} us over topics physics takes "
+        f"{tick.physics:.0f}, the control law {tick.control:.0f}, topics and recorder "
+        f"{tick.transport:.0f}",
+    ]
 
 
-def _row(name: str, closure: Closure) -> list[Cell]:
+def _row(name: str, closure: Closure) -> Row:
     p50, p99, largest = np.percentile(closure.relative, (50, 99, 100)).tolist()
-    return [name, p50, p99, largest, float(np.median(closure.without_contacts))]
+    without = float(np.median(closure.without_contacts))
+    return {
+        "run": name,
+        "p50": p50,
+        "p99": p99,
+        "largest": largest,
+        "p50 without contacts": without,
+    }
 
 
 def close(run: Recording) -> Closure:
@@ -129,7 +116,7 @@ def _rows(contacts: WrenchArrays | None, links: Mapping[str, int]) -> FloatArray
 
 def _measure(walk: RunResult) -> TickTime:
     """Time the walk's parts in one process; the whole is that of the run over topics."""
-    plan = make_plan("humanoid", 1.0, _WALK, {}, {})
+    plan = make_plan("humanoid", 1.0, WALK, {}, {})
     controller = make_controller(plan.character, plan.reference, plan.controller)
     role = make_character_setup(plan.character, plan.simulator)
     physics, control = [], []
@@ -152,12 +139,11 @@ def _measure(walk: RunResult) -> TickTime:
     )
 
 
-def _draw(closures: Mapping[str, Closure], tick: TickTime) -> "Figure":
-    figure, (residuals, norms, bars) = make_panels(3, 1, (10.0, 9.0))
+def _draw(result: StudyResult, closures: Mapping[str, Closure], tick: TickTime) -> None:
+    residuals, norms, bars = result.add_panels(result.name, 3, 1, (10.0, 9.0))
     for name, closure in closures.items():
-        (line,) = residuals.semilogy(
-            closure.times, np.maximum(closure.relative, _SMALLEST), linewidth=0.8, label=name
-        )
+        shown = np.maximum(closure.relative, _SMALLEST)
+        (line,) = residuals.semilogy(closure.times, shown, linewidth=0.8, label=name)
         residuals.semilogy(
             closure.times,
             np.maximum(closure.without_contacts, _SMALLEST),
@@ -181,7 +167,11 @@ def _draw(closures: Mapping[str, Closure], tick: TickTime) -> "Figure":
         start += width
     bars.set_yticks([])
     label(bars, "time (µs)", "", "where a tick's time goes, walk", legend="upper right")
-    return figure
 
 
-STUDY = EquationStudy()
+STUDY = Study(
+    "equation",
+    "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part",
+    runs=len(_CASES),
+    fill=_fill,
+)

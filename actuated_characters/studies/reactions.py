@@ -2,20 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.recording_metrics import distances, vectors_of
 from actuated_characters.render.stills import strip
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.reactions import mode_spans
-from actuated_characters.studies.framework.study import Cell, RunSpec, StudyResult, StudyRunner
+from actuated_characters.studies.framework.result import StudyResult
+from actuated_characters.studies.framework.study import WALK, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.tracking import joint_errors
 from msgs_config.arrays import FloatArray
-
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
 
 IMPULSES = (5.0, 10.0, 20.0, 40.0)  # N s
 HIT = 1.0  # s
@@ -24,10 +21,9 @@ _SPEED = 8.0  # m/s
 _LENGTH, _LONG = 4.0, 8.0  # s, of the runs; of those that fall and get up
 _RAGDOLL_HIT = 0.15  # s: later it is out of the ball's way
 _AROUND = 0.05  # s before and after the hit between which the ball's momentum is compared
-_AS_BEFORE = 1.1  # times the largest error of who is not hit
+_AS_BEFORE = 1.1  # times the largest error without a hit
 _PEAK = 1.5  # s after the hit in which the root's largest displacement is looked for
 _MODES = ("REACT", "BLEND", "LIMP")
-_WIDTH = 12.0  # inches of a picture of poses
 _MOMENTS = {
     "ragdoll": (0.0, 0.1, 0.15, 0.25, 0.4, 0.6, 0.9, 3.0),
     "active_ragdoll": (0.9, 1.05, 1.4, 1.9, 3.0, 4.0, 5.0, 6.5),
@@ -53,61 +49,66 @@ class Reaction:
     error: FloatArray  # (t + 1,) rad, mean of the joints, from the clip at that time
 
 
-class ReactionStudy:
-    """The walking humanoid, hit against the chest from in front."""
+def _fill(runner: StudyRunner, result: StudyResult) -> None:
+    """Hit the walking humanoid harder and harder against the chest, from in front.
 
-    name = "reactions"
-    title = "a walk that is hit by a ball against the chest, behaviour reactive"
-    runs = len(IMPULSES) + 3
+    And two others: one that is limp, and one that gets up.
+    """
 
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Let it be hit harder and harder; and others: one that is limp, and one that gets up."""
+    def run(label: str, behaviour: str, impulse: float = 0.0, **more: float) -> Recording:
+        return runner.run(_case(label, behaviour, impulse, **more)).recording
 
-        def run(label: str, behaviour: str, impulse: float = 0.0, **more: float) -> Recording:
-            return runner.run(_case(label, behaviour, impulse, **more)).recording
-
-        strongest = IMPULSES[-1]
-        alone = run("alone", "reactive", length=_LONG)
-        hits = {
-            impulse: run(
-                f"reactive_{impulse:g}Ns",
-                "reactive",
-                impulse,
-                length=_LONG if impulse == strongest else _LENGTH,
-            )
-            for impulse in IMPULSES
-        }
-        others = {
-            "ragdoll": run("ragdoll", "ragdoll", strongest, at=_RAGDOLL_HIT, distance=1.0),
-            "active_ragdoll": run("active_ragdoll", "active_ragdoll", strongest, length=_LONG),
-        }
-        reactions = {impulse: measure(run, alone, HIT) for impulse, run in hits.items()}
-        poses = {**others, "reactive": hits[20.0]}
-        return StudyResult(
-            columns=(
-                "planned impulse (N s)",
-                "measured impulse (N s)",
-                "largest displacement of the root (m)",
-                "back on the clip (s)",
-                *(f"{mode} (s)" for mode in _MODES),
-            ),
-            rows=[_row(impulse, reactions[impulse], hits[impulse]) for impulse in IMPULSES],
-            figures={
-                self.name: _draw(alone, hits, reactions),
-                **{f"{self.name}_{name}": _poses(name, run) for name, run in poses.items()},
-            },
-            curves={
-                f"{self.name}_{impulse:g}Ns": (
-                    ("time_s", "root_displacement_m", "joint_error_rad"),
-                    np.column_stack((hits[impulse].times, each.displacement, each.error)),
-                )
-                for impulse, each in reactions.items()
-            },
-            notes=(
-                "assistance: full while it follows a clip, at most 0.2 of the weight in REACT, "
-                "none in LIMP; the ragdoll has none",
-            ),
+    strongest = IMPULSES[-1]
+    alone = run("alone", "reactive", length=_LONG)
+    hits = {
+        impulse: run(
+            f"reactive_{impulse:g}Ns",
+            "reactive",
+            impulse,
+            length=_LONG if impulse == strongest else _LENGTH,
         )
+        for impulse in IMPULSES
+    }
+    poses = {
+        "ragdoll": run("ragdoll", "ragdoll", strongest, at=_RAGDOLL_HIT, distance=1.0),
+        "active_ragdoll": run("active_ragdoll", "active_ragdoll", strongest, length=_LONG),
+        "reactive": hits[20.0],
+    }
+    reactions = {impulse: measure(hit, alone, HIT) for impulse, hit in hits.items()}
+    for impulse, reaction in reactions.items():
+        spans = mode_spans(hits[impulse])
+        result.rows.append(
+            {
+                "planned impulse (N s)": impulse,
+                "measured impulse (N s)": reaction.impulse,
+                "largest displacement of the root (m)": reaction.peak,
+                "back on the clip (s)": reaction.back,
+            }
+            | {
+                f"{mode} (s)": sum((s.duration for s in spans if s.mode == mode), start=0.0)
+                for mode in _MODES
+            }
+        )
+        result.add_curves(
+            f"{result.name}_{impulse:g}Ns",
+            {
+                "time_s": hits[impulse].times,
+                "root_displacement_m": reaction.displacement,
+                "joint_error_rad": reaction.error,
+            },
+        )
+    _draw(result, alone, hits, reactions)
+    for name, recording in poses.items():
+        result.add_pictures(
+            f"{result.name}_{name}",
+            {_TITLES[name]: strip(recording, _MOMENTS[name])},
+            title_height=0.4,
+            title_place="center",
+        )
+    result.notes.append(
+        "assistance: full while it follows a clip, at most 0.2 of the weight in REACT, "
+        "none in LIMP; the ragdoll has none"
+    )
 
 
 def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
@@ -119,8 +120,8 @@ def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
         hit: When it touches, s.
     """
     states = slice(len(run.times))
-    error = joint_errors(run, alone.reference_position[states])
-    usual = joint_errors(alone, alone.reference_position)[alone.times >= hit]
+    error = joint_errors(run, alone.reference_position[states]).mean(axis=1)
+    usual = joint_errors(alone).mean(axis=1)[alone.times >= hit]
     displacement = np.linalg.norm(run.position[:, :3] - alone.position[states, :3], axis=1)
     times, after = run.times, run.times >= hit
     is_off = np.flatnonzero(after & (error > _AS_BEFORE * np.nanmax(usual)))  # the last has none
@@ -135,13 +136,6 @@ def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
         displacement=displacement,
         error=error,
     )
-
-
-def joint_errors(run: Recording, reference: FloatArray) -> FloatArray:
-    """Mean distance (t + 1,) in rad of the joints from a reference (t + 1, n)."""
-    actuated = vectors_of(run.character).actuated
-    mean: FloatArray = distances(run, run.position, reference)[:, actuated].mean(axis=1)
-    return mean
 
 
 def lost_momentum(run: Recording, hit: float) -> float:
@@ -172,31 +166,26 @@ def _case(
         label,
         "humanoid",
         length,
-        reference={"reference": "clip", "clip": "walk"},
+        reference=WALK,
         controller={"behaviour": behaviour},
         throws=[throw] if impulse else [],
     )
 
 
-def _row(planned: float, reaction: Reaction, run: Recording) -> tuple[Cell, ...]:
-    spans = mode_spans(run)
-    lasting = [
-        sum((span.duration for span in spans if span.mode == mode), start=0.0) for mode in _MODES
-    ]
-    return (planned, reaction.impulse, reaction.peak, reaction.back, *lasting)
-
-
 def _draw(
-    alone: Recording, hits: Mapping[float, Recording], reactions: Mapping[float, Reaction]
-) -> "Figure":
-    """One panel an impulse with the root's displacement and height, and its modes above it."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 9), layout="constrained")
-    panels = figure.subplots(len(hits), 2, sharex="row")
+    result: StudyResult,
+    alone: Recording,
+    hits: Mapping[float, Recording],
+    reactions: Mapping[float, Reaction],
+) -> None:
+    """Two panels an impulse: the root's displacement and the joint error, and the modes."""
+    title = "hit against the chest at 1 s; the assistance is full in TRACK and BLEND"
+    panels = result.add_panels(result.name, len(hits), 2, (11.0, 9.0), title=title, same_x="row")
     marks, modes = Marks(), list[tuple[float, float, str]]()  # of all of them, for the legend
-    usual = joint_errors(alone, alone.reference_position)
-    for (impulse, run), (moved, error) in zip(hits.items(), panels, strict=True):
+    usual = joint_errors(alone).mean(axis=1)
+    for (impulse, run), (moved, error) in zip(
+        hits.items(), zip(panels[::2], panels[1::2], strict=True), strict=True
+    ):
         reaction = reactions[impulse]
         marks = Marks(
             throws=[float(run.times[tick]) for tick, each in enumerate(run.throws) if each],
@@ -213,26 +202,15 @@ def _draw(
             panel.set_ylim(bottom=0.0)
             panel.grid(alpha=0.3)
             marks.draw(panel, filled=False)
-    for panel in panels[-1]:
+    for panel in panels[-2:]:
         panel.set_xlabel("time (s)")
-    panels[0, 1].legend(fontsize="small")
-    replace(marks, modes=modes).explained(figure)
-    figure.suptitle("hit against the chest at 1 s; the assistance is full in TRACK and BLEND")
-    return figure
+    panels[1].legend(fontsize="small")
+    replace(marks, modes=modes).explained(result.figures[result.name])
 
 
-def _poses(name: str, run: Recording) -> "Figure":
-    """Pictures from before the hit until it is over."""
-    from matplotlib.figure import Figure
-
-    picture = strip([run], _MOMENTS[name])
-    height, width, _ = picture.shape
-    figure = Figure(figsize=(_WIDTH, _WIDTH * height / width + 0.4), layout="constrained")
-    panel = figure.subplots()
-    panel.imshow(picture)
-    panel.set_title(_TITLES[name], fontsize="medium")
-    panel.set_axis_off()
-    return figure
-
-
-STUDY = ReactionStudy()
+STUDY = Study(
+    "reactions",
+    "a walk that is hit by a ball against the chest, behaviour reactive",
+    runs=len(IMPULSES) + 3,
+    fill=_fill,
+)

@@ -58,16 +58,13 @@ def write_box(runner: StudyRunner, box: Box) -> str:
     return _write(runner, box.name, box.link())
 
 
-def write_hinged_boxes(
-    runner: StudyRunner, name: str, parent: Box, child: Box, *, joint_in_parent: Vector
-) -> str:
-    """Write two boxes that float, joined by a hinge about y; returns the character's path.
+def write_hinged_boxes(runner: StudyRunner, name: str, parent: Box, child: Box) -> str:
+    """Write two boxes that float, joined by a hinge about y at the origins of both.
 
-    The hinge is at the child's origin, and at `joint_in_parent` (m) in the parent's frame.
+    Returns the character's path.
     """
     joint = f"""  <joint name="{HINGE}" type="continuous">
-    <parent link="{parent.name}"/><child link="{child.name}"/>
-    <origin xyz="{_listed(joint_in_parent)}"/><axis xyz="0 1 0"/>
+    <parent link="{parent.name}"/><child link="{child.name}"/><axis xyz="0 1 0"/>
   </joint>
 """
     return _write(runner, name, parent.link() + child.link() + joint)
@@ -75,8 +72,10 @@ def write_hinged_boxes(
 
 def _write(runner: StudyRunner, name: str, elements: str) -> str:
     text = f'<?xml version="1.0"?>\n<robot name="{name}">\n{elements}</robot>\n'
-    runner.write(f"{name}.urdf", text)
-    return runner.write(f"{name}.yaml", f"urdf: {name}.urdf\ninertia: file\n")
+    runner.path(f"{name}.urdf").write_text(text, encoding="utf-8")
+    path = runner.path(f"{name}.yaml")
+    path.write_text(f"urdf: {name}.urdf\ninertia: file\n", encoding="utf-8")
+    return str(path)
 
 
 def _listed(numbers: Sequence[float]) -> str:
@@ -99,33 +98,17 @@ class Momenta:
 
 
 def momenta(character: Character, position: FloatArray, velocity: FloatArray) -> Momenta:
-    """The momentum of states (t, n) of a character, summed over its links.
+    """The momentum of states (t, n) of a character with a floating base.
 
-    `P = sum m v` and `L = sum (c x m v + I w)`, with each link's centre of mass c and its inertia I
-    in the world's axes.
+    The first entries of the generalised momentum `M v` are P in the world's axes, and L about the
+    base's origin in the base's axes.
     """
     model = DynamicsModel(character)
-    masses = np.array([link.mass for link in character.links])
-    rows = [_of_state(model, character, *state) for state in zip(position, velocity, strict=True)]
-    centres, velocities, spins = (np.array(part) for part in zip(*rows, strict=True))
-    momentum = masses[:, np.newaxis] * velocities
-    return Momenta(
-        centre=(masses[:, np.newaxis] * centres).sum(axis=1) / masses.sum(),
-        linear=momentum.sum(axis=1),
-        angular=(np.cross(centres, momentum) + spins).sum(axis=1),
-    )
-
-
-def _of_state(
-    model: DynamicsModel, character: Character, position: FloatArray, velocity: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centre of mass, its velocity, and `I w` of each link (links, 3) in one state."""
-    model.update(position, velocity)
-    origins, turns = model.link_poses()
-    motions = np.array([model.link_jacobian(k) @ velocity for k in range(len(origins))])
-    poses = [link.inertial_pose for link in character.links]
-    centres = origins + rotations.rotate(turns, np.array([pose.position for pose in poses]))
-    inertial = rotations.multiply(turns, np.array([pose.orientation_xyzw for pose in poses]))
-    moments = np.array([link.inertia_diagonal for link in character.links])
-    own = moments * rotations.rotate(rotations.conjugate(inertial), motions[:, 3:])
-    return centres, motions[:, :3], rotations.rotate(inertial, own)
+    centres, momentum = np.empty((len(position), 3)), np.empty((len(position), 6))
+    for row, state in enumerate(zip(position, velocity, strict=True)):
+        model.update(*state)
+        centres[row] = model.centre_of_mass()
+        momentum[row] = (model.mass_matrix() @ state[1])[:6]
+    linear, turns = momentum[:, :3], rotations.exp(position[:, 3:6])
+    about_base = rotations.rotate(turns, momentum[:, 3:])
+    return Momenta(centres, linear, np.cross(position[:, :3], linear) + about_base)

@@ -2,23 +2,36 @@
 
 import numpy as np
 
+from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics.recording_metrics import distances, vectors_of, weight
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import JointLayout, JointType
 
 _FALL_FRACTION = 0.5  # of the reference's root height, as `fell` of a run's summary has it ...
 _LEAST_HEIGHT = 0.5  # m; ... where the reference is not lying itself
 
 
-def errors_by_joint(layout: JointLayout, position: FloatArray, desired: FloatArray) -> FloatArray:
-    """Angle (t, j) in rad between positions and desired ones (t, n), for each of j joints.
+def joint_errors(run: Recording, reference: FloatArray | None = None) -> FloatArray:
+    """Angle (t + 1, j) in rad of each of j hinges and balls from where it is to be.
 
-    The joints are the layout's hinges and balls, in its order; NaN where nothing was desired.
+    `reference` (t + 1, n) stands for the run's own; NaN where there is none, as after the last
+    tick.
     """
-    difference = layout.difference(layout.configuration(position), layout.configuration(desired))
-    kinds = [joint.type for joint in layout.joints for _ in joint.vectors]
-    rotate = [kind in (JointType.REVOLUTE, JointType.SPHERICAL) for kind in kinds]
-    errors: FloatArray = layout.norms(difference)[:, rotate]
+    desired = run.reference_position if reference is None else reference
+    vectors = vectors_of(run.character)
+    rotates = vectors.actuated & (np.array(vectors.units) == "rad")
+    errors: FloatArray = distances(run, run.position, desired)[:, rotates]
     return errors
+
+
+def mean_joint_errors(run: Recording) -> FloatArray:
+    """The joint error (t,) in rad, mean over the joints, before each tick."""
+    errors: FloatArray = joint_errors(run)[:-1].mean(axis=1)
+    return errors
+
+
+def root_force_share(run: Recording, ticks: int | None = None) -> float:
+    """Size of the root's force over the character's weight, mean over so many first ticks."""
+    return float(np.linalg.norm(run.effort[:ticks, :3], axis=1).mean()) / weight(run)
 
 
 def overshoot(angle: FloatArray, reference: FloatArray) -> float:
@@ -81,16 +94,14 @@ def inertialess_response(
     return angle
 
 
-def fall_time(times: FloatArray, height: FloatArray, desired: FloatArray) -> float | None:
-    """When the root first is below half of its desired height; None if it never is.
+def fall_time(run: Recording) -> float | None:
+    """When, in s, the root first is below half of its desired height; None if it never is.
 
-    Args:
-        times: Of the states (t,), s.
-        height: Of the root (t,), m.
-        desired: Its reference (t,), m; below 0.5 m it lies by intention, which is no fall.
+    A reference below 0.5 m lies by intention, which is no fall.
     """
+    height, desired = run.position[:-1, 2], run.reference_position[:-1, 2]
     fallen = (desired > _LEAST_HEIGHT) & (height < _FALL_FRACTION * desired)
-    return float(times[int(fallen.argmax())]) if fallen.any() else None
+    return float(run.times[int(fallen.argmax())]) if fallen.any() else None
 
 
 def delayed_spectral_radius(
