@@ -13,7 +13,8 @@ from actuated_characters.studies.catalogue import NAMES, load_study
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.studies.framework.study import Cell, Study, StudyResult
+    from actuated_characters.studies.framework.result import Cell, StudyResult
+    from actuated_characters.studies.framework.study import Study
 
 _ALL = "all"
 
@@ -57,7 +58,7 @@ def _study(options: argparse.Namespace) -> None:
 
 
 def _run_study(study: "Study", directory: Path, *, keep_runs: bool) -> None:
-    from actuated_characters.studies.framework.runner import TopicRunner, write_result
+    from actuated_characters.studies.framework.runner import TopicRunner
 
     console = Console()
     done: dict[str, float] = {}
@@ -77,7 +78,7 @@ def _run_study(study: "Study", directory: Path, *, keep_runs: bool) -> None:
         runner = TopicRunner(directory, keep_runs=keep_runs, report=report)
         result = study.run(runner)
         bar.update(task, description=study.name, completed=bar.tasks[task].total)
-    files = write_result(directory, study.name, result)
+    files = result.write(directory)
     console.print(_table(study.title, result))
     for note in result.notes:
         console.print(note)
@@ -89,7 +90,7 @@ def _table(title: str, result: "StudyResult") -> Table:
     for column in result.columns:
         table.add_column(column, overflow="fold")
     for row in result.rows:
-        table.add_row(*(_shown(cell) for cell in row))
+        table.add_row(*(_shown(cell) for cell in row.values()))
     return table
 
 

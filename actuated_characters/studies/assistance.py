@@ -1,15 +1,14 @@
 """What the lecture's root force and torque do: the walk with less and less of them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import label
-from actuated_characters.studies.framework.result import StudyResult
-from actuated_characters.studies.framework.study import WALK, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (
     fall_time,
     joint_errors,
@@ -19,6 +18,9 @@ from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import ROOT_TORQUE, Character
 
+TITLE = "the walk by strength of root force and torque"
+RUNS = 7
+
 _CHARACTER = "humanoid"
 _STRENGTHS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)  # of root force and torque
 _DURATION = 5.0  # s
@@ -26,54 +28,26 @@ _SMALLEST = 0.003  # where no assistance is drawn on an axis that has no zero
 _PICTURES, _SIZE = 8, (190, 240)
 
 
-@dataclass(frozen=True)
-class _Walk:
-    """What became of the walk with assistance of one strength."""
-
-    name: str
-    strength: float  # share of the character's own stiffness
-    run: Recording
-    fall: float | None  # s
-    joint_error: float  # rad, mean until the fall
-    root_error: float  # m, mean until the fall
-    force_share: float  # mean root force over the weight until the fall
-
-
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Walk with each strength of root force and torque, and with a root without commands."""
     character = load_character(_CHARACTER)
-    walks = [
-        _walk(runner, f"x {strength:g}", strength, weakened(character, strength))
-        for strength in _STRENGTHS
-    ]
-    walks.append(_walk(runner, "none", 0.0, {"root_assistance": False}))
-    result.rows += [
-        {
-            "root stiffness": walk.name,
-            "falls at (s)": walk.fall,
-            "mean joint error until then (rad)": walk.joint_error,
-            "mean root error until then (m)": walk.root_error,
-            "root force / weight until then": walk.force_share,
-        }
-        for walk in walks
-    ]
-    _draw(result, walks[:-1])
-    _draw_poses(result, walks[-1], walks[0])
-    longest = max((walk.run for walk in walks), key=lambda run: len(run.times))
-    result.add_curves(
-        "assistance_height",
-        {
-            "time_s": longest.times,
-            "reference_m": longest.reference_position[:, 2],
-            **{f"{walk.name.replace(' ', '')}_m": walk.run.position[:, 2] for walk in walks},
-        },
-    )
-    zero, none = walks[-2:]
-    same = np.array_equal(none.run.position, zero.run.position)
+    controllers = {f"x {strength:g}": weakened(character, strength) for strength in _STRENGTHS}
+    controllers["none"] = {"root_assistance": False}
+    runs = {name: _walk(runner, name, given) for name, given in controllers.items()}
+    result.rows += [_row(name, run) for name, run in runs.items()]
+    first, *_, zero, none = runs.values()
+    _draw(result, runs)
+    _draw_poses(result, none, first)
+    longest = max(runs.values(), key=lambda run: len(run.times))
+    curves = {"time_s": longest.times, "reference_m": longest.reference_position[:, 2]}
+    for name, run in runs.items():
+        curves[f"{name.replace(' ', '')}_m"] = run.position[:, 2]
+    result.add_curves("assistance_height", curves)
+    fall, same = fall_time(none), np.array_equal(none.position, zero.position)
     result.notes += [
-        f"without assistance it falls at {none.fall:.3g} s: 28 motors cannot hold 34 degrees of "
+        f"without assistance it falls at {fall:.3g} s: 28 motors cannot hold 34 degrees of "
         "freedom on a path that was not planned for them (underactuation)"
-        if none.fall is not None
+        if fall is not None
         else "without assistance it does not fall",
         "root gains of zero and a root that may not be commanded: "
         f"{'the same states' if same else 'other states'}",
@@ -93,69 +67,64 @@ def weakened(character: Character, strength: float) -> dict[str, object]:
     return given
 
 
-def _walk(runner: StudyRunner, name: str, strength: float, controller: dict[str, object]) -> _Walk:
-    case = RunSpec(name.replace(" ", ""), _CHARACTER, _DURATION, WALK, controller=controller)
-    run = runner.run(case).recording
+def _walk(runner: StudyRunner, name: str, controller: dict[str, object]) -> Recording:
+    label = name.replace(" ", "")
+    case = RunSpec(label, _CHARACTER, _DURATION, WALK, controller=controller)
+    return runner.run(case).recording
+
+
+def _row(name: str, run: Recording) -> Row:
     fall = fall_time(run)
     until = len(run.effort) if fall is None else int(np.searchsorted(run.times, fall))
     off = run.position[:until, :3] - run.reference_position[:until, :3]
-    return _Walk(
-        name,
-        strength,
-        run,
-        fall,
-        float(joint_errors(run)[:until].mean()),
-        float(np.linalg.norm(off, axis=1).mean()),
-        root_force_share(run, until),
-    )
+    return {
+        "root stiffness": name,
+        "falls at (s)": fall,
+        "mean joint error until then (rad)": float(joint_errors(run)[:until].mean()),
+        "mean root error until then (m)": float(np.linalg.norm(off, axis=1).mean()),
+        "root force / weight until then": root_force_share(run, until),
+    }
 
 
-def _draw(result: StudyResult, walks: Sequence[_Walk]) -> None:
+def _draw(result: StudyResult, runs: Mapping[str, Recording]) -> None:
     title = "the walk needs a force that no motor gives"
     panels = result.add_panels(result.name, 2, 2, (12.0, 7.5), title=title)
-    strengths = [max(walk.strength, _SMALLEST) for walk in walks]
     falls, errors, forces, heights = panels
-    for walk, place in zip(walks, strengths, strict=True):
-        held = walk.fall is None
-        falls.plot(place, walk.fall or _DURATION, "^" if held else "o", color="tab:blue")
-    falls.plot(strengths, [walk.fall or _DURATION for walk in walks], color="tab:blue")
+    strengths = [max(strength, _SMALLEST) for strength in _STRENGTHS]
+    columns = {name: result.column(name)[:-1] for name in result.columns}
+    times = columns["falls at (s)"]
+    for time, place in zip(times, strengths, strict=True):
+        falls.plot(place, time or _DURATION, "^" if time is None else "o", color="tab:blue")
+    falls.plot(strengths, [time or _DURATION for time in times], color="tab:blue")
     falls.plot([], [], "^", color="tab:blue", label=f"does not fall within {_DURATION:g} s")
     label(falls, "strength of assistance", "time of the fall (s)")
-    joints = [walk.joint_error for walk in walks]
-    errors.plot(strengths, joints, "o-", label="joints (rad)")
-    errors.plot(strengths, [walk.root_error for walk in walks], "s-", label="root (m)")
+    joint, root = columns["mean joint error until then (rad)"], "mean root error until then (m)"
+    errors.plot(strengths, joint, "o-", label="joints (rad)")
+    errors.plot(strengths, columns[root], "s-", label="root (m)")
     label(errors, "strength of assistance", "mean error until the fall")
-    forces.plot(strengths, [walk.force_share for walk in walks], "o-", color="tab:green")
+    shares = columns["root force / weight until then"]
+    forces.plot(strengths, shares, "o-", color="tab:green")
     label(forces, "strength of assistance", "root force / weight until the fall", legend=None)
     for panel in (falls, errors, forces):
         panel.set_xscale("log")
-        ticks = [f"{walk.strength:g}" for walk in walks]
-        panel.set_xticks(strengths, ticks)
+        panel.set_xticks(strengths, [f"{strength:g}" for strength in _STRENGTHS])
         panel.set_xticks([], minor=True)
         panel.set_ylim(bottom=0.0)
-    for walk in walks:
-        heights.plot(walk.run.times, walk.run.position[:, 2], label=walk.name)
-    heights.plot(
-        walks[0].run.times, walks[0].run.reference_position[:, 2], "k--", label="reference"
-    )
+    *assisted, _ = runs.items()
+    for name, run in assisted:
+        heights.plot(run.times, run.position[:, 2], label=name)
+    full = assisted[0][1]
+    heights.plot(full.times, full.reference_position[:, 2], "k--", label="reference")
     label(heights, "time (s)", "root height (m)", legend="center right")
     heights.set_xlim(right=1.3 * _DURATION)  # for the legend
 
 
-def _draw_poses(result: StudyResult, none: _Walk, full: _Walk) -> None:
+def _draw_poses(result: StudyResult, none: Recording, full: Recording) -> None:
     """The fall without assistance, and the same times with all of it."""
-    end = min(1.5 * (none.fall or _DURATION), float(none.run.times[-2]))
+    end = min(1.5 * (fall_time(none) or _DURATION), float(none.times[-2]))
     times = np.linspace(0.0, end, _PICTURES).tolist()
     pictures = {
-        f"{named}; the reference in green": strip(walk.run, times, ghost=True, size=_SIZE)
-        for named, walk in (("without assistance", none), ("with root force and torque", full))
+        f"{named}; the reference in green": strip(run, times, ghost=True, size=_SIZE)
+        for named, run in (("without assistance", none), ("with root force and torque", full))
     }
     result.add_pictures("assistance_poses", pictures)
-
-
-STUDY = Study(
-    "assistance",
-    "the walk by strength of root force and torque",
-    runs=len(_STRENGTHS) + 1,
-    fill=_fill,
-)

@@ -11,12 +11,14 @@ from actuated_characters.studies.framework.result import StudyResult
 from actuated_characters.studies.framework.study import (
     RunResult,
     RunSpec,
-    Study,
     StudyRunner,
     plan_push,
 )
 from msgs_config.arrays import BoolArray
 from msgs_config.geometry import rotations
+
+TITLE = "balance without assistance: pushes at the chest, 0.1 s"
+RUNS = 30
 
 _RATE = 240  # Hz
 _PUSH_TIME, _PUSH_DURATION = 1.0, 0.1  # s
@@ -47,7 +49,7 @@ class _Limit:
     strongest: RunResult  # the run with the largest impulse that it survived
 
 
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Stand with and without the virtual force, then be pushed harder and harder.
 
     By joint efforts alone.
@@ -175,11 +177,3 @@ def _draw_poses(result: StudyResult, limp: Recording, forward: _Limit) -> None:
         panel.imshow(pose_strip(run.character, run.position[rows], captions))
         panel.set_title(title)
         panel.set_axis_off()
-
-
-STUDY = Study(
-    "balance",
-    "balance without assistance: pushes at the chest, 0.1 s",
-    runs=2 + 7 * len(_DIRECTIONS),
-    fill=_fill,
-)

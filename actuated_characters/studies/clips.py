@@ -1,22 +1,29 @@
 """Every motion clip of the humanoid, tracked with root assistance: errors, falls, real time."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 
+from actuated_characters.bags.recording import Recording
 from actuated_characters.render.engine.visual_shapes import outline
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
-from actuated_characters.studies.framework.study import RunResult, RunSpec, Study, StudyRunner
-from actuated_characters.studies.framework.tracking import joint_errors, root_force_share
+from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyRunner
+from actuated_characters.studies.framework.tracking import (
+    joint_errors,
+    mean_joint_errors,
+    root_force_share,
+)
 from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
+
+TITLE = "every clip with root assistance, 10 s each"
+RUNS = 15
 
 _CHARACTER = "humanoid"
 _DURATION = 10.0  # s
@@ -28,45 +35,31 @@ _PICTURED = {"walk": 1.3, "backflip": 1.75, "cartwheel": 2.72, "punch": 2.2}  # 
 _PICTURES, _SIZE = 8, (190, 240)
 
 
-@dataclass(frozen=True)
-class _Tracked:
-    """What a run of one clip gave."""
-
-    clip: str
-    loops: bool
-    outcome: RunResult
-    errors: FloatArray  # (t, j) rad
-    captured: tuple[str, ...]  # links, besides the feet, on the ground in the capture itself
-    touching: tuple[str, ...]  # links, besides feet and shins, on the ground in the run
-
-    @property
-    def bound(self) -> float:
-        return _BOUNDS.get(self.clip, _BOUND)
-
-    @property
-    def falls(self) -> bool:
-        """Below half its height, or on the ground with what should not be there."""
-        down = bool(self.touching) and not self.captured
-        return bool(self.outcome.summary["fell"]) or down or bool(self.outcome.diverged)
-
-
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Track each clip for the same time, and compare its error with the bound."""
     character = load_character(_CHARACTER)
-    runs = [_track(runner, character, clip) for clip in available_clips(character)]
-    result.rows += [_row(run) for run in runs]
-    _draw(result, runs)
-    _draw_poses(result, runs)
-    times = max((run.outcome.recording.times for run in runs), key=len)[:-1]
-    curves = {f"{run.clip}_rad": run.errors.mean(axis=1) for run in runs}
-    result.add_curves("clips_errors", {"time_s": times, **curves})
-    worst = max(runs, key=lambda run: float(run.errors.mean()) / run.bound)
-    fallen = ", ".join(run.clip for run in runs if run.falls) or "none"
-    down = ", ".join(run.clip for run in runs if run.captured) or "none"
+    outcomes = {clip: _track(runner, clip) for clip in available_clips(character)}
+    result.rows += [_row(character, clip, outcome) for clip, outcome in outcomes.items()]
+    _draw(result)
+    _draw_poses(result, {clip: outcome.recording for clip, outcome in outcomes.items()})
+    times = max((outcome.recording.times for outcome in outcomes.values()), key=len)
+    curves = {f"{c}_rad": mean_joint_errors(outcome.recording) for c, outcome in outcomes.items()}
+    result.add_curves("clips_errors", {"time_s": times[:-1], **curves})
+    errors, bounds = np.array(
+        [result.column("mean joint error (rad)"), result.column("bound (rad)")]
+    )
+    worst = int(np.argmax(errors / bounds))
+    falls, down = _named(result, "fell") or "none", _named(result, "down in the capture") or "none"
     result.notes += [
-        f"nearest to its bound: {worst.clip}, {worst.errors.mean():.3f} of {worst.bound:g} rad",
-        f"falls: {fallen}; in the capture itself on the ground with more than the feet: {down}",
+        f"nearest to its bound: {list(outcomes)[worst]}, {errors[worst]:.3f} of "
+        f"{bounds[worst]:g} rad",
+        f"falls: {falls}; in the capture itself on the ground with more than the feet: {down}",
     ]
+
+
+def _named(result: StudyResult, column: str) -> str:
+    """The clips that have a yes in a column."""
+    return ", ".join(row["clip"] for row in result.rows if row[column])
 
 
 def clearances(character: Character, positions: FloatArray) -> Mapping[str, FloatArray]:
@@ -92,21 +85,8 @@ def clearances(character: Character, positions: FloatArray) -> Mapping[str, Floa
     return lowest
 
 
-def _track(runner: StudyRunner, character: Character, clip: str) -> _Tracked:
-    reference = {"reference": "clip", "clip": clip}
-    outcome = runner.run(RunSpec(clip, _CHARACTER, _DURATION, reference))
-    run, feet = outcome.recording, set(character.feet)
-    parents = {link.name: character.links[link.parent].name for link in character.links[1:]}
-    # a shin reaches down to its ankle, and to the ground where the foot turns over
-    legs = feet | {parents[foot] for foot in feet}
-    return _Tracked(
-        clip,
-        read_clip(character, clip).wraps,
-        outcome,
-        joint_errors(run)[:-1],
-        _on_the_ground(character, run.reference_position[:-1:_EACH], feet),
-        _on_the_ground(character, run.position[::_EACH], legs),
-    )
+def _track(runner: StudyRunner, clip: str) -> RunResult:
+    return runner.run(RunSpec(clip, _CHARACTER, _DURATION, {"reference": "clip", "clip": clip}))
 
 
 def _on_the_ground(
@@ -118,58 +98,68 @@ def _on_the_ground(
     )
 
 
-def _row(run: _Tracked) -> Row:
-    measured = run.outcome.measured
+def _row(character: Character, clip: str, outcome: RunResult) -> Row:
+    """A fall is below half of the height, or on the ground with what should not be there."""
+    recording, errors, feet = (
+        outcome.recording,
+        joint_errors(outcome.recording),
+        set(character.feet),
+    )
+    parents = {link.name: character.links[link.parent].name for link in character.links[1:]}
+    # a shin reaches down to its ankle, and to the ground where the foot turns over
+    legs = feet | {parents[foot] for foot in feet}
+    captured = _is_down(character, recording.reference_position[:-1:_EACH], feet)
+    down = _is_down(character, recording.position[::_EACH], legs) and not captured
     return {
-        "clip": run.clip,
-        "loops": run.loops,
-        "mean joint error (rad)": float(run.errors.mean()),
-        "bound (rad)": run.bound,
-        "largest joint error (rad)": float(run.errors.max()),
-        "mean root error (m)": measured("root_error_mean_m"),
-        "root force / weight": root_force_share(run.outcome.recording),
-        "fell": run.falls,
-        "down in the capture": bool(run.captured),
-        "share saturated": measured("saturated_fraction"),
-        "real-time factor": measured("real_time_factor"),
+        "clip": clip,
+        "loops": read_clip(character, clip).wraps,
+        "mean joint error (rad)": float(errors[:-1].mean()),
+        "bound (rad)": _BOUNDS.get(clip, _BOUND),
+        "largest joint error (rad)": float(errors[:-1].max()),
+        "mean root error (m)": outcome.measured("root_error_mean_m"),
+        "root force / weight": root_force_share(recording),
+        "fell": bool(outcome.summary["fell"] or down or outcome.diverged),
+        "down in the capture": captured,
+        "share saturated": outcome.measured("saturated_fraction"),
+        "real-time factor": outcome.measured("real_time_factor"),
     }
 
 
-def _draw(result: StudyResult, runs: Sequence[_Tracked]) -> None:
+def _is_down(character: Character, positions: FloatArray, besides: set[str]) -> bool:
+    """Whether other links than some touch the ground in any of positions (t, n)."""
+    heights = clearances(character, positions)
+    return any(heights[name].min() < _TOUCH for name in heights.keys() - besides)
+
+
+def _draw(result: StudyResult) -> None:
+    clips, errors = result.column("clip"), result.column("mean joint error (rad)")
     means, others = result.add_panels(result.name, 2, 1, (11.0, 7.5), same_x=True)
-    places = np.arange(len(runs))
-    errors = [float(run.errors.mean()) for run in runs]
+    places = np.arange(len(clips))
     means.bar(places, errors, 0.7, color="tab:blue", label="mean over joints and time")
-    bounds = [run.bound for run in runs]
-    means.hlines(
-        bounds, places - 0.45, places + 0.45, color="tab:red", linewidth=2.0, label="bound"
-    )
-    falls = ", ".join(run.clip for run in runs if run.falls) or "no clip"
+    marks = means.hlines(result.column("bound (rad)"), places - 0.45, places + 0.45, label="bound")
+    marks.set(color="tab:red", linewidth=2.0)
+    falls = _named(result, "fell") or "no clip"
     label(means, "", "joint error (rad)", f"tracked with root force and torque: {falls} falls")
-    roots = [run.outcome.measured("root_error_mean_m") or 0.0 for run in runs]
+    roots = [error or 0.0 for error in result.column("mean root error (m)")]
     others.bar(places - 0.2, roots, 0.4, color="tab:orange", label="mean root error (m)")
-    twin = others.twinx()
-    shares = [root_force_share(run.outcome.recording) for run in runs]
+    twin, shares = others.twinx(), result.column("root force / weight")
     twin.bar(places + 0.2, shares, 0.4, color="tab:green", label="root force / weight")
     twin.set_ylabel("root force / weight")
     twin.legend(loc="upper right", fontsize="small")
     for panel in (others, twin):
         panel.margins(y=0.2)  # for the legends
     label(others, "", "root error (m)", legend="upper left")
-    others.set_xticks(places, [run.clip for run in runs], rotation=30, ha="right")
+    others.set_xticks(places, clips, rotation=30, ha="right")
 
 
-def _draw_poses(result: StudyResult, runs: Sequence[_Tracked]) -> None:
+def _draw_poses(result: StudyResult, recordings: Mapping[str, Recording]) -> None:
     """Poses of some clips over one cycle, the capture as a ghost."""
     pictures = {}
-    for run in runs:
-        if run.clip in _PICTURED:
-            recording = run.outcome.recording
-            last = min(_PICTURED[run.clip], float(recording.times[-2]))  # the last has no ghost
-            times = np.linspace(0.0, last, _PICTURES).tolist()
-            picture = strip(recording, times, ghost=True, size=_SIZE)
-            pictures[f"{run.clip}; the capture in green"] = picture
+    for clip, recording in recordings.items():
+        if clip not in _PICTURED:
+            continue
+        last = min(_PICTURED[clip], float(recording.times[-2]))  # the last has no ghost
+        times = np.linspace(0.0, last, _PICTURES).tolist()
+        picture = strip(recording, times, ghost=True, size=_SIZE)
+        pictures[f"{clip}; the capture in green"] = picture
     result.add_pictures("clips_poses", pictures)
-
-
-STUDY = Study("clips", "every clip with root assistance, 10 s each", runs=15, fill=_fill)

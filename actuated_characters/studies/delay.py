@@ -1,14 +1,13 @@
 """How fast control must be, and how late it may come: the walk by rate and delay of commands."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from actuated_characters.studies.framework.plots import label
-from actuated_characters.studies.framework.result import StudyResult
-from actuated_characters.studies.framework.study import WALK, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (
     delayed_spectral_radius,
     fall_time,
@@ -16,11 +15,14 @@ from actuated_characters.studies.framework.tracking import (
 )
 from controller_node import parameters as controller_parameters
 from controller_node.control_laws import GainArrays
-from msgs_config.arrays import FloatArray
+from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.parameters import resolve
+
+TITLE = "tracking of the walk by control rate and delay, with root assistance"
+RUNS = 16
 
 _CHARACTER = "humanoid"
 _RATES = (120, 240, 480, 960)  # Hz, of control
@@ -30,56 +32,20 @@ _DURATION = 3.0  # s
 _WORST, _BEST = 0.6, 0.05  # rad, the ends of the map's colours
 
 
-@dataclass(frozen=True)
-class _Cell:
-    """What became of one rate and delay."""
-
-    rate: int  # Hz
-    delay: int  # ticks
-    error: float  # rad, mean joint error until the end
-    end: float  # s
-    diverged: bool
-    fall: float | None  # s
-    growth: float  # by theory, of a small deviation a tick
-
-    @property
-    def delay_ms(self) -> float:
-        return 1e3 * self.delay / self.rate
-
-    @property
-    def fails(self) -> bool:
-        return self.diverged or self.fall is not None
-
-    @property
-    def text(self) -> str:
-        """What became of it, in a few words."""
-        if self.diverged:
-            return f"diverges\n{self.end:.2f} s"
-        if self.fall is not None:
-            return f"falls\n{self.fall:.2f} s"
-        return f"{self.error:.3f}"
-
-
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Walk with root assistance at each rate, the commands late by each number of ticks."""
     character = load_character(_CHARACTER)
-    cells = [_measure(runner, character, rate, delay) for rate in _RATES for delay in _DELAYS]
     result.rows += [
-        {
-            "rate (Hz)": cell.rate,
-            "delay (ticks)": cell.delay,
-            "delay (ms)": cell.delay_ms,
-            "mean joint error (rad)": cell.error,
-            "ends at (s)": cell.end,
-            "diverged": cell.diverged,
-            "falls at (s)": cell.fall,
-            "growth a tick by theory": cell.growth,
-        }
-        for cell in cells
+        _measure(runner, character, rate, delay) for rate in _RATES for delay in _DELAYS
     ]
+    shape = len(_RATES), len(_DELAYS)
+    late = np.reshape(result.column("delay (ms)"), shape)
+    errors = np.reshape(result.column("mean joint error (rad)"), shape)
+    falls = [time is not None for time in result.column("falls at (s)")]
+    failed = np.reshape(np.logical_or(result.column("diverged"), falls), shape)
     lines, grid = result.add_panels(result.name, 1, 2, (13.0, 5.5))
-    _draw_lines(lines, cells)
-    _draw_map(grid, cells)
+    _draw_lines(lines, late, errors, failed)
+    _draw_map(grid, np.where(failed, _WORST, errors), [_describe(row) for row in result.rows])
     result.notes += [
         "stable PD foresees its own period, not a late command: one tick of delay is "
         "harmless from 480 Hz on, two ticks shake the character at any rate",
@@ -115,31 +81,40 @@ def small_deviations(
     )
 
 
-def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -> _Cell:
+def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -> Row:
     substeps = _ENGINE_RATE // rate
     simulator = {"rate": rate, "substeps": substeps, "command_delay_ticks": delay}
     case = RunSpec(f"{rate}Hz_{delay}ticks", _CHARACTER, _DURATION, WALK, simulator)
     outcome = runner.run(case)
     run = outcome.recording
-    return _Cell(
-        rate,
-        delay,
-        float(joint_errors(run)[:-1].mean()),
-        float(run.times[-1]),
-        bool(outcome.diverged),
-        fall_time(run),
-        small_deviations(character, rate, delay, substeps, {"character": _CHARACTER}),
-    )
+    growth = small_deviations(character, rate, delay, substeps, {"character": _CHARACTER})
+    return {
+        "rate (Hz)": rate,
+        "delay (ticks)": delay,
+        "delay (ms)": 1e3 * delay / rate,
+        "mean joint error (rad)": float(joint_errors(run)[:-1].mean()),
+        "ends at (s)": float(run.times[-1]),
+        "diverged": bool(outcome.diverged),
+        "falls at (s)": fall_time(run),
+        "growth a tick by theory": growth,
+    }
 
 
-def _draw_lines(axes: Axes, cells: Sequence[_Cell]) -> None:
-    """The error over the delay, a line a rate; a cross where the walk fails."""
-    for rate in _RATES:
-        of_rate = [cell for cell in cells if cell.rate == rate]
-        walked = [(cell.delay_ms, cell.error) for cell in of_rate if not cell.fails]
-        failed = [(cell.delay_ms, _WORST) for cell in of_rate if cell.fails]
-        (line,) = axes.plot(*np.reshape(walked, (-1, 2)).T, "o-", label=f"{rate} Hz")
-        (crosses,) = axes.plot(*np.reshape(failed, (-1, 2)).T, "x", color=line.get_color())
+def _describe(row: Row) -> str:
+    """What became of a rate and delay, in a few words."""
+    text = f"{row['mean joint error (rad)']:.3f}"
+    if row["diverged"]:
+        text = f"diverges\n{row['ends at (s)']:.2f} s"
+    elif row["falls at (s)"] is not None:
+        text = f"falls\n{row['falls at (s)']:.2f} s"
+    return f"{text}\n(x {row['growth a tick by theory']:.3f})"
+
+
+def _draw_lines(axes: Axes, late: FloatArray, errors: FloatArray, failed: BoolArray) -> None:
+    """Errors over delays in ms, a line a rate; a cross where the walk fails."""
+    for rate, times, error, lost in zip(_RATES, late, errors, failed, strict=True):
+        (line,) = axes.plot(times[~lost], error[~lost], "o-", label=f"{rate} Hz")
+        (crosses,) = axes.plot(times[lost], [_WORST] * lost.sum(), "x", color=line.get_color())
         crosses.set(markersize=9, markeredgewidth=2)
     axes.plot([], [], "kx", label="diverges or falls")
     axes.set_yscale("log")
@@ -148,32 +123,16 @@ def _draw_lines(axes: Axes, cells: Sequence[_Cell]) -> None:
     label(axes, "delay of commands (ms)", "mean joint error (rad)", "walk, 3 s, root assistance")
 
 
-def _draw_map(axes: Axes, cells: Sequence[_Cell]) -> None:
-    errors: FloatArray = np.array([_WORST if cell.fails else cell.error for cell in cells])
-    table = errors.reshape(len(_RATES), len(_DELAYS))
-    axes.imshow(np.log(table), cmap="viridis_r", vmin=np.log(_BEST), vmax=np.log(_WORST))
-    for number, cell in enumerate(cells):
-        row, column = divmod(number, len(_DELAYS))
-        dark = table[row, column] > (_WORST * _BEST) ** 0.5
-        text = f"{cell.text}\n(x {cell.growth:.3f})"
-        color = "white" if dark else "black"
+def _draw_map(axes: Axes, errors: FloatArray, texts: Sequence[str]) -> None:
+    axes.imshow(np.log(errors), cmap="viridis_r", vmin=np.log(_BEST), vmax=np.log(_WORST))
+    for (row, column), text in zip(np.ndindex(errors.shape), texts, strict=True):
+        color = "white" if errors[row, column] > (_WORST * _BEST) ** 0.5 else "black"
         axes.text(column, row, text, ha="center", va="center", fontsize="small", color=color)
     axes.set_xticks(range(len(_DELAYS)), [str(delay) for delay in _DELAYS])
     axes.set_yticks(range(len(_RATES)), [str(rate) for rate in _RATES])
-    label(
-        axes,
-        "delay of commands (ticks)",
-        "control rate (Hz)",
+    title = (
         "mean joint error (rad); in brackets theory: growth of\n"
-        "small deviations a tick, above 1 unstable",
-        legend=None,
+        "small deviations a tick, above 1 unstable"
     )
+    label(axes, "delay of commands (ticks)", "control rate (Hz)", title, legend=None)
     axes.grid(visible=False)
-
-
-STUDY = Study(
-    "delay",
-    "tracking of the walk by control rate and delay, with root assistance",
-    runs=len(_RATES) * len(_DELAYS),
-    fill=_fill,
-)

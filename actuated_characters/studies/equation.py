@@ -11,12 +11,15 @@ from actuated_characters.metrics.equation_of_motion import EquationOfMotion
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
-from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
+
+TITLE = "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part"
+RUNS = 3
 
 _DURATION = 3.0  # s
 _CASES = (
@@ -24,6 +27,7 @@ _CASES = (
     RunSpec("stand", "humanoid", _DURATION, contacts=True),
     RunSpec("fall", "humanoid", _DURATION, controller={"root_assistance": False}, contacts=True),
 )
+
 _SMALLEST = 1e-17  # that a logarithmic axis shows
 _PARTS = ("M (v' - v) / h", "C", "f", "J^T contacts")
 
@@ -52,7 +56,7 @@ class TickTime:
         return self.over_topics - self.physics - self.control
 
 
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Walk, stand and fall; put what went over the topics into the equation; time a walk."""
     outcomes = {case.label: runner.run(case) for case in _CASES}
     closures = {name: close(outcome.recording) for name, outcome in outcomes.items()}
@@ -167,11 +171,3 @@ def _draw(result: StudyResult, closures: Mapping[str, Closure], tick: TickTime) 
         start += width
     bars.set_yticks([])
     label(bars, "time (µs)", "", "where a tick's time goes, walk", legend="upper right")
-
-
-STUDY = Study(
-    "equation",
-    "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part",
-    runs=len(_CASES),
-    fill=_fill,
-)

@@ -14,13 +14,15 @@ from actuated_characters.studies.framework.study import (
     WALK,
     RunResult,
     RunSpec,
-    Study,
     StudyRunner,
     plan_push,
 )
 from actuated_characters.studies.framework.tracking import mean_joint_errors
 from controller_node.effort_series import write_effort_series
 from msgs_config.character.model import Vector
+
+TITLE = "torques of a run, played again (open loop) and computed again (closed loop)"
+RUNS = 8
 
 _RATE = 240  # Hz
 _PUSH_TIME, _PUSH_DURATION = 1.0, 0.1  # s
@@ -91,7 +93,7 @@ class _Loop:
         )
 
 
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Four runs of an arm and of a walk."""
     arm, walk = quartets = [_run(runner, subject) for subject in _SUBJECTS]
     result.rows += [_row(run) for run in (*arm, *walk)]
@@ -190,11 +192,3 @@ def _draw_poses(result: StudyResult, walks: Sequence[_Loop]) -> None:
     result.add_pictures(
         "feedforward_walk", {title: picture}, width=11.0, title_height=0.4, title_place="center"
     )
-
-
-STUDY = Study(
-    "feedforward",
-    "torques of a run, played again (open loop) and computed again (closed loop)",
-    runs=4 * len(_SUBJECTS),
-    fill=_fill,
-)

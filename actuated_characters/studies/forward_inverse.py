@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.studies.framework.plots import THEORY, label
 from actuated_characters.studies.framework.result import Row, StudyResult
-from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import mean_joint_errors
 from controller_node.effort_series import write_effort_series
 from controller_node.references.base import Reference
@@ -23,37 +23,38 @@ from controller_node.references.files.clip import read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 
+TITLE = "inverse dynamics of a motion, fed forward without feedback"
+RUNS = 9
+
 _ARM, _HUMANOID = "kuka", "humanoid"
 _ARM_RATES, _WALK_RATES = (120, 240, 480, 960, 1920), (240, 480, 960)  # Hz
 _ARM_LENGTH, _WALK_LENGTH = 1.2, 1.5  # s
 _EARLY = 0.2  # s, after which errors are compared; later they are as large as can be
 _KEYFRAMES: Mapping[float, Mapping[str, float]] = {  # the arm's: time in s, angles in rad
     0.0: {},
-    0.6: {"joint_1": 0.6, "joint_2": 0.2, "joint_4": -1.0, "joint_6": 0.4},
-    1.2: {"joint_1": -0.2, "joint_2": 0.8, "joint_4": -1.7, "joint_5": 0.5},
+    0.6: {
+        "lbr_iiwa_joint_1": 0.6,
+        "lbr_iiwa_joint_2": 0.2,
+        "lbr_iiwa_joint_4": -1.0,
+        "lbr_iiwa_joint_6": 0.4,
+    },
+    1.2: {
+        "lbr_iiwa_joint_1": -0.2,
+        "lbr_iiwa_joint_2": 0.8,
+        "lbr_iiwa_joint_4": -1.7,
+        "lbr_iiwa_joint_5": 0.5,
+    },
 }
 _A_CYCLE, _CYCLES = 12, 1.5  # keyframes a cycle of the clip
-
-
-@dataclass(frozen=True)
-class _Motion:
-    """What is to be done."""
-
-    character: str
-    keyframes: str  # path of their file
-    duration: float  # s
-
-    @property
-    def reference(self) -> dict[str, object]:
-        """The parameters that say it."""
-        return {"reference": "keyframes", "keyframes": self.keyframes}
 
 
 @dataclass(frozen=True)
 class _Inverse:
     """What inverse dynamics says of a motion at a rate."""
 
-    motion: _Motion
+    character: str
+    reference: Mapping[str, object]  # the motion's parameters
+    duration: float  # s
     rate: int  # Hz
     times: FloatArray  # (t,) s
     efforts: FloatArray  # (t, n)
@@ -73,30 +74,27 @@ class _Return:
     error: FloatArray  # (t,) rad, mean over the joints
 
     @property
-    def rate(self) -> int:
-        """Of control, Hz."""
-        return self.inverse.rate
-
-    @property
     def early(self) -> float:
         """The error (rad) after `_EARLY`."""
         return float(np.interp(_EARLY, self.times, self.error))
 
 
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """An arm and a walk in the air at several rates; the walk on the ground by its joints."""
-    arm = _Motion(_ARM, _write_arm(runner), _ARM_LENGTH)
-    keyframes, cycle = _write_walk(runner)
-    walk = _Motion(_HUMANOID, keyframes, _WALK_LENGTH)
-    arms = [_give_back(runner, _invert(runner, arm, rate)) for rate in _ARM_RATES]
-    inverses = [_invert(runner, walk, rate) for rate in _WALK_RATES]
+    keyframes, cycle = _sample_walk()
+    reach = _write_keyframes(runner, _ARM, _KEYFRAMES)
+    walk = _write_keyframes(runner, _HUMANOID, keyframes)
+    arms = [
+        _give_back(runner, _invert(runner, _ARM, reach, _ARM_LENGTH, rate)) for rate in _ARM_RATES
+    ]
+    inverses = [_invert(runner, _HUMANOID, walk, _WALK_LENGTH, rate) for rate in _WALK_RATES]
     whole = [_give_back(runner, each, root="fed forward", ground=False) for each in inverses]
     joints = _give_back(runner, inverses[0], root="left out")
     result.rows += [*_rows(arms), *_rows(whole), *_rows([joints])]
     for each in (*arms, *whole, joints):
+        air = "" if each.ground else "_air"
         result.add_curves(
-            f"{result.name}_{each.inverse.motion.character}_{each.rate}"
-            f"{'' if each.ground else '_air'}",
+            f"{result.name}_{each.inverse.character}_{each.inverse.rate}{air}",
             {"time_s": each.times, "joint_error_rad": each.error},
         )
     finest = inverses[-1]
@@ -111,51 +109,47 @@ def _fill(runner: StudyRunner, result: StudyResult) -> None:
     _add_notes(result, arms, whole, cycle)
 
 
-def _write_arm(runner: StudyRunner) -> str:
-    """Write the arm's motion; returns the file."""
-    keyframes = [
-        (time, {f"lbr_iiwa_{name}": angle for name, angle in pose.items()})
-        for time, pose in _KEYFRAMES.items()
-    ]
-    return _write_keyframes(runner, _ARM, keyframes)
-
-
-def _write_walk(runner: StudyRunner) -> tuple[str, float]:
-    """Write the clip as a smooth motion, from rest; returns the file and a cycle's time in s.
+def _sample_walk() -> tuple[dict[float, dict[str, float]], float]:
+    """The clip as keyframes of a smooth motion, from rest, and the time in s of a cycle.
 
     The clip itself is linear between its frames: its velocity jumps, for which no effort is
     large enough.
     """
     plan = make_plan(_HUMANOID, _WALK_LENGTH, WALK, {}, {})
     cycle = float(read_clip(plan.character, str(WALK["clip"])).times[-1])
-    names, keyframes = plan.character.layout.dof_names, []
+    names, keyframes = plan.character.layout.dof_names, {}
     for number in range(round(_A_CYCLE * _CYCLES) + 1):
         time = number * cycle / _A_CYCLE
         position = plan.reference.sample(time).configuration.position
-        keyframes.append((time, dict(zip(names, position.tolist(), strict=True))))
-    return _write_keyframes(runner, _HUMANOID, keyframes), cycle
+        keyframes[time] = dict(zip(names, position.tolist(), strict=True))
+    return keyframes, cycle
 
 
 def _write_keyframes(
-    runner: StudyRunner, character: str, keyframes: Sequence[tuple[float, dict[str, float]]]
-) -> str:
-    content = {
-        "interpolation": "smooth",
-        "keyframes": [{"time": time, "pose": pose} for time, pose in keyframes],
-    }
+    runner: StudyRunner, character: str, poses: Mapping[float, Mapping[str, float]]
+) -> dict[str, object]:
+    """Write a motion as poses at times in s; returns the reference's parameters."""
+    keyframes = [{"time": time, "pose": dict(pose)} for time, pose in poses.items()]
+    content = {"interpolation": "smooth", "keyframes": keyframes}
     path = runner.path(f"{character}_keyframes.yaml")
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
-    return str(path)
+    return {"reference": "keyframes", "keyframes": str(path)}
 
 
-def _invert(runner: StudyRunner, motion: _Motion, rate: int) -> _Inverse:
+def _invert(
+    runner: StudyRunner,
+    character: str,
+    reference: Mapping[str, object],
+    duration: float,
+    rate: int,
+) -> _Inverse:
     """Inverse dynamics at each tick of a run."""
-    plan = make_plan(motion.character, motion.duration, motion.reference, {"rate": rate}, {})
+    plan = make_plan(character, duration, reference, {"rate": rate}, {})
     model, times = DynamicsModel(plan.character), np.arange(plan.ticks) / rate
     efforts = efforts_along(model, plan.reference, times, 1.0 / rate)
-    file = runner.path(f"{motion.character}_{rate}_efforts.csv")
+    file = runner.path(f"{character}_{rate}_efforts.csv")
     write_effort_series(file, plan.character.layout, times, efforts)
-    return _Inverse(motion, rate, times, efforts, model.weight, str(file))
+    return _Inverse(character, reference, duration, rate, times, efforts, model.weight, str(file))
 
 
 def efforts_along(
@@ -178,33 +172,31 @@ def _give_back(
     runner: StudyRunner, inverse: _Inverse, *, root: str = "none", ground: bool = True
 ) -> _Return:
     """Feed efforts forward; the root's only if that is what is said of them."""
-    motion = inverse.motion
-    outcome = runner.run(
-        RunSpec(
-            label=f"{motion.character}-{inverse.rate}{'' if ground else '-air'}",
-            character=motion.character,
-            duration=motion.duration,
-            reference=motion.reference,
-            simulator={"rate": inverse.rate, "terrain": "plane" if ground else "none"},
-            controller={
-                "law": "feedforward",
-                "feedforward": inverse.file,
-                "root_assistance": root == "fed forward",
-            },
-        )
+    case = RunSpec(
+        label=f"{inverse.character}-{inverse.rate}{'' if ground else '-air'}",
+        character=inverse.character,
+        duration=inverse.duration,
+        reference=inverse.reference,
+        simulator={"rate": inverse.rate, "terrain": "plane" if ground else "none"},
+        controller={
+            "law": "feedforward",
+            "feedforward": inverse.file,
+            "root_assistance": root == "fed forward",
+        },
     )
+    outcome = runner.run(case)
     run = outcome.recording
     return _Return(inverse, outcome, root, ground, run.times[:-1], mean_joint_errors(run))
 
 
 def _rows(returns: Sequence[_Return]) -> list[Row]:
-    steps = orders([1.0 / each.rate for each in returns], [each.early for each in returns])
+    steps = orders([1.0 / each.inverse.rate for each in returns], [each.early for each in returns])
     return [
         {
-            "character": each.inverse.motion.character,
+            "character": each.inverse.character,
             "ground": "yes" if each.ground else "no",
             "root efforts": each.root,
-            "rate (Hz)": each.rate,
+            "rate (Hz)": each.inverse.rate,
             "joint error after 0.2 s (rad)": each.early,
             "order in the tick": step,
             "joint error at the end (rad)": float(each.error[-1]),
@@ -229,8 +221,8 @@ def _add_notes(
     vertical = float(inverse.efforts[in_cycle, 2].mean())
     result.notes += [
         "The arm has a motor for each degree of freedom: its motion comes back, but for an error "
-        f"in proportion to the tick ({arms[0].early:.2g} rad at {arms[0].rate} Hz, "
-        f"{arms[-1].early:.2g} rad at {arms[-1].rate} Hz, after {_EARLY:g} s).",
+        f"in proportion to the tick ({arms[0].early:.2g} rad at {arms[0].inverse.rate} Hz, "
+        f"{arms[-1].early:.2g} rad at {arms[-1].inverse.rate} Hz, after {_EARLY:g} s).",
         f"So does the walk in the air ({whole[0].early:.2g} rad and {whole[-1].early:.2g} rad), if "
         "the root gets its force and torque, too. What error there is grows without feedback.",
         f"That force is {vertical:.0f} N upwards in the mean over a cycle; the weight is "
@@ -245,7 +237,7 @@ def _draw_errors(
     titles = ("arm (kuka)", "walk in the air, with root efforts")
     for axes, returns, title in zip(panels, (arms, whole), titles, strict=True):
         for each in returns:
-            axes.semilogy(each.times[1:], each.error[1:], label=f"{each.rate} Hz")
+            axes.semilogy(each.times[1:], each.error[1:], label=f"{each.inverse.rate} Hz")
         axes.set_ylim(1e-6, 5.0)
         axes.axvline(_EARLY, color="grey", linewidth=0.8, linestyle=":")
         label(axes, "time (s)", "mean joint error (rad)", title, legend="lower right")
@@ -257,7 +249,7 @@ def _draw_errors(
 
 def _draw_orders(axes: Axes, families: Mapping[str, Sequence[_Return]]) -> None:
     for name, returns in families.items():
-        ticks = np.array([1e3 / each.rate for each in returns])  # ms
+        ticks = np.array([1e3 / each.inverse.rate for each in returns])  # ms
         errors = np.array([each.early for each in returns])
         axes.loglog(ticks, errors, "o", label=name)
         axes.loglog(ticks, errors[-1] * ticks / ticks[-1], **THEORY)
@@ -287,11 +279,3 @@ def _draw_root(
     heights.plot(run.times, run.reference_position[:, 2], **THEORY, label="reference")
     heights.set_ylim(bottom=0.0)
     label(heights, "time (s)", "height of the root (m)", "fed forward, no feedback")
-
-
-STUDY = Study(
-    "forward_inverse",
-    "inverse dynamics of a motion, fed forward without feedback",
-    runs=len(_ARM_RATES) + len(_WALK_RATES) + 1,
-    fill=_fill,
-)

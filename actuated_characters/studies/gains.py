@@ -9,7 +9,7 @@ from actuated_characters.bags.recording import Recording
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import THEORY, label
 from actuated_characters.studies.framework.result import Row, StudyResult
-from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (
     inertialess_response,
     joint_errors,
@@ -17,6 +17,9 @@ from actuated_characters.studies.framework.tracking import (
     overshoot,
 )
 from msgs_config.arrays import FloatArray
+
+TITLE = "stiffness and damping x 0.1, 1, 10: the walk, with root assistance"
+RUNS = 10
 
 _CHARACTER, _KNEE = "humanoid", "right_knee"
 _RATE, _DURATION = 240, 4.0  # Hz, s
@@ -45,25 +48,11 @@ class _Knee:
     reference: FloatArray  # (t,) rad
     theory: FloatArray  # (t,) rad
 
-    def settled(self) -> "_Knee":
-        """Without the start."""
-        rows = self.times >= _SETTLED
-        return _Knee(self.times[rows], self.angle[rows], self.reference[rows], self.theory[rows])
-
-    def lags(self) -> tuple[float, float]:
-        """By which it comes after its reference, and should by theory, s."""
-        known = self.settled()
-        late, expected = (
-            lag(angle, known.reference, 1.0 / _RATE, _LONGEST_LAG)
-            for angle in (known.angle, known.theory)
-        )
-        return late, expected
-
 
 _Runs = Mapping[tuple[tuple[float, float], str], RunResult]
 
 
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Walk by each pair of factors, with and without the reference's velocity.
 
     With root assistance, so that what is seen is the joints' gains.
@@ -121,9 +110,13 @@ def _row(name: str, velocity: str, outcome: RunResult) -> Row:
     run, overshoots, late, expected = outcome.recording, None, None, None
     if not outcome.diverged:
         knee = _knee(run, _FACTORS[name])
-        settled = knee.settled()
-        overshoots = overshoot(settled.angle, settled.reference)
-        late, expected = (1e3 * time for time in knee.lags())
+        settled = knee.times >= _SETTLED
+        angle, reference = knee.angle[settled], knee.reference[settled]
+        overshoots = overshoot(angle, reference)
+        late, expected = (
+            1e3 * lag(values, reference, 1.0 / _RATE, _LONGEST_LAG)
+            for values in (angle, knee.theory[settled])
+        )
     return {
         "gains": name,
         "reference velocity": velocity,
@@ -138,22 +131,23 @@ def _row(name: str, velocity: str, outcome: RunResult) -> Row:
 
 def _draw(result: StudyResult, runs: _Runs) -> None:
     panels = result.add_panels(result.name, 2, 3, (13.0, 7.0), same_x=True)
+    lags = zip(result.column("knee lag (ms)"), result.column("by theory (ms)"), strict=True)
     for panel, (name, factors) in zip(panels, _FACTORS.items(), strict=True):
-        lags = []
+        texts = []
         for velocity, named in _VELOCITIES.items():
             outcome = runs[factors, velocity]
             knee = _knee(outcome.recording, factors)
             (line,) = panel.plot(knee.times, knee.angle, label=named, linewidth=2.0, alpha=0.8)
             panel.plot(knee.times, knee.theory, **{**THEORY, "color": line.get_color()})
+            late, expected = next(lags)
             if outcome.diverged:
                 panel.plot(knee.times[-1:], knee.angle[-1:], "x", color="tab:red", markersize=10)
-                lags.append("diverges")
+                texts.append("diverges")
             else:
-                late, expected = (round(1e3 * time) for time in knee.lags())
-                lags.append(f"{late} ms (theory {expected})")
+                texts.append(f"{round(late)} ms (theory {round(expected)})")
         reference = _knee(runs[factors, "clip"].recording, factors)
         panel.plot(reference.times, reference.reference, "k", linewidth=0.8, label="reference")
-        title = f"{name}\nlag {lags[0]}; without velocity {lags[1]}"
+        title = f"{name}\nlag {texts[0]}; without velocity {texts[1]}"
         label(panel, "time (s)", "right knee (rad)", title, legend=None)
         panel.title.set_fontsize("small")
         panel.set_xlim(0.0, _SHOWN)
@@ -173,11 +167,3 @@ def _draw_poses(result: StudyResult, runs: _Runs) -> None:
             run, times, columns=_PICTURES, ghost=True, size=_SIZE
         )
     result.add_pictures("gains_poses", pictures)
-
-
-STUDY = Study(
-    "gains",
-    "stiffness and damping x 0.1, 1, 10: the walk, with root assistance",
-    runs=10,
-    fill=_fill,
-)

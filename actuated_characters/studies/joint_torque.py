@@ -18,11 +18,14 @@ from actuated_characters.studies.framework.bodies import (
 )
 from actuated_characters.studies.framework.plots import THEORY, label
 from actuated_characters.studies.framework.result import Row, StudyResult
-from actuated_characters.studies.framework.study import HOLD, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.study import HOLD, RunSpec, StudyRunner
 from controller_node.effort_series import write_effort_series
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations
+
+TITLE = "joint torque: forces between two bodies that sum to zero"
+RUNS = 5
 
 _RATE, _FINE_RATE = 240, 1920  # Hz
 _DURATION = 2.0  # s
@@ -67,7 +70,7 @@ class _Run:
         return linear, angular
 
 
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Drive two boxes on a hinge, floating: by a torque, by forces between them, as a whole.
 
     The torque is prescribed over time. The forces that do the same depend on how the boxes lie, so
@@ -233,11 +236,3 @@ def _draw_momentum(
     momentum.plot(times, _FORCE * times, label="f t", **THEORY)
     label(centre, "time (s)", "centre of mass off its line (m)", "only the root force moves it")
     label(momentum, "time (s)", "change of P (kg m/s), L (kg m²/s)", "and only that adds momentum")
-
-
-STUDY = Study(
-    "joint_torque",
-    "joint torque: forces between two bodies that sum to zero",
-    runs=5,
-    fill=_fill,
-)

@@ -10,9 +10,12 @@ from actuated_characters.render.stills import strip
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.reactions import mode_spans
 from actuated_characters.studies.framework.result import StudyResult
-from actuated_characters.studies.framework.study import WALK, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import joint_errors
 from msgs_config.arrays import FloatArray
+
+TITLE = "a walk that is hit by a ball against the chest, behaviour reactive"
+RUNS = 7
 
 IMPULSES = (5.0, 10.0, 20.0, 40.0)  # N s
 HIT = 1.0  # s
@@ -49,7 +52,7 @@ class Reaction:
     error: FloatArray  # (t + 1,) rad, mean of the joints, from the clip at that time
 
 
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Hit the walking humanoid harder and harder against the chest, from in front.
 
     And two others: one that is limp, and one that gets up.
@@ -206,11 +209,3 @@ def _draw(
         panel.set_xlabel("time (s)")
     panels[1].legend(fontsize="small")
     replace(marks, modes=modes).explained(result.figures[result.name])
-
-
-STUDY = Study(
-    "reactions",
-    "a walk that is hit by a ball against the chest, behaviour reactive",
-    runs=len(IMPULSES) + 3,
-    fill=_fill,
-)

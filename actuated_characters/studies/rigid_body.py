@@ -12,7 +12,7 @@ from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies.framework.bodies import IN_SPACE, Box, Momenta, momenta, write_box
 from actuated_characters.studies.framework.plots import draw_over_theory, label
 from actuated_characters.studies.framework.result import Row, StudyResult
-from actuated_characters.studies.framework.study import HOLD, RunSpec, Study, StudyRunner
+from actuated_characters.studies.framework.study import HOLD, RunSpec, StudyRunner
 from actuated_characters.studies.theory.euler import (
     Load,
     Motion,
@@ -27,6 +27,9 @@ from msgs_config.geometry import rotations
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from sim_node.physics.world import WorldSettings
 
+TITLE = "a free rigid body: m dv/dt = f, I dw/dt + w x I w = tau + r x f"
+RUNS = 8
+
 _RATE = 1000  # Hz
 _COMPACT = Box("compact", 6.0, (0.3, 0.3, 0.3))
 _LONG = Box("long", 6.0, (1.2, 0.15, 0.15))
@@ -36,6 +39,8 @@ _COUPLE = (
     Load(force=(0.0, 2.0, 0.0), point=(0.15, 0.0, 0.0)),
     Load(force=(0.0, -2.0, 0.0), point=(-0.15, 0.0, 0.0)),
 )
+_PUSH = (3.0, 0.0, 0.0)  # N
+_ABOUT_X = (Load(torque=(0.3, 0.0, 0.0)),)
 _TORQUE = (Load(torque=(0.0, 0.0, 0.3)),)
 
 
@@ -76,37 +81,18 @@ class Observed:
 
 
 TRIALS = (
-    Trial("force", "force f", _COMPACT, (Load(force=(3.0, 0.0, 0.0)),)),
+    Trial("force", "force f", _COMPACT, (Load(_PUSH),)),
     Trial("torque", "torque", _COMPACT, _TORQUE),
-    Trial(
-        "off_centre",
-        "force off the centre",
-        _COMPACT,
-        (Load(force=(3.0, 0.0, 0.0), point=(0.0, -0.1, 0.0)),),
-    ),
+    Trial("off_centre", "force off the centre", _COMPACT, (Load(_PUSH, point=(0.0, -0.1, 0.0)),)),
     Trial("couple", "couple f, -f", _COMPACT, _COUPLE),
     Trial("torque_long", "the same torque, long box", _LONG, _TORQUE),
-    Trial(
-        "spinning",
-        "torque, spinning brick",
-        _BRICK,
-        (Load(torque=(0.3, 0.0, 0.0)),),
-        spin=(0.5, 1.0, 3.0),
-    ),
+    Trial("spinning", "torque, spinning brick", _BRICK, _ABOUT_X, spin=(0.5, 1.0, 3.0)),
     Trial("middle_axis", "free spin, middle axis", _BRICK, (), 4.0, _SPIN),
-    Trial(
-        "middle_axis_2000",
-        "free spin at 2000 Hz",
-        _BRICK,
-        (),
-        4.0,
-        _SPIN,
-        rate=2 * _RATE,
-    ),
+    Trial("middle_axis_2000", "free spin at 2000 Hz", _BRICK, (), 4.0, _SPIN, 2 * _RATE),
 )
 
 
-def _fill(runner: StudyRunner, result: StudyResult) -> None:
+def run(runner: StudyRunner, result: StudyResult) -> None:
     """Push boxes that float, and integrate Newton's and Euler's laws beside each run."""
     seen = {trial.label: _observe(runner, trial) for trial in TRIALS}
     free, finer = seen["middle_axis"], seen["middle_axis_2000"]
@@ -283,11 +269,3 @@ def _draw_spin(result: StudyResult, free: Observed, finer: Observed) -> None:
     for one in (free, finer):
         drift.plot(one.recording.times, one.drift, label=f"{one.trial.rate} Hz")
     label(drift, "time (s)", "|L - L(0)| / |L(0)|", "half the step, half the drift")
-
-
-STUDY = Study(
-    "rigid_body",
-    "a free rigid body: m dv/dt = f, I dw/dt + w x I w = tau + r x f",
-    runs=len(TRIALS),
-    fill=_fill,
-)

@@ -3,7 +3,7 @@
 import csv
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:  # it takes a second to import
 Cell = str | int | float | bool | None
 """What a table's field holds; None where nothing can be said."""
 
-Row = Mapping[str, Cell]
-"""One row of a table: its cells by the names of their columns, which have the units."""
+Row = Mapping[str, Any]
+"""One row of a table: each cell by the name of its column, which has the unit."""
 
 _DPI = 110
 
@@ -41,6 +41,10 @@ class StudyResult:
     def columns(self) -> list[str]:
         """The names of the table's columns."""
         return list(self.rows[0])
+
+    def column(self, name: str) -> list[Any]:
+        """The cells of a column of the table."""
+        return [row[name] for row in self.rows]
 
     def add_curves(self, name: str, columns: Mapping[str, FloatArray]) -> None:
         """Add curves (t,) by their names; those that end early are NaN from there on."""

@@ -68,15 +68,15 @@ class StudyRunner(Protocol):
 
 @dataclass(frozen=True)
 class Study:
-    """One of the lecture's topics."""
+    """One of the lecture's topics: a module's `TITLE`, `RUNS` and `run`."""
 
     name: str  # of the module, of the command's argument and of the files
     title: str  # one line
     runs: int  # how many it asks for, about; for the progress bar
-    fill: Callable[[StudyRunner, StudyResult], None]  # runs its cases, and adds what they show
+    fill: Callable[[StudyRunner, StudyResult], None]  # makes the runs, and adds what they show
 
     def run(self, runner: StudyRunner) -> StudyResult:
-        """Run its cases and return what they show."""
+        """Make its runs and return what they show."""
         result = StudyResult(self.name)
         self.fill(runner, result)
         return result

@@ -37,11 +37,6 @@ def overshoot(ratio: float) -> float:
     return math.exp(-math.pi * ratio / math.sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
 
 
-def steady_state_error(load: float, stiffness: float) -> float:
-    """Where a spring holds a constant load (N): the error in m, `load / kp`."""
-    return load / stiffness
-
-
 def largest_integral_gain(stiffness: float, damping: float, mass: float) -> float:
     """The integral gain (N/(m s)) at which PID begins to swing ever wider: `kp kd / m`."""
     return stiffness * damping / mass
@@ -129,7 +124,7 @@ def step_response(
     """
     frequency = math.sqrt(stiffness / mass)
     ratio = damping_ratio(stiffness, damping, mass)
-    rest = 1.0 - steady_state_error(load, stiffness)
+    rest = 1.0 - load / stiffness
     if abs(ratio - 1.0) < 1e-9:
         away: FloatArray = (1.0 + frequency * times) * np.exp(-frequency * times)
     else:

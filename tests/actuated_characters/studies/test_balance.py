@@ -32,7 +32,7 @@ class Weakling:
         down[-1, 2] = 0.1
         return replace(self._outcome, recording=replace(run, position=down))
 
-    def write(self, name: str, text: str) -> str:
+    def path(self, name: str) -> Path:
         raise AssertionError("it needs no file")
 
 
@@ -76,7 +76,7 @@ def test_bisection_finds_the_largest_impulse(stood: RunResult, bearable: float) 
 
     assert limit.survived <= bearable < limit.fell
     assert limit.fell - limit.survived <= 0.5
-    assert len(runner.impulses) <= balance.STUDY.runs / 4
+    assert len(runner.impulses) <= balance.RUNS / 4
 
 
 def test_who_lies_on_the_back_in_the_end_has_not_survived(stood: RunResult) -> None:

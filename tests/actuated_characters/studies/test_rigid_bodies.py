@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from actuated_characters.studies import joint_torque, rigid_body
-from actuated_characters.studies.catalogue import load_study
 from actuated_characters.studies.framework.bodies import HINGE, Box, momenta, write_box
-from actuated_characters.studies.framework.study import StudyResult
+from actuated_characters.studies.framework.result import StudyResult
 from actuated_characters.studies.theory.euler import (
     Load,
     Motion,
@@ -179,19 +178,18 @@ def test_forces_that_sum_to_zero_have_the_torque_about_any_point() -> None:
 
 @pytest.fixture(scope="module")
 def rigid(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
-    return load_study("rigid_body").run(InProcessRunner(tmp_path_factory.mktemp("rigid")))
+    return InProcessRunner(tmp_path_factory.mktemp("rigid")).study("rigid_body")
 
 
 @pytest.fixture(scope="module")
 def jointed(tmp_path_factory: pytest.TempPathFactory) -> tuple[StudyResult, InProcessRunner]:
     runner = InProcessRunner(tmp_path_factory.mktemp("jointed"))
-    return load_study("joint_torque").run(runner), runner
+    return runner.study("joint_torque"), runner
 
 
 def column(result: StudyResult, start_of_name: str) -> list[float]:
     (index,) = [k for k, name in enumerate(result.columns) if name.startswith(start_of_name)]
-    cells = [row[index] for row in result.rows]
-    return [float("nan") if cell is None else float(cell) for cell in cells]
+    return result.column(result.columns[index])
 
 
 def test_each_load_accelerates_a_box_as_newton_and_euler_say(rigid: StudyResult) -> None:
@@ -219,8 +217,7 @@ def test_the_turn_is_off_theory_by_the_step_alone(rigid: StudyResult) -> None:
 
 
 def test_a_box_spun_about_its_middle_axis_turns_over(rigid: StudyResult) -> None:
-    names, values = rigid.curves["rigid_body_spin"]
-    curve = dict(zip(names, values.T, strict=True))
+    curve = rigid.curves["rigid_body_spin"]
     about_middle = curve["angular_velocity_y_rad_s"]
 
     assert about_middle.min() < -0.9 * about_middle[0]
@@ -232,9 +229,7 @@ def test_forces_between_two_bodies_do_what_the_joint_torque_does(
     jointed: tuple[StudyResult, InProcessRunner],
 ) -> None:
     result, runner = jointed
-    names, values = result.curves["joint_torque_hinge"]
-    curve = dict(zip(names, values.T, strict=True))
-
+    curve = result.curves["joint_torque_hinge"]
     by_torque, by_forces = curve["hinge_by_torque_rad"], curve["hinge_by_forces_rad"]
     np.testing.assert_allclose(by_forces, by_torque, atol=1e-12)
     assert np.ptp(by_torque) > 1.0
@@ -254,8 +249,7 @@ def test_without_one_of_the_pairs_the_motion_is_another(
 ) -> None:
     # Arrange
     result, runner = jointed
-    names, values = result.curves["joint_torque_hinge"]
-    by_torque = values[:, list(names).index("hinge_by_torque_rad")]
+    by_torque = result.curves["joint_torque_hinge"]["hinge_by_torque_rad"]
     (pushed,) = [case for case in runner.cases if case.label == "forces"]
 
     # Act: six pushes a tick, each force and then its opposite
