@@ -76,11 +76,12 @@ def _walk(runner: StudyRunner, name: str, controller: dict[str, object]) -> Reco
 def _row(name: str, run: Recording) -> Row:
     fall = fall_time(run)
     until = len(run.effort) if fall is None else int(np.searchsorted(run.times, fall))
-    off = run.position[:until, :3] - run.reference_position[:until, :3]
+    desired = run.reference_position[:until]
+    off = run.position[:until, :3] - desired[:, :3]
     return {
         "root stiffness": name,
         "falls at (s)": fall,
-        "mean joint error until then (rad)": float(joint_errors(run)[:until].mean()),
+        "mean joint error until then (rad)": float(joint_errors(run, desired).mean()),
         "mean root error until then (m)": float(np.linalg.norm(off, axis=1).mean()),
         "root force / weight until then": root_force_share(run, until),
     }

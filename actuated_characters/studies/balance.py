@@ -33,11 +33,13 @@ _DIRECTIONS = {
     "left": (0.0, 1.0),
     "right": (0.0, -1.0),
 }
-_SOFT_HIPS = {
-    f"gains.{side}_hip.{kind}": gain
-    for side in ("right", "left")
-    for kind, gain in (("p", 70.0), ("d", 25.0))
-}  # with stiff ones the trunk could not give way
+_GIVEN: Mapping[str, object] = {
+    "root_assistance": False,
+    "balance.enabled": True,
+    # with stiff hips the trunk could not give way
+    **{f"gains.{side}_hip.p": 70.0 for side in ("right", "left")},
+    **{f"gains.{side}_hip.d": 25.0 for side in ("right", "left")},
+}
 
 
 @dataclass(frozen=True)
@@ -109,14 +111,13 @@ def _case(
     impulse: tuple[float, float] = (0.0, 0.0),
 ) -> RunSpec:
     force = (impulse[0] / _PUSH_DURATION, impulse[1] / _PUSH_DURATION, 0.0)
-    given = {"root_assistance": False, "balance.enabled": True, **_SOFT_HIPS, **(controller or {})}
     return RunSpec(
         label,
         "humanoid",
         duration,
         reference={"reference": "keyframes", "keyframes": "humanoid_stand"},
         simulator={"rate": _RATE, "wrench_duration": _PUSH_DURATION},
-        controller=given,
+        controller={**_GIVEN, **(controller or {})},
         pushes=[plan_push(_PUSH_TIME, _RATE, _LINK, force)] if any(impulse) else [],
     )
 

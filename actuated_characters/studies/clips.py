@@ -12,7 +12,6 @@ from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (
     joint_errors,
-    mean_joint_errors,
     root_force_share,
 )
 from controller_node.references.files.clip import available_clips, read_clip
@@ -43,7 +42,9 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     _draw(result)
     _draw_poses(result, {clip: outcome.recording for clip, outcome in outcomes.items()})
     times = max((outcome.recording.times for outcome in outcomes.values()), key=len)
-    curves = {f"{c}_rad": mean_joint_errors(outcome.recording) for c, outcome in outcomes.items()}
+    curves = {
+        f"{c}_rad": joint_errors(outcome.recording).mean(axis=1) for c, outcome in outcomes.items()
+    }
     result.add_curves("clips_errors", {"time_s": times[:-1], **curves})
     errors, bounds = np.array(
         [result.column("mean joint error (rad)"), result.column("bound (rad)")]
@@ -113,9 +114,9 @@ def _row(character: Character, clip: str, outcome: RunResult) -> Row:
     return {
         "clip": clip,
         "loops": read_clip(character, clip).wraps,
-        "mean joint error (rad)": float(errors[:-1].mean()),
+        "mean joint error (rad)": float(errors.mean()),
         "bound (rad)": _BOUNDS.get(clip, _BOUND),
-        "largest joint error (rad)": float(errors[:-1].max()),
+        "largest joint error (rad)": float(errors.max()),
         "mean root error (m)": outcome.measured("root_error_mean_m"),
         "root force / weight": root_force_share(recording),
         "fell": bool(outcome.summary["fell"] or down or outcome.diverged),

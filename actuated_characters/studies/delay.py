@@ -92,7 +92,7 @@ def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -
         "rate (Hz)": rate,
         "delay (ticks)": delay,
         "delay (ms)": 1e3 * delay / rate,
-        "mean joint error (rad)": float(joint_errors(run)[:-1].mean()),
+        "mean joint error (rad)": float(joint_errors(run).mean()),
         "ends at (s)": float(run.times[-1]),
         "diverged": bool(outcome.diverged),
         "falls at (s)": fall_time(run),

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
-from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 
@@ -42,54 +41,29 @@ class Closure:
     parts: FloatArray  # (t, 4) norms, of `_PARTS`
 
 
-@dataclass(frozen=True)
-class TickTime:
-    """What one tick takes, in µs, by its parts."""
-
-    physics: float
-    control: float
-    over_topics: float  # all of it, by two processes
-
-    @property
-    def transport(self) -> float:
-        """What the topics, the processes and the recorder beside them add."""
-        return self.over_topics - self.physics - self.control
-
-
 def run(runner: StudyRunner, result: StudyResult) -> None:
     """Walk, stand and fall; put what went over the topics into the equation; time a walk."""
     outcomes = {case.label: runner.run(case) for case in _CASES}
     closures = {name: close(outcome.recording) for name, outcome in outcomes.items()}
-    tick, walk = _measure(outcomes["walk"]), closures["walk"]
+    times, walk = _time_parts(outcomes["walk"]), closures["walk"]
     result.rows += [_row(name, closure) for name, closure in closures.items()]
-    _draw(result, closures, tick)
-    result.add_curves(
-        "equation_walk",
-        {
-            "time_s": walk.times,
-            "relative_residual": walk.relative,
-            "without_contacts": walk.without_contacts,
-        },
-    )
+    _draw(result, closures, times)
+    curves = {"relative_residual": walk.relative, "without_contacts": walk.without_contacts}
+    result.add_curves("equation_walk", {"time_s": walk.times, **curves})
+    physics, control, rest = times.values()
     result.notes += [
         "all forces are on the topics, and the equation closes to rounding; the efforts of "
         "joint limits are on none, and are left out on those joints' own entries",
-        f"of a tick's {tick.over_topics:.0f} us over topics physics takes "
-        f"{tick.physics:.0f}, the control law {tick.control:.0f}, topics and recorder "
-        f"{tick.transport:.0f}",
+        f"of a tick's {physics + control + rest:.0f} us over topics physics takes {physics:.0f}, "
+        f"the control law {control:.0f}, topics and recorder {rest:.0f}",
     ]
 
 
 def _row(name: str, closure: Closure) -> Row:
     p50, p99, largest = np.percentile(closure.relative, (50, 99, 100)).tolist()
     without = float(np.median(closure.without_contacts))
-    return {
-        "run": name,
-        "p50": p50,
-        "p99": p99,
-        "largest": largest,
-        "p50 without contacts": without,
-    }
+    row = {"run": name, "p50": p50, "p99": p99, "largest": largest}
+    return row | {"p50 without contacts": without}
 
 
 def close(run: Recording) -> Closure:
@@ -98,75 +72,61 @@ def close(run: Recording) -> Closure:
         run.character, float(run.parameters["gravity"]), int(run.parameters["rate"])
     )
     links = {link.name: row for row, link in enumerate(run.character.links)}
-    nothing = np.zeros((len(links), 6))
     relative, without, parts = [], [], []
     for tick, contacts in enumerate(run.contacts):
+        wrenches = np.zeros((len(links), 6))
+        if contacts is not None and contacts.links:
+            wrenches[[links[name] for name in contacts.links]] = contacts.wrenches
         state = run.position[tick], run.velocity[tick], run.effort[tick], run.velocity[tick + 1]
-        balance = equation.balance(*state, _rows(contacts, links))
+        balance = equation.balance(*state, wrenches)
         relative.append(balance.relative)
-        without.append(equation.balance(*state, nothing).relative)
+        without.append(replace(balance, contact=np.zeros_like(balance.contact)).relative)
         summands = (balance.inertial, balance.bias, balance.applied, balance.contact)
         parts.append([float(np.linalg.norm(summand)) for summand in summands])
     return Closure(run.times[:-1], np.array(relative), np.array(without), np.array(parts))
 
 
-def _rows(contacts: WrenchArrays | None, links: Mapping[str, int]) -> FloatArray:
-    """Wrenches (links, 6), zero where nothing touches."""
-    wrenches = np.zeros((len(links), 6))
-    if contacts is not None and contacts.links:
-        wrenches[[links[name] for name in contacts.links]] = contacts.wrenches
-    return wrenches
-
-
-def _measure(walk: RunResult) -> TickTime:
-    """Time the walk's parts in one process; the whole is that of the run over topics."""
+def _time_parts(walk: RunResult) -> dict[str, float]:
+    """The parts of a tick's time, µs: two in one process, the rest of the run over topics."""
     plan = make_plan("humanoid", 1.0, WALK, {}, {})
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    role = make_character_setup(plan.character, plan.simulator)
+    setup = make_character_setup(plan.character, plan.simulator)
     physics, control = [], []
-    with Simulation([role], make_settings(plan.simulator)) as simulation:
-        (actor,) = simulation.actors
-        episode_ns = actor.state.stamp_ns
+    with Simulation([setup], make_settings(plan.simulator)) as simulation:
+        (character,) = simulation.actors
+        episode_ns = character.state.stamp_ns
         for _ in range(plan.ticks):
             began = time.perf_counter()
-            effort, _ = controller.compute_effort(actor.state, episode_ns)
+            effort, _ = controller.compute_effort(character.state, episode_ns)
             answered = time.perf_counter()
-            simulation.step([np.where(actor.commanded, effort, 0.0)])
+            simulation.step([np.where(character.commanded, effort, 0.0)])
             control.append(answered - began)
             physics.append(time.perf_counter() - answered)
     seconds, ticks = walk.summary["wall_time_s"], walk.summary["ticks"]
     assert isinstance(seconds, float) and isinstance(ticks, int)
-    return TickTime(
-        physics=1e6 * float(np.median(physics)),
-        control=1e6 * float(np.median(control)),
-        over_topics=1e6 * seconds / ticks,
-    )
+    parts = [1e6 * float(np.median(each)) for each in (physics, control)]
+    names = ("physics", "control law", "topics, processes, recorder")
+    return dict(zip(names, (*parts, 1e6 * seconds / ticks - sum(parts)), strict=True))
 
 
-def _draw(result: StudyResult, closures: Mapping[str, Closure], tick: TickTime) -> None:
+def _draw(result: StudyResult, closures: Mapping[str, Closure], times: Mapping[str, float]) -> None:
     residuals, norms, bars = result.add_panels(result.name, 3, 1, (10.0, 9.0))
     for name, closure in closures.items():
-        shown = np.maximum(closure.relative, _SMALLEST)
-        (line,) = residuals.semilogy(closure.times, shown, linewidth=0.8, label=name)
-        residuals.semilogy(
-            closure.times,
-            np.maximum(closure.without_contacts, _SMALLEST),
-            linewidth=0.8,
-            linestyle=":",
-            color=line.get_color(),
-            label=f"{name}, contacts left out",
+        relative = np.maximum(closure.relative, _SMALLEST)
+        without = np.maximum(closure.without_contacts, _SMALLEST)
+        (line,) = residuals.semilogy(closure.times, relative, linewidth=0.8, label=name)
+        style, left_out = (
+            {"color": line.get_color(), "linewidth": 0.8},
+            f"{name}, contacts left out",
         )
+        residuals.semilogy(closure.times, without, ":", label=left_out, **style)
     label(residuals, "time (s)", "residual / largest part", legend="center right")
     walk = closures["walk"]
     for column, name in enumerate(_PARTS):
         norms.semilogy(walk.times, walk.parts[:, column], linewidth=0.8, label=name)
     label(norms, "time (s)", "norm (N, N m)", "the equation's parts, walk", legend="upper right")
     start = 0.0
-    for name, width in (
-        ("physics", tick.physics),
-        ("control law", tick.control),
-        ("topics, processes, recorder", tick.transport),
-    ):
+    for name, width in times.items():
         bars.barh(0.0, width, left=start, label=f"{name}: {width:.0f} µs")
         start += width
     bars.set_yticks([])

@@ -16,7 +16,7 @@ from actuated_characters.runs.plan import make_plan
 from actuated_characters.studies.framework.plots import THEORY, label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
-from actuated_characters.studies.framework.tracking import mean_joint_errors
+from actuated_characters.studies.framework.tracking import joint_errors
 from controller_node.effort_series import write_effort_series
 from controller_node.references.base import Reference
 from controller_node.references.files.clip import read_clip
@@ -186,7 +186,7 @@ def _give_back(
     )
     outcome = runner.run(case)
     run = outcome.recording
-    return _Return(inverse, outcome, root, ground, run.times[:-1], mean_joint_errors(run))
+    return _Return(inverse, outcome, root, ground, run.times[:-1], joint_errors(run).mean(axis=1))
 
 
 def _rows(returns: Sequence[_Return]) -> list[Row]:

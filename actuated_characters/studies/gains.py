@@ -1,7 +1,6 @@
 """Small, normal and large stiffness and damping, with the reference's velocity and without."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -39,16 +38,6 @@ _PICTURES, _SIZE = 10, (180, 230)
 _PICTURED = (1.27, 2.54)  # s, the second cycle
 
 
-@dataclass(frozen=True)
-class _Knee:
-    """The knee's angle, its reference, and what theory says of a knee without inertia."""
-
-    times: FloatArray  # (t,) s
-    angle: FloatArray  # (t,) rad
-    reference: FloatArray  # (t,) rad
-    theory: FloatArray  # (t,) rad
-
-
 _Runs = Mapping[tuple[tuple[float, float], str], RunResult]
 
 
@@ -69,15 +58,15 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     ]
     _draw(result, runs)
     _draw_poses(result, runs)
-    reference = _knee(runs[(1.0, 1.0), "clip"].recording, (1.0, 1.0))
-    curves = {"time_s": reference.times, "reference_rad": reference.reference}
+    times, _, reference, _ = _knee(runs[(1.0, 1.0), "clip"].recording, (1.0, 1.0))
+    curves = {"time_s": times, "reference_rad": reference}
     result.notes += [
         "without the reference's velocity damping holds back: a slow motion lags by kd / kp; with "
         "it, it does not",
         "small damping does not oscillate here, as stable PD has a damping kp h of its own",
     ]
     for ((p, d), velocity), outcome in runs.items():
-        curves[f"p{p:g}_d{d:g}_{velocity}_rad"] = _knee(outcome.recording, (p, d)).angle
+        curves[f"p{p:g}_d{d:g}_{velocity}_rad"] = _knee(outcome.recording, (p, d))[1]
         if outcome.diverged:
             result.notes.append(
                 f"stiffness x {p:g}, damping x {d:g}, velocity {velocity}: {outcome.diverged}; "
@@ -93,7 +82,11 @@ def _case(factors: tuple[float, float], velocity: str) -> RunSpec:
     return RunSpec(label, _CHARACTER, _DURATION, WALK, {"rate": _RATE}, controller)
 
 
-def _knee(run: Recording, factors: tuple[float, float]) -> _Knee:
+def _knee(run: Recording, factors: tuple[float, float]) -> FloatArray:
+    """Times in s, the knee's angle, its reference, and that by theory, without inertia, in rad.
+
+    Rows of an array (4, t).
+    """
     entry, gains = run.layout.joint(_KNEE).start, run.character.gains[_KNEE]
     reference = run.reference_position[:-1, entry]  # the last state may have none
     theory = inertialess_response(
@@ -103,24 +96,22 @@ def _knee(run: Recording, factors: tuple[float, float]) -> _Knee:
         factors[1] * gains.damping,
         1.0 / _RATE,
     )
-    return _Knee(run.times[:-1], run.position[:-1, entry], reference, theory)
+    return np.array((run.times[:-1], run.position[:-1, entry], reference, theory))
 
 
 def _row(name: str, velocity: str, outcome: RunResult) -> Row:
     run, overshoots, late, expected = outcome.recording, None, None, None
     if not outcome.diverged:
         knee = _knee(run, _FACTORS[name])
-        settled = knee.times >= _SETTLED
-        angle, reference = knee.angle[settled], knee.reference[settled]
+        _, angle, reference, theory = knee[:, knee[0] >= _SETTLED]
         overshoots = overshoot(angle, reference)
         late, expected = (
-            1e3 * lag(values, reference, 1.0 / _RATE, _LONGEST_LAG)
-            for values in (angle, knee.theory[settled])
+            1e3 * lag(values, reference, 1.0 / _RATE, _LONGEST_LAG) for values in (angle, theory)
         )
     return {
         "gains": name,
         "reference velocity": velocity,
-        "joint error (rad)": float(joint_errors(run)[:-1].mean()),
+        "joint error (rad)": float(joint_errors(run).mean()),
         "knee overshoot / range": overshoots,
         "knee lag (ms)": late,
         "by theory (ms)": expected,
@@ -136,22 +127,22 @@ def _draw(result: StudyResult, runs: _Runs) -> None:
         texts = []
         for velocity, named in _VELOCITIES.items():
             outcome = runs[factors, velocity]
-            knee = _knee(outcome.recording, factors)
-            (line,) = panel.plot(knee.times, knee.angle, label=named, linewidth=2.0, alpha=0.8)
-            panel.plot(knee.times, knee.theory, **{**THEORY, "color": line.get_color()})
+            times, angle, _, theory = _knee(outcome.recording, factors)
+            (line,) = panel.plot(times, angle, label=named, linewidth=2.0, alpha=0.8)
+            panel.plot(times, theory, **{**THEORY, "color": line.get_color()})
             late, expected = next(lags)
             if outcome.diverged:
-                panel.plot(knee.times[-1:], knee.angle[-1:], "x", color="tab:red", markersize=10)
+                panel.plot(times[-1:], angle[-1:], "x", color="tab:red", markersize=10)
                 texts.append("diverges")
             else:
                 texts.append(f"{round(late)} ms (theory {round(expected)})")
-        reference = _knee(runs[factors, "clip"].recording, factors)
-        panel.plot(reference.times, reference.reference, "k", linewidth=0.8, label="reference")
+        times, _, reference, _ = _knee(runs[factors, "clip"].recording, factors)
+        panel.plot(times, reference, "k", linewidth=0.8, label="reference")
         title = f"{name}\nlag {texts[0]}; without velocity {texts[1]}"
         label(panel, "time (s)", "right knee (rad)", title, legend=None)
         panel.title.set_fontsize("small")
         panel.set_xlim(0.0, _SHOWN)
-        panel.set_ylim(float(reference.reference.min()) - 0.4, 0.4)
+        panel.set_ylim(float(reference.min()) - 0.4, 0.4)
     panels[0].plot([], [], label="theory: no inertia", **THEORY)
     panels[0].legend(loc="lower left", fontsize="x-small", ncols=2)
 

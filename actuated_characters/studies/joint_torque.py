@@ -84,13 +84,14 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     by_root = _run(runner, boxes, "root_force", force=_FORCE, rate=_FINE_RATE)
     passive = _run(runner, boxes, "nothing", torque=0.0)
     apart = np.abs(by_torque.recording.position - by_forces.recording.position).max(axis=1)
-    result.rows += [
-        _row(f"joint torque, {_RATE} Hz", by_torque, by_torque),
-        _row(f"joint torque, {_FINE_RATE} Hz", at_fine_rate, by_torque),
-        _row("forces between the bodies", by_forces, by_torque),
-        _row(f"and a root force of {_FORCE:g} N, {_FINE_RATE} Hz", by_root, by_torque),
-        _row("neither", passive, by_torque),
-    ]
+    for name, run in (
+        (f"joint torque, {_RATE} Hz", by_torque),
+        (f"joint torque, {_FINE_RATE} Hz", at_fine_rate),
+        ("forces between the bodies", by_forces),
+        (f"and a root force of {_FORCE:g} N, {_FINE_RATE} Hz", by_root),
+        ("neither", passive),
+    ):
+        result.rows.append(_row(name, run, by_torque))
     hinge, difference, *others = result.add_panels(result.name, 2, 2, (11.0, 7.0))
     times = by_torque.recording.times
     hinge.plot(times, by_torque.hinge, linewidth=2.5, alpha=0.7, label="by a joint torque")
@@ -100,14 +101,8 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     difference.semilogy(times, np.maximum(apart, _SMALLEST), label="largest entry")
     label(difference, "time (s)", "position apart (rad, m)", "the two runs differ by rounding")
     _draw_momentum(others, by_torque, at_fine_rate, by_root)
-    result.add_curves(
-        "joint_torque_hinge",
-        {
-            "time_s": times,
-            "hinge_by_torque_rad": by_torque.hinge,
-            "hinge_by_forces_rad": by_forces.hinge,
-        },
-    )
+    curves = {"hinge_by_torque_rad": by_torque.hinge, "hinge_by_forces_rad": by_forces.hinge}
+    result.add_curves("joint_torque_hinge", {"time_s": times, **curves})
     result.notes += [
         f"three pairs of forces move the boxes as the torque sum r x f does: positions agree "
         f"within {apart.max():.1e}; what of it is not along the hinge's axis the hinge holds",
@@ -141,8 +136,8 @@ def _run(
     efforts = np.zeros((len(times), layout.size))
     efforts[:, layout.dof_names.index(HINGE)] = torque * _profile(times)
     efforts[:, 0] = force
-    series = runner.path(f"{name}.csv")
-    write_effort_series(series, layout, times, efforts)
+    path = runner.path(f"{name}.csv")
+    write_effort_series(path, layout, times, efforts)
     case = RunSpec(
         label=name,
         character=boxes,
@@ -156,7 +151,7 @@ def _run(
         },
         controller={
             "law": "feedforward",
-            "feedforward": str(series),
+            "feedforward": str(path),
             "root_assistance": bool(force),
         },
         pushes=pushes,

@@ -9,7 +9,7 @@ from actuated_characters.bags.recording import Recording
 from actuated_characters.render.stills import strip
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.reactions import mode_spans
-from actuated_characters.studies.framework.result import StudyResult
+from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import joint_errors
 from msgs_config.arrays import FloatArray
@@ -27,17 +27,20 @@ _AROUND = 0.05  # s before and after the hit between which the ball's momentum i
 _AS_BEFORE = 1.1  # times the largest error without a hit
 _PEAK = 1.5  # s after the hit in which the root's largest displacement is looked for
 _MODES = ("REACT", "BLEND", "LIMP")
-_MOMENTS = {
-    "ragdoll": (0.0, 0.1, 0.15, 0.25, 0.4, 0.6, 0.9, 3.0),
-    "active_ragdoll": (0.9, 1.05, 1.4, 1.9, 3.0, 4.0, 5.0, 6.5),
-    "reactive": (0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.25, 3.0),
-}  # s
-_TITLES = {
-    "ragdoll": "ragdoll, 40 N s: no torque but that of the soft limits, no assistance",
-    "active_ragdoll": "active ragdoll, 40 N s: limp and without assistance, which comes back as "
-    "it gets up",
-    "reactive": "reactive, 20 N s: soft, with at most 0.2 of the weight, then along the clip that "
-    "was found",
+_POSES = {  # of a run: what is seen, and when, s
+    "ragdoll": (
+        "ragdoll, 40 N s: no torque but that of the soft limits, no assistance",
+        (0.0, 0.1, 0.15, 0.25, 0.4, 0.6, 0.9, 3.0),
+    ),
+    "active_ragdoll": (
+        "active ragdoll, 40 N s: limp and without assistance, which comes back as it gets up",
+        (0.9, 1.05, 1.4, 1.9, 3.0, 4.0, 5.0, 6.5),
+    ),
+    "reactive": (
+        "reactive, 20 N s: soft, with at most 0.2 of the weight, then along the clip that was "
+        "found",
+        (0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.25, 3.0),
+    ),
 }
 
 
@@ -57,54 +60,27 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
 
     And two others: one that is limp, and one that gets up.
     """
-
-    def run(label: str, behaviour: str, impulse: float = 0.0, **more: float) -> Recording:
-        return runner.run(_case(label, behaviour, impulse, **more)).recording
-
     strongest = IMPULSES[-1]
-    alone = run("alone", "reactive", length=_LONG)
-    hits = {
-        impulse: run(
-            f"reactive_{impulse:g}Ns",
-            "reactive",
-            impulse,
-            length=_LONG if impulse == strongest else _LENGTH,
-        )
-        for impulse in IMPULSES
-    }
-    poses = {
-        "ragdoll": run("ragdoll", "ragdoll", strongest, at=_RAGDOLL_HIT, distance=1.0),
-        "active_ragdoll": run("active_ragdoll", "active_ragdoll", strongest, length=_LONG),
-        "reactive": hits[20.0],
-    }
+    alone = runner.run(_case("alone", "reactive", length=_LONG)).recording
+    hits = {}
+    for impulse in IMPULSES:
+        length = _LONG if impulse == strongest else _LENGTH
+        case = _case(f"reactive_{impulse:g}Ns", "reactive", impulse, length=length)
+        hits[impulse] = runner.run(case).recording
+    limp = _case("ragdoll", "ragdoll", strongest, at=_RAGDOLL_HIT, distance=1.0)
+    rising = _case("active_ragdoll", "active_ragdoll", strongest, length=_LONG)
+    poses = {case.label: runner.run(case).recording for case in (limp, rising)}
     reactions = {impulse: measure(hit, alone, HIT) for impulse, hit in hits.items()}
     for impulse, reaction in reactions.items():
-        spans = mode_spans(hits[impulse])
-        result.rows.append(
-            {
-                "planned impulse (N s)": impulse,
-                "measured impulse (N s)": reaction.impulse,
-                "largest displacement of the root (m)": reaction.peak,
-                "back on the clip (s)": reaction.back,
-            }
-            | {
-                f"{mode} (s)": sum((s.duration for s in spans if s.mode == mode), start=0.0)
-                for mode in _MODES
-            }
-        )
-        result.add_curves(
-            f"{result.name}_{impulse:g}Ns",
-            {
-                "time_s": hits[impulse].times,
-                "root_displacement_m": reaction.displacement,
-                "joint_error_rad": reaction.error,
-            },
-        )
+        result.rows.append(_row(impulse, reaction, hits[impulse]))
+        curves = {"root_displacement_m": reaction.displacement, "joint_error_rad": reaction.error}
+        result.add_curves(f"{result.name}_{impulse:g}Ns", {"time_s": hits[impulse].times, **curves})
     _draw(result, alone, hits, reactions)
-    for name, recording in poses.items():
+    for name, recording in {**poses, "reactive": hits[20.0]}.items():
+        title, times = _POSES[name]
         result.add_pictures(
             f"{result.name}_{name}",
-            {_TITLES[name]: strip(recording, _MOMENTS[name])},
+            {title: strip(recording, times)},
             title_height=0.4,
             title_place="center",
         )
@@ -112,6 +88,21 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
         "assistance: full while it follows a clip, at most 0.2 of the weight in REACT, "
         "none in LIMP; the ragdoll has none"
     )
+
+
+def _row(planned: float, reaction: Reaction, run: Recording) -> Row:
+    spans = mode_spans(run)
+    lasting = {
+        f"{mode} (s)": sum((span.duration for span in spans if span.mode == mode), start=0.0)
+        for mode in _MODES
+    }
+    return {
+        "planned impulse (N s)": planned,
+        "measured impulse (N s)": reaction.impulse,
+        "largest displacement of the root (m)": reaction.peak,
+        "back on the clip (s)": reaction.back,
+        **lasting,
+    }
 
 
 def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
@@ -124,7 +115,7 @@ def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
     """
     states = slice(len(run.times))
     error = joint_errors(run, alone.reference_position[states]).mean(axis=1)
-    usual = joint_errors(alone).mean(axis=1)[alone.times >= hit]
+    usual = joint_errors(alone, alone.reference_position).mean(axis=1)[alone.times >= hit]
     displacement = np.linalg.norm(run.position[:, :3] - alone.position[states, :3], axis=1)
     times, after = run.times, run.times >= hit
     is_off = np.flatnonzero(after & (error > _AS_BEFORE * np.nanmax(usual)))  # the last has none
@@ -163,15 +154,14 @@ def _case(
     distance: float = 2.0,
     length: float = _LENGTH,
 ) -> RunSpec:
-    mass = impulse / _SPEED
-    throw = f"mass={mass} speed={_SPEED} at={at} from=front target=chest distance={distance}"
+    throw = f"mass={impulse / _SPEED} speed={_SPEED} at={at} from=front target=chest"
     return RunSpec(
         label,
         "humanoid",
         length,
-        reference=WALK,
+        WALK,
         controller={"behaviour": behaviour},
-        throws=[throw] if impulse else [],
+        throws=[f"{throw} distance={distance}"] if impulse else [],
     )
 
 
@@ -185,7 +175,7 @@ def _draw(
     title = "hit against the chest at 1 s; the assistance is full in TRACK and BLEND"
     panels = result.add_panels(result.name, len(hits), 2, (11.0, 9.0), title=title, same_x="row")
     marks, modes = Marks(), list[tuple[float, float, str]]()  # of all of them, for the legend
-    usual = joint_errors(alone).mean(axis=1)
+    usual = joint_errors(alone, alone.reference_position).mean(axis=1)
     for (impulse, run), (moved, error) in zip(
         hits.items(), zip(panels[::2], panels[1::2], strict=True), strict=True
     ):

@@ -176,12 +176,13 @@ def _row(one: Observed) -> Row:
     """What is measured in the first tick and over the run, beside theory."""
     trial, motion = one.trial, one.motion
     inertia, step = trial.box.inertia, 1.0 / trial.rate
-    force, torque = net_load(trial.loads, motion.turn_xyzw)
+    turns = rotations.matrix(motion.turn_xyzw)
+    force, torque = net_load(trial.loads, turns)
     forces = np.broadcast_to(force, torque[:-1].shape)
     linear = np.diff(motion.velocity[:2], axis=0)[0] / step
     angular = np.diff(motion.angular_velocity[:2], axis=0)[0] / step
     by_force = force / trial.box.mass
-    in_body = rotations.matrix(motion.turn_xyzw[0]).T @ torque[0]
+    in_body = turns[0].T @ torque[0]
     by_torque = angular_acceleration(inertia, motion.angular_velocity[0], in_body)
     off = np.concatenate((linear - by_force, angular - by_torque))
     largest = np.abs(np.concatenate((by_force, by_torque))).max()

@@ -98,17 +98,33 @@ class Momenta:
 
 
 def momenta(character: Character, position: FloatArray, velocity: FloatArray) -> Momenta:
-    """The momentum of states (t, n) of a character with a floating base.
+    """The momentum of states (t, n) of a character, summed over its links.
 
-    The first entries of the generalised momentum `M v` are P in the world's axes, and L about the
-    base's origin in the base's axes.
+    `P = sum m v` and `L = sum (c x m v + I w)`, with each link's centre of mass c and its inertia I
+    in the world's axes.
     """
     model = DynamicsModel(character)
-    centres, momentum = np.empty((len(position), 3)), np.empty((len(position), 6))
-    for row, state in enumerate(zip(position, velocity, strict=True)):
-        model.update(*state)
-        centres[row] = model.centre_of_mass()
-        momentum[row] = (model.mass_matrix() @ state[1])[:6]
-    linear, turns = momentum[:, :3], rotations.exp(position[:, 3:6])
-    about_base = rotations.rotate(turns, momentum[:, 3:])
-    return Momenta(centres, linear, np.cross(position[:, :3], linear) + about_base)
+    masses = np.array([link.mass for link in character.links])
+    rows = [_of_state(model, character, *state) for state in zip(position, velocity, strict=True)]
+    centres, velocities, spins = (np.array(part) for part in zip(*rows, strict=True))
+    momentum = masses[:, np.newaxis] * velocities
+    return Momenta(
+        centre=(masses[:, np.newaxis] * centres).sum(axis=1) / masses.sum(),
+        linear=momentum.sum(axis=1),
+        angular=(np.cross(centres, momentum) + spins).sum(axis=1),
+    )
+
+
+def _of_state(
+    model: DynamicsModel, character: Character, position: FloatArray, velocity: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Centre of mass, its velocity, and `I w` of each link (links, 3) in one state."""
+    model.update(position, velocity)
+    origins, turns = model.link_poses()
+    motions = np.array([model.link_jacobian(k) @ velocity for k in range(len(origins))])
+    poses = [link.inertial_pose for link in character.links]
+    centres = origins + rotations.rotate(turns, np.array([pose.position for pose in poses]))
+    inertial = rotations.multiply(turns, np.array([pose.orientation_xyzw for pose in poses]))
+    moments = np.array([link.inertia_diagonal for link in character.links])
+    own = moments * rotations.rotate(rotations.conjugate(inertial), motions[:, 3:])
+    return centres, motions[:, :3], rotations.rotate(inertial, own)

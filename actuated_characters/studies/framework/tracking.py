@@ -11,21 +11,14 @@ _LEAST_HEIGHT = 0.5  # m; ... where the reference is not lying itself
 
 
 def joint_errors(run: Recording, reference: FloatArray | None = None) -> FloatArray:
-    """Angle (t + 1, j) in rad of each of j hinges and balls from where it is to be.
+    """Angle (r, j) in rad of each of j hinges and balls from where it is to be.
 
-    `reference` (t + 1, n) stands for the run's own; NaN where there is none, as after the last
-    tick.
+    `reference` (r, n) is that of the first r states; by default the run's own, before each tick.
     """
-    desired = run.reference_position if reference is None else reference
+    desired = run.reference_position[:-1] if reference is None else reference
     vectors = vectors_of(run.character)
     rotates = vectors.actuated & (np.array(vectors.units) == "rad")
-    errors: FloatArray = distances(run, run.position, desired)[:, rotates]
-    return errors
-
-
-def mean_joint_errors(run: Recording) -> FloatArray:
-    """The joint error (t,) in rad, mean over the joints, before each tick."""
-    errors: FloatArray = joint_errors(run)[:-1].mean(axis=1)
+    errors: FloatArray = distances(run, run.position[: len(desired)], desired)[:, rotates]
     return errors
 
 
@@ -130,22 +123,14 @@ def delayed_spectral_radius(
     """
     size, blocks = len(stiffness), 2 + delay_ticks
     implicit = mass_matrix + np.diag(damping * period)
-    by_position = -np.linalg.solve(implicit, np.diag(stiffness))
-    by_velocity = -np.linalg.solve(implicit, np.diag(damping + stiffness * period))
-    one, moved = np.eye(size), period * period * (substeps + 1) / (2 * substeps)
-    # of position, velocity, and what was asked for a tick ago, two ticks ago, ...
-    step = np.zeros((blocks, size, blocks, size))
-    step[0, :, 0], step[0, :, 1], step[1, :, 1] = one, period * one, one
-    asked = np.zeros((size, blocks, size))
-    asked[:, 0], asked[:, 1] = by_position, by_velocity
-    acting = asked
-    if delay_ticks:
-        acting = np.zeros_like(asked)
-        acting[:, blocks - 1] = one
-        step[2] = asked
-    for block in range(3, blocks):
-        step[block, :, block - 1] = one
-    step[0] += moved * acting
-    step[1] += period * acting
-    matrix = step.reshape(blocks * size, blocks * size)
+    # blocks: position, velocity, and what was asked for a tick ago, two ticks ago, ...
+    every = np.eye(blocks * size).reshape(blocks, size, blocks * size)
+    asked = np.zeros((size, blocks * size))
+    asked[:, :size] = -np.linalg.solve(implicit, np.diag(stiffness))
+    asked[:, size : 2 * size] = -np.linalg.solve(implicit, np.diag(damping + stiffness * period))
+    acting = every[-1] if delay_ticks else asked
+    moved = period * period * (substeps + 1) / (2 * substeps)
+    position = every[0] + period * every[1] + moved * acting
+    velocity = every[1] + period * acting
+    matrix = np.concatenate((position, velocity, *([asked] * bool(delay_ticks)), *every[2:-1]))
     return float(np.abs(np.linalg.eigvals(matrix)).max())
