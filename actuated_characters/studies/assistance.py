@@ -1,4 +1,4 @@
-"""What the lecture's root force and torque do: the walk with less and less of them."""
+"""Root force and torque of the lecture: the walk with less and less of them."""
 
 from collections.abc import Mapping
 

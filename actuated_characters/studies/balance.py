@@ -44,7 +44,7 @@ _GIVEN: Mapping[str, object] = {
 
 @dataclass(frozen=True)
 class _Limit:
-    """What bisection has found in one direction."""
+    """The result of the bisection in one direction."""
 
     survived: float  # N s
     fell: float  # N s
@@ -84,7 +84,7 @@ def stands(recording: Recording) -> BoolArray:
 
 
 def is_upright(recording: Recording) -> bool:
-    """Whether the trunk is at most 45 degrees from where it was at first, at the end."""
+    """True if the trunk has tilted by at most 45 degrees at the end of a run."""
     first, last = rotations.exp(recording.position[[0, -1], 3:6])
     up = np.array((0.0, 0.0, 1.0))
     own_up = rotations.rotate(rotations.conjugate(first), up)
@@ -99,7 +99,7 @@ def standing_time(recording: Recording) -> float:
 
 
 def survives(outcome: RunResult) -> bool:
-    """Whether it stood all the time, and is upright in the end."""
+    """True if the character stood all the time and is upright at the end."""
     run = outcome.recording
     return not outcome.diverged and bool(stands(run).all()) and is_upright(run)
 
@@ -123,7 +123,7 @@ def _case(
 
 
 def _largest_impulse(runner: StudyRunner, direction: str) -> _Limit:
-    """Bisect between no push and one that throws anybody over."""
+    """Bisect between no push and one that is too strong in every direction."""
     x, y = _DIRECTIONS[direction]
 
     def pushed(impulse: float) -> RunResult:

@@ -100,7 +100,10 @@ def _on_the_ground(
 
 
 def _row(character: Character, clip: str, outcome: RunResult) -> Row:
-    """A fall is below half of the height, or on the ground with what should not be there."""
+    """A row of the table.
+
+    A fall: below half of the height, or unexpected links on the ground.
+    """
     recording, errors, feet = (
         outcome.recording,
         joint_errors(outcome.recording),
@@ -127,7 +130,7 @@ def _row(character: Character, clip: str, outcome: RunResult) -> Row:
 
 
 def _is_down(character: Character, positions: FloatArray, besides: set[str]) -> bool:
-    """Whether other links than some touch the ground in any of positions (t, n)."""
+    """True if links other than `besides` touch the ground in any of positions (t, n)."""
     heights = clearances(character, positions)
     return any(heights[name].min() < _TOUCH for name in heights.keys() - besides)
 

@@ -1,4 +1,4 @@
-"""How fast control must be, and how late it may come: the walk by rate and delay of commands."""
+"""Tracking of the walk by the rate of control and the delay of commands."""
 
 from collections.abc import Mapping, Sequence
 
@@ -101,7 +101,7 @@ def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -
 
 
 def _describe(row: Row) -> str:
-    """What became of a rate and delay, in a few words."""
+    """The outcome at one rate and delay, in a few words."""
     text = f"{row['mean joint error (rad)']:.3f}"
     if row["diverged"]:
         text = f"diverges\n{row['ends at (s)']:.2f} s"

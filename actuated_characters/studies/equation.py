@@ -33,7 +33,7 @@ _PARTS = ("M (v' - v) / h", "C", "f", "J^T contacts")
 
 @dataclass(frozen=True)
 class Closure:
-    """How the equation closes over the t ticks of a run."""
+    """The residual of the equation over the t ticks of a run."""
 
     times: FloatArray  # (t,) s
     relative: FloatArray  # (t,) norm of the residual, without limits, over the largest part

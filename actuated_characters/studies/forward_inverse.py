@@ -50,7 +50,7 @@ _A_CYCLE, _CYCLES = 12, 1.5  # keyframes a cycle of the clip
 
 @dataclass(frozen=True)
 class _Inverse:
-    """What inverse dynamics says of a motion at a rate."""
+    """The inverse dynamics of a motion at a rate."""
 
     character: str
     reference: Mapping[str, object]  # the motion's parameters
@@ -64,11 +64,11 @@ class _Inverse:
 
 @dataclass(frozen=True)
 class _Return:
-    """What came back of a motion whose inverse dynamics was fed forward."""
+    """The run in which the inverse dynamics of a motion was fed forward."""
 
     inverse: _Inverse
     outcome: RunResult
-    root: str  # what was done with the root efforts
+    root: str  # "none", "fed forward" or "left out": the root efforts
     ground: bool
     times: FloatArray  # (t,) s
     error: FloatArray  # (t,) rad, mean over the joints
@@ -171,7 +171,7 @@ def efforts_along(
 def _give_back(
     runner: StudyRunner, inverse: _Inverse, *, root: str = "none", ground: bool = True
 ) -> _Return:
-    """Feed efforts forward; the root's only if that is what is said of them."""
+    """Feed efforts forward; the root's only if `root` is "fed forward"."""
     case = RunSpec(
         label=f"{inverse.character}-{inverse.rate}{'' if ground else '-air'}",
         character=inverse.character,
@@ -208,7 +208,7 @@ def _rows(returns: Sequence[_Return]) -> list[Row]:
 
 
 def orders(periods: Sequence[float], errors: Sequence[float]) -> list[float]:
-    """With which power of the tick (s) the error shrinks, from each tick to the next one."""
+    """The power of the tick (s) with which the error shrinks, from each tick to the next one."""
     both = pairwise(zip(np.log(periods), np.log(errors), strict=True))
     return [float((e1 - e0) / (h1 - h0)) for (h0, e0), (h1, e1) in both]
 

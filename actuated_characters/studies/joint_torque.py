@@ -1,4 +1,4 @@
-"""What a joint torque is: the sum of forces between two bodies, and nothing to both together."""
+"""A joint torque as forces between two bodies that sum to zero, and change no momentum."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ class _Run:
 
     @property
     def off_line(self) -> FloatArray:
-        """How far (t + 1,) the centre of mass is off where its first velocity leads it, m."""
+        """Distance (t + 1,) in m of the centre of mass from where its first velocity leads it."""
         centre, times = self.momenta.centre, self.recording.times
         mass_velocity = (centre[1] - centre[0]) / (times[1] - times[0])
         straight = centre[0] + times[:, np.newaxis] * mass_velocity
@@ -62,7 +62,7 @@ class _Run:
 
     @property
     def changes(self) -> tuple[FloatArray, FloatArray]:
-        """How far (t + 1,) P is from where it was, kg m/s, and (t + 1,) L, kg m^2/s."""
+        """Distances (t + 1,) of P in kg m/s and L in kg m^2/s from their first values."""
         linear, angular = (
             np.linalg.norm(values - values[0], axis=1)
             for values in (self.momenta.linear, self.momenta.angular)

@@ -1,4 +1,4 @@
-"""One mass on a slider: what P, PD and PID do with a weight, and when they are unstable."""
+"""One mass on a slider under P, PD and PID: steady-state errors, and bounds of stability."""
 
 import math
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ _LIMIT = second_order.largest_integral_gain(STIFFNESS, CRITICAL, MASS)
 
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
-    """Run each law with gains that show what it is like, then look for the bounds."""
+    """Run each law with typical gains, then look for the bounds of stability."""
 
     def respond(law: str, kp: float = STIFFNESS, kd: float = CRITICAL, ki: float = 0.0) -> Response:
         return _respond(runner, Gains(law, kp, kd, ki), _LENGTH)
@@ -85,7 +85,7 @@ def _respond(runner: StudyRunner, gains: Gains, duration: float) -> Response:
 
 
 def _row(response: Response, *, at_bound: bool = False) -> Row:
-    """A line of the table; at its bound a motion is none that continuous time knows of."""
+    """A row of the table; at a bound, without the measures that suppose continuous time."""
     gains, stable = response.gains, response.stable
     ideal = stable and not at_bound
     rest = response.rest if stable else math.nan

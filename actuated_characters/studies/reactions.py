@@ -46,7 +46,7 @@ _POSES = {  # of a run: what is seen, and when, s
 
 @dataclass(frozen=True)
 class Reaction:
-    """What a hit has done."""
+    """The effects of a hit."""
 
     impulse: float  # N s, that the ball has lost until shortly after it touched
     peak: float  # m, how far the root is at the most from where it would have been
@@ -106,7 +106,7 @@ def _row(planned: float, reaction: Reaction, run: Recording) -> Row:
 
 
 def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
-    """What a hit at a time in s has done, by the same run without it.
+    """The effects of a hit at a time in s, by comparison with the same run without it.
 
     Args:
         run: A run of one ball.

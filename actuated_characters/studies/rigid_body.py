@@ -74,7 +74,7 @@ class Observed:
 
     @property
     def drift(self) -> FloatArray:
-        """How far (t + 1,) the angular momentum is from where it was, relative to that."""
+        """Distance (t + 1,) of the angular momentum from its first value, relative to that."""
         spin = self.momenta.spin
         off: FloatArray = np.linalg.norm(spin - spin[0], axis=1)
         return off / float(np.linalg.norm(spin[0]))
@@ -164,7 +164,7 @@ def euler_residual(inertia: FloatArray, motion: Motion, torque: FloatArray, step
 
 
 def missed_impulse(momentum: FloatArray, load: FloatArray, step: float) -> float:
-    """How far a momentum (t + 1, 3) has changed otherwise than by its load (t, 3) in each tick.
+    """The change of a momentum (t + 1, 3) that the impulse of its load (t, 3) does not explain.
 
     In kg m/s for a force, kg m^2/s for a torque; `step` in s.
     """
@@ -173,7 +173,7 @@ def missed_impulse(momentum: FloatArray, load: FloatArray, step: float) -> float
 
 
 def _row(one: Observed) -> Row:
-    """What is measured in the first tick and over the run, beside theory."""
+    """Measurements of the first tick and of the whole run, beside theory."""
     trial, motion = one.trial, one.motion
     inertia, step = trial.box.inertia, 1.0 / trial.rate
     turns = rotations.matrix(motion.turn_xyzw)

@@ -1,4 +1,4 @@
-"""How the figures of studies and reports look."""
+"""The common look of the figures of studies and reports."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
@@ -10,7 +10,7 @@ if TYPE_CHECKING:  # it takes a second to import
     from matplotlib.figure import Figure
 
 THEORY: dict[str, Any] = {"color": "black", "linestyle": "--", "linewidth": 1.0}
-"""How a line of theory is drawn."""
+"""The style of a line of theory."""
 
 
 def make_panels(
@@ -28,7 +28,7 @@ def make_panels(
 
 
 def label(axes: "Axes", x: str, y: str, title: str = "", *, legend: Any = "best") -> None:
-    """Name what a panel shows, with units; `legend` is where that lies, None for no legend."""
+    """Label a panel's axes, with units; `legend` is the place of its legend, None for none."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title, fontsize="medium")

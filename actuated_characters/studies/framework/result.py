@@ -1,4 +1,4 @@
-"""What a study shows: a table, pictures, the curves behind them, and notes; and their files."""
+"""The result of a study: table, pictures, the curves behind them, notes; and their files."""
 
 import csv
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.render.engine.renderer import Picture
 
 Cell = str | int | float | bool | None
-"""What a table's field holds; None where nothing can be said."""
+"""A field of a table; None where there is no value."""
 
 Row = Mapping[str, Any]
 """One row of a table: each cell by the name of its column, which has the unit."""
@@ -35,7 +35,7 @@ class StudyResult:
         self.figures: dict[str, Figure] = {}  # by the name of their files
         self.curves: dict[str, Mapping[str, FloatArray]] = {}
         # by the name of a CSV file: columns (t,) by their names
-        self.notes: list[str] = []  # sentences that say what is seen
+        self.notes: list[str] = []  # sentences about the result
 
     @property
     def columns(self) -> list[str]:

@@ -17,7 +17,7 @@ from actuated_characters.studies.framework.study import RunResult, RunSpec
 from msgs_config.errors import RunError
 
 Report = Callable[[str, float], None]
-"""Called with a run's label, and which share of it is done."""
+"""Called with a run's label and the share of it that is done."""
 
 _DIVERGED = "diverged at tick"
 _UNREAD = ["odom", "visualization", "controller_node/net_wrench"]  # topics, at a cost each tick
@@ -66,7 +66,7 @@ class TopicRunner:
         return RunResult(recording, summary, diverged)
 
     def path(self, name: str) -> Path:
-        """Where a file of that name is to be written; its directory is there."""
+        """The path for a file of that name; its directory exists."""
         self._directory.mkdir(parents=True, exist_ok=True)
         return self._directory / name
 

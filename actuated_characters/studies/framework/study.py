@@ -1,4 +1,4 @@
-"""What a study is: runs that are asked for one by one, and a result that they fill."""
+"""A study: runs that it asks for one by one, and a result that it fills."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ HOLD: Mapping[str, object] = {"reference": "hold"}
 
 @dataclass(frozen=True)
 class RunSpec:
-    """One run of a study: what `actuated_characters run` takes."""
+    """One run of a study, with the options of `actuated_characters run`."""
 
     label: str  # unique in its study; also the name of its directory
     character: str  # a shipped one, or a file's path
@@ -38,7 +38,7 @@ def plan_push(time: float, rate: int, link: str, force: Vector) -> PlannedPush:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run gave."""
+    """A run's recording and summary."""
 
     recording: Recording
     summary: Mapping[str, object]  # of summary.json
@@ -51,7 +51,7 @@ class RunResult:
 
 
 class StudyRunner(Protocol):
-    """Where runs are made."""
+    """Makes the runs of a study."""
 
     def run(self, case: RunSpec) -> RunResult:
         """Run a case over topics, to its end or until it diverges.
@@ -62,7 +62,7 @@ class StudyRunner(Protocol):
         ...
 
     def path(self, name: str) -> Path:
-        """Where a file that runs need, such as a URDF, is to be written: below the study."""
+        """The path for a file that runs need, such as a URDF, below the study's directory."""
         ...
 
 
@@ -76,7 +76,7 @@ class Study:
     fill: Callable[[StudyRunner, StudyResult], None]  # makes the runs, and adds what they show
 
     def run(self, runner: StudyRunner) -> StudyResult:
-        """Make its runs and return what they show."""
+        """Make the runs and return the filled result."""
         result = StudyResult(self.name)
         self.fill(runner, result)
         return result

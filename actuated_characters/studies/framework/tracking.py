@@ -1,4 +1,4 @@
-"""How well a motion is tracked: errors, overshoot, lag, time of a fall, and what theory says."""
+"""Measures of tracking: errors, overshoot, lag, time of a fall; and their theory."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def root_force_share(run: Recording, ticks: int | None = None) -> float:
 
 
 def overshoot(angle: FloatArray, reference: FloatArray) -> float:
-    """How far an angle (t,) goes beyond the extremes of its reference (t,), over their distance.
+    """Overshoot of an angle (t,) beyond the extremes of its reference (t,), over their distance.
 
     Negative where it stays within both. Of a step it is the overshoot of the step's response.
     """
@@ -88,7 +88,7 @@ def inertialess_response(
 
 
 def fall_time(run: Recording) -> float | None:
-    """When, in s, the root first is below half of its desired height; None if it never is.
+    """Time in s at which the root first is below half of its desired height; None if never.
 
     A reference below 0.5 m lies by intention, which is no fall.
     """

@@ -1,4 +1,4 @@
-"""How the mass of `lift` answers to a law, what theory says of that, and where it is unstable."""
+"""Responses of the mass of `lift` to control laws, their theory, and bounds of stability."""
 
 import math
 from collections.abc import Callable
@@ -18,7 +18,7 @@ _TAIL = RATE // 2  # states that a steady state is the mean of, where nothing sw
 
 @dataclass(frozen=True)
 class Gains:
-    """A law and its gains, and what theory says of them."""
+    """A law and its gains, and the theory of both."""
 
     law: str
     stiffness: float  # N/m
@@ -46,7 +46,7 @@ class Gains:
 
     @property
     def stable_by_theory(self) -> bool:
-        """Whether the law with these gains is stable; PID by its bound in continuous time."""
+        """True if the law with these gains is stable; PID by its bound in continuous time."""
         gains = self.stiffness, self.damping, MASS
         if self.law == "pid":
             return self.integral < second_order.largest_integral_gain(*gains)
@@ -57,7 +57,7 @@ class Gains:
 
 @dataclass(frozen=True)
 class Response:
-    """How the mass went, from rest at 0 towards the target, and what that was like."""
+    """A motion of the mass, from rest at 0 m towards the target, and its measures."""
 
     gains: Gains
     times: FloatArray  # (t,) s
@@ -66,20 +66,20 @@ class Response:
 
     @property
     def stable(self) -> bool:
-        """Whether it came nearer to its rest rather than farther from it."""
+        """True if the motion decays towards its rest instead of growing."""
         wider = second_order.swings_wider(self.height, TARGET - self.gains.error_by_theory)
         return not (self.diverged or wider)
 
     @property
     def rest(self) -> float:
-        """Where it came to rest (m), or what it swings about."""
+        """The height (m) at which the mass comes to rest, or about which it swings."""
         if self.gains.law == "pid":
             return float(self.height[-_TAIL:].mean())
         return second_order.identify(self.height, PERIOD).rest
 
     @property
     def ratio(self) -> float | None:
-        """Its damping ratio; a PID is not of second order."""
+        """The damping ratio; None for PID, which is not of second order."""
         if self.gains.law == "pid":
             return None
         return second_order.identify(self.height, PERIOD).damping_ratio

@@ -118,14 +118,6 @@ def test_a_joint_without_inertia_lags_as_a_first_order_filter(
     assert measured == pytest.approx(late, abs=1e-4)  # s; samples are 4 ms apart
 
 
-def test_a_slow_motion_lags_by_damping_over_stiffness() -> None:
-    times = np.arange(0.0, 3.0, PERIOD)
-
-    angle = inertialess_response(0.2 * times, np.zeros_like(times), 500.0, 50.0, PERIOD)
-
-    assert 0.2 * times[-1] - angle[-1] == pytest.approx(0.2 * 50.0 / 500.0, rel=1e-6)
-
-
 def test_a_fall_is_below_half_of_a_reference_that_stands(few_ticks: Recording) -> None:
     def falls(height: list[float], desired: float) -> float | None:
         position, reference = few_ticks.position.copy(), few_ticks.position.copy()
@@ -154,19 +146,6 @@ def test_delayed_damping_is_stable_up_to_the_bound_of_levin_and_may(delay_ticks:
         assert (radius > 1.0 + 1e-9) == (factor > 1.0)  # 1: where it stands is free
 
 
-@pytest.mark.parametrize("factor", [0.98, 1.02])
-def test_without_delay_it_is_stable_where_stable_pd_is(factor: float) -> None:
-    """One mass: 3 kp h^2 < 4 m + 2 kd h."""
-    mass, damping = 2.0, 5.0
-    stiffness = factor * (4.0 * mass + 2.0 * damping * PERIOD) / (3.0 * PERIOD**2)
-
-    radius = delayed_spectral_radius(
-        np.array([[mass]]), np.array([stiffness]), np.array([damping]), PERIOD, delay_ticks=0
-    )
-
-    assert (radius < 1.0) == (factor < 1.0)
-
-
 @pytest.mark.parametrize(("delay_ticks", "substeps"), [(0, 1), (1, 1), (2, 4), (4, 3)])
 def test_growth_is_that_of_the_controllers_own_law_stepped_with_delay(
     delay_ticks: int, substeps: int
@@ -175,39 +154,31 @@ def test_growth_is_that_of_the_controllers_own_law_stepped_with_delay(
     root = rng.normal(size=(3, 3))
     mass = root @ root.T + 0.1 * np.eye(3)
     stiffness, damping = np.array([500.0, 100.0, 900.0]), np.array([50.0, 5.0, 20.0])
-    position, velocity, waiting = rng.normal(size=3), np.zeros(3), [np.zeros(3)] * delay_ticks
-    sizes, scale = [], 0.0
+    # position, velocity, and the efforts that have still to act, the next one first
+    state = np.zeros((2 + delay_ticks, 3))
+    state[0] = rng.normal(size=3)
+    sizes = np.zeros(3000)
 
     def solve(force: FloatArray, added: FloatArray) -> FloatArray:
         return np.array(np.linalg.solve(mass + np.diag(added), force), dtype=float)
 
-    for _ in range(3000):
-        effort = stable_pd_effort(
-            solve,
-            np.zeros(3),
-            stiffness,
-            damping,
-            -position,
-            velocity,
-            np.zeros(3),
-            PERIOD,
-        )
-        waiting = [*waiting, effort]
-        acceleration = np.linalg.solve(mass, waiting.pop(0))
+    for tick in range(len(sizes)):
+        position, velocity, *waiting = state
+        gains = np.zeros(3), stiffness, damping
+        effort = stable_pd_effort(solve, *gains, -position, velocity, np.zeros(3), PERIOD)
+        acting, *waiting = *waiting, effort
         for _ in range(substeps):
-            velocity = velocity + acceleration * PERIOD / substeps
+            velocity = velocity + np.linalg.solve(mass, acting) * PERIOD / substeps
             position = position + velocity * PERIOD / substeps
         size = np.linalg.norm([position, velocity])
-        position, velocity = position / size, velocity / size
-        waiting = [each / size for each in waiting]
-        scale += np.log(size)
-        sizes.append(scale)
+        state = np.array([position, velocity, *waiting]) / size
+        sizes[tick] = np.log(size)
 
     radius = delayed_spectral_radius(
         mass, stiffness, damping, PERIOD, delay_ticks=delay_ticks, substeps=substeps
     )
 
-    assert np.log(radius) == pytest.approx((sizes[-1] - sizes[999]) / 2000, abs=2e-3)
+    assert np.log(radius) == pytest.approx(sizes[1000:].mean(), abs=2e-3)
 
 
 def test_clearances_are_the_engines_distances_to_the_ground() -> None:
