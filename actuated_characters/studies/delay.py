@@ -1,10 +1,11 @@
 """Tracking of the walk by the rate of control and the delay of commands."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from actuated_characters.runs.plan import Plan, make_plan
 from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
@@ -13,13 +14,9 @@ from actuated_characters.studies.framework.tracking import (
     fall_time,
     joint_errors,
 )
-from controller_node import parameters as controller_parameters
-from controller_node.control_laws import GainArrays
+from controller_node.parameters import make_settings
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.loading import load_character
-from msgs_config.character.model import Character
-from msgs_config.parameters import resolve
 
 TITLE = "tracking of the walk by control rate and delay, with root assistance"
 RUNS = 16
@@ -34,10 +31,8 @@ _WORST, _BEST = 0.6, 0.05  # rad, the ends of the map's colours
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
     """Walk with root assistance at each rate, the commands late by each number of ticks."""
-    character = load_character(_CHARACTER)
-    result.rows += [
-        _measure(runner, character, rate, delay) for rate in _RATES for delay in _DELAYS
-    ]
+    plan = make_plan(_CHARACTER, _DURATION, WALK, {}, {})
+    result.rows += [_measure(runner, plan, rate, delay) for rate in _RATES for delay in _DELAYS]
     shape = len(_RATES), len(_DELAYS)
     late = np.reshape(result.column("delay (ms)"), shape)
     errors = np.reshape(result.column("mean joint error (rad)"), shape)
@@ -53,22 +48,13 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     ]
 
 
-def small_deviations(
-    character: Character, rate: int, delay: int, substeps: int, given: Mapping[str, object]
-) -> float:
-    """Growth a tick of small deviations from the rest pose in the air, under the default gains.
+def _growth_by_theory(plan: Plan, rate: int, delay: int) -> float:
+    """Growth a tick of small deviations from the rest pose in the air, under the plan's gains.
 
-    Args:
-        character: The character.
-        rate: Of control, Hz.
-        delay: Ticks by which commands come late.
-        substeps: Steps of the engine a tick.
-        given: The controller's parameters that are not at their defaults.
+    `rate` is that of control in Hz, `delay` the ticks by which commands come late.
     """
-    parameters = controller_parameters.PARAMETERS
-    own = controller_parameters.character_parameters(character)
-    values = resolve(parameters + own, given)
-    gains: GainArrays = controller_parameters.make_settings(character, values).gains
+    character = plan.character
+    gains = make_settings(character, plan.controller).gains
     model = DynamicsModel(character)
     model.update(np.array(character.rest_position), np.zeros(character.layout.size))
     return delayed_spectral_radius(
@@ -77,17 +63,16 @@ def small_deviations(
         gains.damping,
         1.0 / rate,
         delay_ticks=delay,
-        substeps=substeps,
+        substeps=_ENGINE_RATE // rate,
     )
 
 
-def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -> Row:
+def _measure(runner: StudyRunner, plan: Plan, rate: int, delay: int) -> Row:
     substeps = _ENGINE_RATE // rate
     simulator = {"rate": rate, "substeps": substeps, "command_delay_ticks": delay}
     case = RunSpec(f"{rate}Hz_{delay}ticks", _CHARACTER, _DURATION, WALK, simulator)
     outcome = runner.run(case)
     run = outcome.recording
-    growth = small_deviations(character, rate, delay, substeps, {"character": _CHARACTER})
     return {
         "rate (Hz)": rate,
         "delay (ticks)": delay,
@@ -96,7 +81,7 @@ def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -
         "ends at (s)": float(run.times[-1]),
         "diverged": bool(outcome.diverged),
         "falls at (s)": fall_time(run),
-        "growth a tick by theory": growth,
+        "growth a tick by theory": _growth_by_theory(plan, rate, delay),
     }
 
 

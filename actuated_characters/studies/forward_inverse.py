@@ -5,7 +5,7 @@ motion needs root forces that no joint gives.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -52,14 +52,11 @@ _A_CYCLE, _CYCLES = 12, 1.5  # keyframes a cycle of the clip
 class _Inverse:
     """The inverse dynamics of a motion at a rate."""
 
-    character: str
-    reference: Mapping[str, object]  # the motion's parameters
-    duration: float  # s
+    case: RunSpec  # that feeds it forward
     rate: int  # Hz
     times: FloatArray  # (t,) s
     efforts: FloatArray  # (t, n)
     weight: float  # N
-    file: str  # what the law `feedforward` reads
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     for each in (*arms, *whole, joints):
         air = "" if each.ground else "_air"
         result.add_curves(
-            f"{result.name}_{each.inverse.character}_{each.inverse.rate}{air}",
+            f"{result.name}_{each.inverse.case.character}_{each.inverse.rate}{air}",
             {"time_s": each.times, "joint_error_rad": each.error},
         )
     finest = inverses[-1]
@@ -149,7 +146,10 @@ def _invert(
     efforts = efforts_along(model, plan.reference, times, 1.0 / rate)
     file = runner.path(f"{character}_{rate}_efforts.csv")
     write_effort_series(file, plan.character.layout, times, efforts)
-    return _Inverse(character, reference, duration, rate, times, efforts, model.weight, str(file))
+    controller = {"law": "feedforward", "feedforward": str(file)}
+    label = f"{character}-{rate}"
+    case = RunSpec(label, character, duration, reference, {"rate": rate}, controller)
+    return _Inverse(case, rate, times, efforts, model.weight)
 
 
 def efforts_along(
@@ -172,17 +172,12 @@ def _give_back(
     runner: StudyRunner, inverse: _Inverse, *, root: str = "none", ground: bool = True
 ) -> _Return:
     """Feed efforts forward; the root's only if `root` is "fed forward"."""
-    case = RunSpec(
-        label=f"{inverse.character}-{inverse.rate}{'' if ground else '-air'}",
-        character=inverse.character,
-        duration=inverse.duration,
-        reference=inverse.reference,
-        simulator={"rate": inverse.rate, "terrain": "plane" if ground else "none"},
-        controller={
-            "law": "feedforward",
-            "feedforward": inverse.file,
-            "root_assistance": root == "fed forward",
-        },
+    case = inverse.case
+    case = replace(
+        case,
+        label=f"{case.label}{'' if ground else '-air'}",
+        simulator={**case.simulator, "terrain": "plane" if ground else "none"},
+        controller={**case.controller, "root_assistance": root == "fed forward"},
     )
     outcome = runner.run(case)
     run = outcome.recording
@@ -193,7 +188,7 @@ def _rows(returns: Sequence[_Return]) -> list[Row]:
     steps = orders([1.0 / each.inverse.rate for each in returns], [each.early for each in returns])
     return [
         {
-            "character": each.inverse.character,
+            "character": each.inverse.case.character,
             "ground": "yes" if each.ground else "no",
             "root efforts": each.root,
             "rate (Hz)": each.inverse.rate,

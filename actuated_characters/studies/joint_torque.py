@@ -79,7 +79,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     boxes = write_hinged_boxes(runner, "hinged", _PARENT, _CHILD)
     by_torque = _run(runner, boxes, "torque")
     at_fine_rate = _run(runner, boxes, "torque_fine", rate=_FINE_RATE)
-    pushes = balanced_pushes(by_torque.recording, _profile(_times(_RATE)))
+    pushes = balanced_pushes(by_torque.recording, _profile(_RATE))
     by_forces = _run(runner, boxes, "forces", torque=0.0, pushes=pushes)
     by_root = _run(runner, boxes, "root_force", force=_FORCE, rate=_FINE_RATE)
     passive = _run(runner, boxes, "nothing", torque=0.0)
@@ -111,13 +111,9 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     ]
 
 
-def _times(rate: int) -> FloatArray:
-    times: FloatArray = np.arange(round(_DURATION * rate)) / rate
-    return times
-
-
-def _profile(times: FloatArray) -> FloatArray:
-    """The torque (t,) in N m at times in s: one way, and back."""
+def _profile(rate: int) -> FloatArray:
+    """The torque (t,) in N m at ticks of a rate in Hz: one way, and back."""
+    times = np.arange(round(_DURATION * rate)) / rate
     torque: FloatArray = _TORQUE * np.sin(2.0 * np.pi * times / _DURATION)
     return torque
 
@@ -132,12 +128,12 @@ def _run(
     rate: int = _RATE,
     pushes: Sequence[PlannedPush] = (),
 ) -> _Run:
-    layout, times = load_character(boxes).layout, _times(rate)
-    efforts = np.zeros((len(times), layout.size))
-    efforts[:, layout.dof_names.index(HINGE)] = torque * _profile(times)
+    layout, torques = load_character(boxes).layout, torque * _profile(rate)
+    efforts = np.zeros((len(torques), layout.size))
+    efforts[:, layout.dof_names.index(HINGE)] = torques
     efforts[:, 0] = force
     path = runner.path(f"{name}.csv")
-    write_effort_series(path, layout, times, efforts)
+    write_effort_series(path, layout, np.arange(len(torques)) / rate, efforts)
     case = RunSpec(
         label=name,
         character=boxes,

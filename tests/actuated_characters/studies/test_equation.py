@@ -18,11 +18,6 @@ NOTICED = 1e-3
 
 
 @pytest.fixture(scope="module")
-def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
-    return InProcessRunner(tmp_path_factory.mktemp("equation"))
-
-
-@pytest.fixture(scope="module")
 def stood(runner: InProcessRunner) -> Recording:
     """Half a second of standing with assistance, its contacts recorded."""
     return runner.run(RunSpec("short", "humanoid", 0.5, contacts=True)).recording

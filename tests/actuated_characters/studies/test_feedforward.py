@@ -27,11 +27,6 @@ AFTERWARDS = "largest afterwards (rad)"
 
 
 @pytest.fixture(scope="module")
-def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
-    return InProcessRunner(tmp_path_factory.mktemp("studies"))
-
-
-@pytest.fixture(scope="module")
 def played(runner: InProcessRunner) -> StudyResult:
     return runner.study("feedforward")
 

@@ -21,11 +21,6 @@ TIMES = np.arange(0.0, 3.0, STEP)
 
 
 @pytest.fixture(scope="module")
-def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
-    return InProcessRunner(tmp_path_factory.mktemp("lift"))
-
-
-@pytest.fixture(scope="module")
 def result(runner: InProcessRunner) -> StudyResult:
     return runner.study("lift")
 

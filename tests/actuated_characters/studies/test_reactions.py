@@ -18,11 +18,6 @@ GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module")
-def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
-    return InProcessRunner(tmp_path_factory.mktemp("studies"))
-
-
-@pytest.fixture(scope="module")
 def result(runner: InProcessRunner) -> StudyResult:
     return runner.study("reactions")
 

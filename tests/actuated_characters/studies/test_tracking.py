@@ -37,8 +37,7 @@ PERIOD = 1.0 / 240  # s
 
 
 @pytest.fixture(scope="module")
-def few_ticks(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    runner = InProcessRunner(tmp_path_factory.mktemp("short"))
+def few_ticks(runner: InProcessRunner) -> Recording:
     return runner.run(RunSpec("short", "humanoid", 0.02)).recording
 
 
