@@ -13,6 +13,7 @@ from msgs_config.messages.clock import FIRST_TICK, TickClock
 
 WALK: Mapping[str, object] = {"reference": "clip", "clip": "walk"}
 HOLD: Mapping[str, object] = {"reference": "hold"}
+"""References that several studies track."""
 
 
 @dataclass(frozen=True)
