@@ -5,7 +5,7 @@ In two terminals, in any order (or with `&`); Ctrl-C ends each:
     .venv/bin/sim_node --ros-args -p character:=pendulum
     .venv/bin/python examples/pd_controller.py --ros-args -p target:=1.0
 
-With a recorder beside them, `-p wait_for_subscribers:=2` has it hear the first answer, too.
+With a recorder beside them, add `-p wait_for_subscribers:=2`, so that it records the first answer.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Pushes links of a running character, and says what was really applied, and when.
+"""Pushes links of a running character, and prints the wrench that was applied, and when.
 
 For instance the pendulum of `pd_controller.py`, or two links of the humanoid at once:
 
@@ -22,46 +22,46 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import MultiDOFJointState
 
-PATIENCE = 1.0  # s of simulated time after which a push that was not applied has been refused
+REJECTED_AFTER = 1.0  # s of simulated time; a push that was not applied by then was rejected
 
 
 class Pusher(Node):
-    """Publishes one push on `external_wrench`; listens to `applied_wrench` until it is over."""
+    """Publishes one push on `external_wrench`; reads `applied_wrench` until it is over."""
 
     def __init__(self, arguments):
         super().__init__("pusher")
         self.push = message(arguments)
         self.at = arguments.at
         self.deadline = None  # s of simulated time
-        self.applied = []  # what `applied_wrench` said at each tick of the push
+        self.applied = []  # messages on `applied_wrench`, one for each tick of the push
         self.over = Future()  # of the stamp of the first tick without it, s
-        self.create_subscription(MultiDOFJointState, "applied_wrench", self.hear, 1000)
+        self.create_subscription(MultiDOFJointState, "applied_wrench", self.receive, 1000)
         self.pushes = self.create_publisher(MultiDOFJointState, "external_wrench", 10)
         self.timer = self.create_timer(0.02, self.send)
 
     def send(self):
-        """Publish the push, once a simulator is there that hears it and is heard."""
+        """Publish the push, once connected to a simulator in both directions."""
         if self.pushes.get_subscription_count() and self.count_publishers("applied_wrench"):
             self.timer.cancel()
             self.pushes.publish(self.push)
             print(f"sent: push on {', '.join(self.push.joint_names)}", flush=True)
 
-    def hear(self, applied):
-        """Take what was applied during the tick that ended at the stamp; mostly it is nothing."""
+    def receive(self, applied):
+        """Collect the wrenches applied during the tick that ended at the stamp; usually none."""
         time = seconds(applied.header.stamp)
         if not self.timer.is_canceled() or self.over.done():
             return
         if self.deadline is None:
-            self.deadline = max(time, self.at) + PATIENCE
+            self.deadline = max(time, self.at) + REJECTED_AFTER
         if set(self.push.joint_names) <= set(applied.joint_names):
             self.applied.append(applied)
         elif self.applied or time > self.deadline:
             self.over.set_result(time)
 
     def report(self):
-        """Say what was applied, and when; returns the exit code."""
+        """Print the wrench that was applied, and when; returns the exit code."""
         if not self.applied:
-            print("nothing was applied; sim_node has said why", file=sys.stderr)
+            print("nothing was applied; sim_node has logged the reason", file=sys.stderr)
             return 1
         last = seconds(self.applied[-1].header.stamp)
         period = self.over.result() - last
@@ -110,7 +110,7 @@ def seconds(stamp):
 
 
 def parse():
-    """The command line; what is meant for ROS is taken out before."""
+    """Parse the command line without the arguments for ROS."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--link", nargs="+", required=True, help="links, each pushed alike")
     parser.add_argument("--force", nargs=3, type=float, required=True, help="N, world axes")

@@ -7,8 +7,8 @@ plain PD without gravity compensation, so that the mass hangs `m g / kp` too low
         -p wait_for_subscribers:=1
     .venv/bin/python examples/step_response.py --damping 6 --csv step_response.csv
 
-In real time the world does not wait for an answer. What theory does not know of, the time from a
-state to the torque that answers it, acts like less damping: `kd - kp delay`.
+In real time the world does not wait for an answer. The time from a state to the torque that answers
+it, which the theory here neglects, acts like less damping: `kd - kp delay`.
 """
 
 import argparse

@@ -1,15 +1,16 @@
 """Two controllers share one humanoid: the one moves arms and trunk, the other the legs.
 
-The simulator takes a step when every motor has its command, whoever sent it. So nobody needs to
-know of the other, and nothing depends on who is faster. In three terminals, in any order:
+The simulator takes a step when every motor has its command, from any publisher. So neither
+controller needs to know the other, and the result does not depend on which one is faster. In three
+terminals, in any order:
 
     .venv/bin/sim_node --ros-args -p character:=humanoid -p rate:=500 -p gravity:=0.0 \
         -p terrain:=none
     .venv/bin/python examples/two_controllers.py --part arms
     .venv/bin/python examples/two_controllers.py --part legs
 
-It floats in space, where nobody has to hold it. All torques are internal, so its centre of mass
-stays where it is, and yet the trunk turns against the limbs.
+The humanoid floats in space, where it needs no support. All torques are internal, so its centre of
+mass stays where it is, and yet the trunk turns against the limbs.
 
 This is explicit PD. On an inertia I it is stable only for `kp h^2 + 2 kd h < 4 I` with the period h
 of the ticks, and the foot's least inertia is 0.001 kg m^2. That is why the rate is 500 Hz and the
@@ -62,7 +63,7 @@ def product(a, b):
 
 
 def rotation_error(current, target):
-    """What turns one rotation vector into another, `rotvec(q^-1 q_target)`, in the child frame.
+    """The rotation from one rotation vector to another, `rotvec(q^-1 q_target)`, child frame.
 
     A difference of components would be wrong: rotations do not add up like vectors.
     """

@@ -59,7 +59,7 @@ def _study(options: argparse.Namespace) -> None:
 
 def _run_study(study: "Study", label: str, directory: Path, *, keep_runs: bool) -> None:
     """Run a study with its progress on standard error, write and print its results."""
-    from actuated_characters.studies.framework.runner import TopicRunner, write_result
+    from actuated_characters.studies.framework.runner import TopicRunner
 
     console, done = Console(), dict[str, float]()
     with progress_bar(label, float(study.runs), "runs") as bar:
@@ -74,8 +74,8 @@ def _run_study(study: "Study", label: str, directory: Path, *, keep_runs: bool) 
 
         result = study.run(TopicRunner(directory, keep_runs=keep_runs, report=report))
         bar.update(task, completed=bar.tasks[task].total, state="")
-    files = write_result(directory, study.name, result)
-    rows = [[show(cell) for cell in row] for row in result.rows]
+    files = result.write(directory)
+    rows = [[show(cell) for cell in row.values()] for row in result.rows]
     console.print(make_table(study.title, result.columns, rows, right=False))
     for note in result.notes:
         console.print(note)

@@ -1,24 +1,25 @@
-"""What the lecture's root force and torque do: the walk with less and less of them."""
+"""Root force and torque of the lecture: the walk with less and less of them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.error_measures import fall_time, joint_errors
-from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.stills import strip
-from actuated_characters.studies.framework.plots import label, make_panels, show_pictures
-from actuated_characters.studies.framework.study import RunSpec, StudyResult, StudyRunner
-from msgs_config.arrays import FloatArray
+from actuated_characters.studies.framework.plots import label
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
+from actuated_characters.studies.framework.tracking import (
+    fall_time,
+    joint_errors,
+    root_force_share,
+)
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import ROOT_TORQUE, Character
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
+TITLE = "the walk by strength of root force and torque"
+RUNS = 7
 
 _CHARACTER = "humanoid"
 _STRENGTHS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)  # of root force and torque
@@ -27,53 +28,30 @@ _SMALLEST = 0.003  # where no assistance is drawn on an axis that has no zero
 _PICTURES, _SIZE = 8, (190, 240)
 
 
-@dataclass(frozen=True)
-class _Walk:
-    """What became of the walk with assistance of one strength."""
-
-    name: str
-    strength: float  # share of the character's own stiffness
-    run: Recording
-    fall: float | None  # s
-    joint_error: float  # rad, mean until the fall
-    root_error: float  # m, mean until the fall
-    force_share: float  # mean root force over the weight until the fall
-
-
-class AssistanceStudy:
-    """The humanoid walks; root force and torque get weaker, down to none."""
-
-    name = "assistance"
-    title = "the walk by strength of root force and torque"
-    runs = len(_STRENGTHS) + 1
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Walk with each strength, and with a root that nobody may command."""
-        character = load_character(_CHARACTER)
-        walks = [
-            _walk(runner, f"x {strength:g}", strength, weakened(character, strength))
-            for strength in _STRENGTHS
-        ]
-        walks.append(_walk(runner, "none", 0.0, {"root_assistance": False}))
-        return StudyResult(
-            columns=(
-                "root stiffness",
-                "falls at (s)",
-                "mean joint error until then (rad)",
-                "mean root error until then (m)",
-                "root force / weight until then",
-            ),
-            rows=[
-                (walk.name, walk.fall, walk.joint_error, walk.root_error, walk.force_share)
-                for walk in walks
-            ],
-            figures={
-                self.name: _draw(walks[:-1]),
-                "assistance_poses": show_pictures(_pictures(walks)),
-            },
-            curves={"assistance_height": _heights(walks)},
-            notes=_notes(walks),
-        )
+def run(runner: StudyRunner, result: StudyResult) -> None:
+    """Walk with each strength of root force and torque, and with a root without commands."""
+    character = load_character(_CHARACTER)
+    controllers = {f"x {strength:g}": weakened(character, strength) for strength in _STRENGTHS}
+    controllers["none"] = {"root_assistance": False}
+    runs = {name: _walk(runner, name, given) for name, given in controllers.items()}
+    result.rows += [_row(name, run) for name, run in runs.items()]
+    first, *_, zero, none = runs.values()
+    _draw(result, runs)
+    _draw_poses(result, none, first)
+    longest = max(runs.values(), key=lambda run: len(run.times))
+    curves = {"time_s": longest.times, "reference_m": longest.reference_position[:, 2]}
+    for name, run in runs.items():
+        curves[f"{name.replace(' ', '')}_m"] = run.position[:, 2]
+    result.add_curves("assistance_height", curves)
+    fall, same = fall_time(none), np.array_equal(none.position, zero.position)
+    result.notes += [
+        f"without assistance it falls at {fall:.3g} s: 28 motors cannot hold 34 degrees of "
+        "freedom on a path that was not planned for them (underactuation)"
+        if fall is not None
+        else "without assistance it does not fall",
+        "root gains of zero and a root that may not be commanded: "
+        f"{'the same states' if same else 'other states'}",
+    ]
 
 
 def weakened(character: Character, strength: float) -> dict[str, object]:
@@ -89,93 +67,65 @@ def weakened(character: Character, strength: float) -> dict[str, object]:
     return given
 
 
-def _walk(runner: StudyRunner, name: str, strength: float, controller: dict[str, object]) -> _Walk:
-    reference = {"reference": "clip", "clip": "walk"}
+def _walk(runner: StudyRunner, name: str, controller: dict[str, object]) -> Recording:
     label = name.replace(" ", "")
-    case = RunSpec(label, _CHARACTER, _DURATION, reference, controller=controller)
-    run = runner.run(case).recording
-    position, desired = run.position[:-1], run.reference_position[:-1]
-    fall = fall_time(run.times[:-1], position[:, 2], desired[:, 2])
-    until = len(position) if fall is None else int(np.searchsorted(run.times, fall))
-    weight = run.character.mass * float(run.parameters["gravity"])
-    return _Walk(
-        name,
-        strength,
-        run,
-        fall,
-        float(joint_errors(run.layout, position[:until], desired[:until]).mean()),
-        float(np.linalg.norm(position[:until, :3] - desired[:until, :3], axis=1).mean()),
-        float(np.linalg.norm(run.effort[:until, :3], axis=1).mean()) / weight,
-    )
+    case = RunSpec(label, _CHARACTER, _DURATION, WALK, controller=controller)
+    return runner.run(case).recording
 
 
-def _notes(walks: Sequence[_Walk]) -> Sequence[str]:
-    none, zero = walks[-1], walks[-2]
-    same = np.array_equal(none.run.position, zero.run.position)
-    return (
-        f"without assistance it falls at {none.fall:.3g} s: 28 motors cannot hold 34 degrees of "
-        "freedom on a path that was not planned for them (underactuation)"
-        if none.fall is not None
-        else "without assistance it does not fall",
-        f"root gains of zero and a root that may not be commanded: "
-        f"{'the same states' if same else 'other states'}",
-    )
-
-
-def _draw(walks: Sequence[_Walk]) -> "Figure":
-    figure, panels = make_panels(2, 2, (12.0, 7.5))
-    strengths = [max(walk.strength, _SMALLEST) for walk in walks]
-    falls, errors, forces, heights = panels
-    for walk, place in zip(walks, strengths, strict=True):
-        held = walk.fall is None
-        falls.plot(place, walk.fall or _DURATION, "^" if held else "o", color="tab:blue")
-    falls.plot(strengths, [walk.fall or _DURATION for walk in walks], color="tab:blue")
-    falls.plot([], [], "^", color="tab:blue", label=f"does not fall within {_DURATION:g} s")
-    label(falls, "strength of assistance", "time of the fall (s)")
-    joints = [walk.joint_error for walk in walks]
-    errors.plot(strengths, joints, "o-", label="joints (rad)")
-    errors.plot(strengths, [walk.root_error for walk in walks], "s-", label="root (m)")
-    label(errors, "strength of assistance", "mean error until the fall")
-    forces.plot(strengths, [walk.force_share for walk in walks], "o-", color="tab:green")
-    label(forces, "strength of assistance", "root force / weight until the fall", legend=None)
-    for panel in (falls, errors, forces):
-        panel.set_xscale("log")
-        ticks = [f"{walk.strength:g}" for walk in walks]
-        panel.set_xticks(strengths, ticks)
-        panel.set_xticks([], minor=True)
-        panel.set_ylim(bottom=0.0)
-    for walk in walks:
-        heights.plot(walk.run.times, walk.run.position[:, 2], label=walk.name)
-    heights.plot(
-        walks[0].run.times, walks[0].run.reference_position[:, 2], "k--", label="reference"
-    )
-    label(heights, "time (s)", "root height (m)", legend="center right")
-    heights.set_xlim(right=1.3 * _DURATION)  # for the legend
-    figure.suptitle("the walk needs a force that no motor gives")
-    return figure
-
-
-def _pictures(walks: Sequence[_Walk]) -> dict[str, Picture]:
-    """The fall without assistance, and the same times with all of it."""
-    none, full = walks[-1], walks[0]
-    end = min(1.5 * (none.fall or _DURATION), float(none.run.times[-2]))
-    times = np.linspace(0.0, end, _PICTURES).tolist()
+def _row(name: str, run: Recording) -> Row:
+    fall = fall_time(run)
+    until = len(run.effort) if fall is None else int(np.searchsorted(run.times, fall))
+    desired = run.reference_position[:until]
+    off = run.position[:until, :3] - desired[:, :3]
     return {
-        f"{named}; the reference in green": strip(walk.run, times, ghost=True, size=_SIZE)
-        for named, walk in (("without assistance", none), ("with root force and torque", full))
+        "root stiffness": name,
+        "falls at (s)": fall,
+        "mean joint error until then (rad)": float(joint_errors(run, desired).mean()),
+        "mean root error until then (m)": float(np.linalg.norm(off, axis=1).mean()),
+        "root force / weight until then": root_force_share(run, until),
     }
 
 
-def _heights(walks: Sequence[_Walk]) -> tuple[Sequence[str], FloatArray]:
-    """Height of the root over time; NaN after an end before the time."""
-    ticks = max(len(walk.run.times) for walk in walks)
-    longest = next(walk.run for walk in walks if len(walk.run.times) == ticks)
-    columns = [longest.times, longest.reference_position[:, 2]]
-    for walk in walks:
-        height = walk.run.position[:, 2]
-        columns.append(np.pad(height, (0, ticks - len(height)), constant_values=np.nan))
-    names = [f"{walk.name.replace(' ', '')}_m" for walk in walks]
-    return ["time_s", "reference_m", *names], np.column_stack(columns)
+def _draw(result: StudyResult, runs: Mapping[str, Recording]) -> None:
+    title = "the walk needs a force that no motor gives"
+    panels = result.add_panels(result.name, 2, 2, (12.0, 7.5), title=title)
+    falls, errors, forces, heights = panels
+    strengths = [max(strength, _SMALLEST) for strength in _STRENGTHS]
+    columns = {name: result.column(name)[:-1] for name in result.columns}
+    times = columns["falls at (s)"]
+    for time, place in zip(times, strengths, strict=True):
+        falls.plot(place, time or _DURATION, "^" if time is None else "o", color="tab:blue")
+    falls.plot(strengths, [time or _DURATION for time in times], color="tab:blue")
+    falls.plot([], [], "^", color="tab:blue", label=f"does not fall within {_DURATION:g} s")
+    label(falls, "strength of assistance", "time of the fall (s)")
+    joint, root = columns["mean joint error until then (rad)"], "mean root error until then (m)"
+    errors.plot(strengths, joint, "o-", label="joints (rad)")
+    errors.plot(strengths, columns[root], "s-", label="root (m)")
+    label(errors, "strength of assistance", "mean error until the fall")
+    shares = columns["root force / weight until then"]
+    forces.plot(strengths, shares, "o-", color="tab:green")
+    label(forces, "strength of assistance", "root force / weight until the fall", legend=None)
+    for panel in (falls, errors, forces):
+        panel.set_xscale("log")
+        panel.set_xticks(strengths, [f"{strength:g}" for strength in _STRENGTHS])
+        panel.set_xticks([], minor=True)
+        panel.set_ylim(bottom=0.0)
+    *assisted, _ = runs.items()
+    for name, run in assisted:
+        heights.plot(run.times, run.position[:, 2], label=name)
+    full = assisted[0][1]
+    heights.plot(full.times, full.reference_position[:, 2], "k--", label="reference")
+    label(heights, "time (s)", "root height (m)", legend="center right")
+    heights.set_xlim(right=1.3 * _DURATION)  # for the legend
 
 
-STUDY = AssistanceStudy()
+def _draw_poses(result: StudyResult, none: Recording, full: Recording) -> None:
+    """The fall without assistance, and the same times with all of it."""
+    end = min(1.5 * (fall_time(none) or _DURATION), float(none.times[-2]))
+    times = np.linspace(0.0, end, _PICTURES).tolist()
+    pictures = {
+        f"{named}; the reference in green": strip(run, times, ghost=True, size=_SIZE)
+        for named, run in (("without assistance", none), ("with root force and torque", full))
+    }
+    result.add_pictures("assistance_poses", pictures)

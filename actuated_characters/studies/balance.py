@@ -2,20 +2,23 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.stills import pose_strip
-from actuated_characters.runs.planned_wrenches import PlannedPush
-from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyResult, StudyRunner
+from actuated_characters.studies.framework.result import StudyResult
+from actuated_characters.studies.framework.study import (
+    RunResult,
+    RunSpec,
+    StudyRunner,
+    plan_push,
+)
 from msgs_config.arrays import BoolArray
 from msgs_config.geometry import rotations
-from msgs_config.messages.clock import TickClock
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
+TITLE = "balance without assistance: pushes at the chest, 0.1 s"
+RUNS = 30
 
 _RATE = 240  # Hz
 _PUSH_TIME, _PUSH_DURATION = 1.0, 0.1  # s
@@ -30,52 +33,47 @@ _DIRECTIONS = {
     "left": (0.0, 1.0),
     "right": (0.0, -1.0),
 }
-_SOFT_HIPS = {
-    f"gains.{side}_hip.{kind}": gain
-    for side in ("right", "left")
-    for kind, gain in (("p", 70.0), ("d", 25.0))
-}  # with stiff ones the trunk could not give way
+_GIVEN: Mapping[str, object] = {
+    "root_assistance": False,
+    "balance.enabled": True,
+    # with stiff hips the trunk could not give way
+    **{f"gains.{side}_hip.p": 70.0 for side in ("right", "left")},
+    **{f"gains.{side}_hip.d": 25.0 for side in ("right", "left")},
+}
 
 
 @dataclass(frozen=True)
 class _Limit:
-    """What bisection has found in one direction."""
+    """The result of the bisection in one direction."""
 
     survived: float  # N s
     fell: float  # N s
     strongest: RunResult  # the run with the largest impulse that it survived
 
 
-class BalanceStudy:
-    """The humanoid on its own feet, by joint efforts alone."""
+def run(runner: StudyRunner, result: StudyResult) -> None:
+    """Stand with and without the virtual force, then be pushed harder and harder.
 
-    name = "balance"
-    title = "balance without assistance: pushes at the chest, 0.1 s"
-    runs = 2 + 7 * len(_DIRECTIONS)
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Stand with and without the virtual force, then be pushed harder and harder."""
-        stood = runner.run(_case("stand", _STANDING))
-        limp = runner.run(_case("without", _PUSHED, {"balance.enabled": False}))
-        limits = {name: _largest_impulse(runner, name) for name in _DIRECTIONS}
-        mass = stood.recording.character.mass
-        rows = [
-            (name, limit.survived, limit.fell, limit.survived / mass)
-            for name, limit in limits.items()
-        ]
-        falls = standing_time(limp.recording)
-        return StudyResult(
-            columns=("direction", "survives (N s)", "falls (N s)", "change of speed (m/s)"),
-            rows=rows,
-            figures={
-                self.name: _draw(stood.recording, limp.recording, limits),
-                "balance_poses": _draw_poses(limp.recording, limits),
-            },
-            notes=(
-                f"with the virtual force it stands {standing_time(stood.recording):.4g} s of "
-                f"{_STANDING:g} s; by stable PD alone {falls:.3g} s",
-            ),
-        )
+    By joint efforts alone.
+    """
+    stood = runner.run(_case("stand", _STANDING)).recording
+    limp = runner.run(_case("without", _PUSHED, {"balance.enabled": False})).recording
+    limits = {name: _largest_impulse(runner, name) for name in _DIRECTIONS}
+    result.rows += [
+        {
+            "direction": name,
+            "survives (N s)": limit.survived,
+            "falls (N s)": limit.fell,
+            "change of speed (m/s)": limit.survived / stood.character.mass,
+        }
+        for name, limit in limits.items()
+    ]
+    _draw(result, stood, limp, limits)
+    _draw_poses(result, limp, limits["forward"])
+    result.notes.append(
+        f"with the virtual force it stands {standing_time(stood):.4g} s of {_STANDING:g} s; "
+        f"by stable PD alone {standing_time(limp):.3g} s"
+    )
 
 
 def stands(recording: Recording) -> BoolArray:
@@ -86,7 +84,7 @@ def stands(recording: Recording) -> BoolArray:
 
 
 def is_upright(recording: Recording) -> bool:
-    """Whether the trunk is at most 45 degrees from where it was at first, at the end."""
+    """True if the trunk has tilted by at most 45 degrees at the end of a run."""
     first, last = rotations.exp(recording.position[[0, -1], 3:6])
     up = np.array((0.0, 0.0, 1.0))
     own_up = rotations.rotate(rotations.conjugate(first), up)
@@ -101,7 +99,7 @@ def standing_time(recording: Recording) -> float:
 
 
 def survives(outcome: RunResult) -> bool:
-    """Whether it stood all the time, and is upright in the end."""
+    """True if the character stood all the time and is upright at the end."""
     run = outcome.recording
     return not outcome.diverged and bool(stands(run).all()) and is_upright(run)
 
@@ -112,27 +110,20 @@ def _case(
     controller: Mapping[str, object] | None = None,
     impulse: tuple[float, float] = (0.0, 0.0),
 ) -> RunSpec:
-    stamp = TickClock(_RATE).stamp_ns(1 + round(_PUSH_TIME * _RATE))
     force = (impulse[0] / _PUSH_DURATION, impulse[1] / _PUSH_DURATION, 0.0)
-    push = PlannedPush(stamp, _LINK, (*force, 0.0, 0.0, 0.0))
     return RunSpec(
         label,
         "humanoid",
         duration,
         reference={"reference": "keyframes", "keyframes": "humanoid_stand"},
         simulator={"rate": _RATE, "wrench_duration": _PUSH_DURATION},
-        controller={
-            "root_assistance": False,
-            "balance.enabled": True,
-            **_SOFT_HIPS,
-            **(controller or {}),
-        },
-        pushes=[push] if any(impulse) else [],
+        controller={**_GIVEN, **(controller or {})},
+        pushes=[plan_push(_PUSH_TIME, _RATE, _LINK, force)] if any(impulse) else [],
     )
 
 
 def _largest_impulse(runner: StudyRunner, direction: str) -> _Limit:
-    """Bisect between no push and one that throws anybody over."""
+    """Bisect between no push and one that is too strong in every direction."""
     x, y = _DIRECTIONS[direction]
 
     def pushed(impulse: float) -> RunResult:
@@ -150,15 +141,14 @@ def _largest_impulse(runner: StudyRunner, direction: str) -> _Limit:
     return _Limit(low, high, strongest or pushed(0.0))
 
 
-def _draw(stood: Recording, limp: Recording, limits: Mapping[str, _Limit]) -> "Figure":
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 7), layout="constrained")
-    heights, sways, bars = figure.subplots(3)
+def _draw(
+    result: StudyResult, stood: Recording, limp: Recording, limits: Mapping[str, _Limit]
+) -> None:
+    title = "the humanoid on its own feet: no root force, no root torque"
+    heights, sways, bars = result.add_panels(result.name, 3, 1, (10.0, 7.0), title=title)
     heights.plot(stood.times, stood.position[:, 2], label="with the virtual force")
     heights.plot(limp.times, limp.position[:, 2], label="stable PD alone")
-    heights.set_xlabel("time (s)")
-    heights.set_ylabel("root height (m)")
+    heights.set(xlabel="time (s)", ylabel="root height (m)")
     heights.legend()
     for name, limit in limits.items():
         run = limit.strongest.recording
@@ -166,36 +156,25 @@ def _draw(stood: Recording, limp: Recording, limits: Mapping[str, _Limit]) -> "F
         moved = run.position[:, axis] - run.position[0, axis]
         sways.plot(run.times, moved, label=f"{name}, {limit.survived:g} N s")
     sways.axvspan(_PUSH_TIME, _PUSH_TIME + _PUSH_DURATION, color="0.85")
-    sways.set_xlabel("time (s)")
-    sways.set_ylabel("root moved (m)")
+    sways.set(xlabel="time (s)", ylabel="root moved (m)")
     sways.legend(ncols=2, loc="upper left")
     bars.barh(list(limits), [limit.survived for limit in limits.values()])
     bars.set_xlabel("largest impulse that it survives (N s)")
     for panel in (heights, sways, bars):
         panel.grid(alpha=0.3)
-    figure.suptitle("the humanoid on its own feet: no root force, no root torque")
-    return figure
 
 
-def _draw_poses(limp: Recording, limits: Mapping[str, _Limit]) -> "Figure":
+def _draw_poses(result: StudyResult, limp: Recording, forward: _Limit) -> None:
     """The fall without the virtual force, and the recovery from the largest push forward."""
-    from matplotlib.figure import Figure
-
-    strongest = limits["forward"]
-    figure = Figure(figsize=(12, 6), layout="constrained")
-    for panel, run, times, title in zip(
-        figure.subplots(2),
-        (limp, strongest.strongest.recording),
-        (np.linspace(0.0, 2.5, 6), np.linspace(1.0, 3.5, 6)),
-        ("stable PD alone", f"virtual force, pushed forward by {strongest.survived:g} N s at 1 s"),
-        strict=True,
+    pushed = f"virtual force, pushed forward by {forward.survived:g} N s at 1 s"
+    panels = result.add_panels("balance_poses", 2, 1, (12.0, 6.0))
+    for panel, run, start, title in (
+        (panels[0], limp, 0.0, "stable PD alone"),
+        (panels[1], forward.strongest.recording, 1.0, pushed),
     ):
+        times = np.linspace(start, start + 2.5, 6)
         rows = np.searchsorted(run.times, times).clip(max=len(run.times) - 1)
         captions = [f"{time:.1f} s" for time in times]
         panel.imshow(pose_strip(run.character, run.position[rows], captions))
         panel.set_title(title)
         panel.set_axis_off()
-    return figure
-
-
-STUDY = BalanceStudy()

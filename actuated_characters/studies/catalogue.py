@@ -23,6 +23,8 @@ NAMES = (
 
 
 def load_study(name: str) -> "Study":
-    """The study of a name; `STUDY` of the module of that name."""
-    study: Study = import_module(f"actuated_characters.studies.{name}").STUDY
-    return study
+    """The study of a name: that of the module of that name."""
+    from actuated_characters.studies.framework.study import Study
+
+    module = import_module(f"actuated_characters.studies.{name}")
+    return Study(name, module.TITLE, module.RUNS, module.run)

@@ -1,17 +1,19 @@
 """Every motion clip of the humanoid, tracked with root assistance: errors, falls, real time."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
-from actuated_characters.metrics.error_measures import joint_errors
-from actuated_characters.render.engine.renderer import Picture
+from actuated_characters.bags.recording import Recording
 from actuated_characters.render.engine.visual_shapes import outline
 from actuated_characters.render.stills import strip
-from actuated_characters.studies.framework.plots import label, make_panels, show_pictures
-from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyResult, StudyRunner
+from actuated_characters.studies.framework.plots import label
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyRunner
+from actuated_characters.studies.framework.tracking import (
+    joint_errors,
+    root_force_share,
+)
 from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -19,8 +21,8 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
+TITLE = "every clip with root assistance, 10 s each"
+RUNS = 15
 
 _CHARACTER = "humanoid"
 _DURATION = 10.0  # s
@@ -32,67 +34,33 @@ _PICTURED = {"walk": 1.3, "backflip": 1.75, "cartwheel": 2.72, "punch": 2.2}  # 
 _PICTURES, _SIZE = 8, (190, 240)
 
 
-@dataclass(frozen=True)
-class _Tracked:
-    """What a run of one clip gave."""
+def run(runner: StudyRunner, result: StudyResult) -> None:
+    """Track each clip for the same time, and compare its error with the bound."""
+    character = load_character(_CHARACTER)
+    outcomes = {clip: _track(runner, clip) for clip in available_clips(character)}
+    result.rows += [_row(character, clip, outcome) for clip, outcome in outcomes.items()]
+    _draw(result)
+    _draw_poses(result, {clip: outcome.recording for clip, outcome in outcomes.items()})
+    times = max((outcome.recording.times for outcome in outcomes.values()), key=len)
+    curves = {
+        f"{c}_rad": joint_errors(outcome.recording).mean(axis=1) for c, outcome in outcomes.items()
+    }
+    result.add_curves("clips_errors", {"time_s": times[:-1], **curves})
+    errors, bounds = np.array(
+        [result.column("mean joint error (rad)"), result.column("bound (rad)")]
+    )
+    worst = int(np.argmax(errors / bounds))
+    falls, down = _named(result, "fell") or "none", _named(result, "down in the capture") or "none"
+    result.notes += [
+        f"nearest to its bound: {list(outcomes)[worst]}, {errors[worst]:.3f} of "
+        f"{bounds[worst]:g} rad",
+        f"falls: {falls}; in the capture itself on the ground with more than the feet: {down}",
+    ]
 
-    clip: str
-    loops: bool
-    outcome: RunResult
-    errors: FloatArray  # (t, j) rad
-    captured: tuple[str, ...]  # links, besides the feet, on the ground in the capture itself
-    touching: tuple[str, ...]  # links, besides feet and shins, on the ground in the run
-    force_share: float  # mean root force over the weight
 
-    @property
-    def bound(self) -> float:
-        return _BOUNDS.get(self.clip, _BOUND)
-
-    @property
-    def falls(self) -> bool:
-        """Below half its height, or on the ground with what should not be there."""
-        down = bool(self.touching) and not self.captured
-        return bool(self.outcome.summary["fell"]) or down or bool(self.outcome.diverged)
-
-
-class ClipsStudy:
-    """All clips, each for the same time."""
-
-    name = "clips"
-    title = "every clip with root assistance, 10 s each"
-    runs = 15
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Track each clip and compare its error with the bound."""
-        character = load_character(_CHARACTER)
-        runs = [_track(runner, character, clip) for clip in available_clips(character)]
-        worst = max(runs, key=lambda run: float(run.errors.mean()) / run.bound)
-        return StudyResult(
-            columns=(
-                "clip",
-                "loops",
-                "mean joint error (rad)",
-                "bound (rad)",
-                "largest joint error (rad)",
-                "mean root error (m)",
-                "root force / weight",
-                "fell",
-                "down in the capture",
-                "share saturated",
-                "real-time factor",
-            ),
-            rows=[_row(run) for run in runs],
-            figures={
-                self.name: _draw(runs),
-                "clips_poses": show_pictures(_pictures(runs), columns=1),
-            },
-            curves={"clips_errors": _curves(runs)},
-            notes=(
-                f"nearest to its bound: {worst.clip}, {worst.errors.mean():.3f} of "
-                f"{worst.bound:g} rad",
-                _fall_note(runs),
-            ),
-        )
+def _named(result: StudyResult, column: str) -> str:
+    """The clips that have a yes in a column."""
+    return ", ".join(row["clip"] for row in result.rows if row[column])
 
 
 def clearances(character: Character, positions: FloatArray) -> Mapping[str, FloatArray]:
@@ -101,12 +69,11 @@ def clearances(character: Character, positions: FloatArray) -> Mapping[str, Floa
     Exact for spheres, capsules and boxes, of others that of a hull; only links with a shape.
     """
     model, still = DynamicsModel(character), np.zeros(character.layout.size)
-    poses = []
-    for position in positions:
+    origins = np.empty((len(positions), len(character.links), 3))
+    turns = np.empty((*origins.shape[:2], 4))
+    for row, position in enumerate(positions):
         model.update(position, still)
-        poses.append(model.link_poses())
-    origins = np.stack([pose[0] for pose in poses])
-    turns = np.stack([pose[1] for pose in poses])
+        origins[row], turns[row] = model.link_poses()
     lowest: dict[str, FloatArray] = {}
     for row, link in enumerate(character.links):
         if not link.shapes:
@@ -119,24 +86,8 @@ def clearances(character: Character, positions: FloatArray) -> Mapping[str, Floa
     return lowest
 
 
-def _track(runner: StudyRunner, character: Character, clip: str) -> _Tracked:
-    case = RunSpec(clip, _CHARACTER, _DURATION, {"reference": "clip", "clip": clip})
-    outcome = runner.run(case)
-    run, feet = outcome.recording, set(character.feet)
-    parents = {link.name: character.links[link.parent].name for link in character.links[1:]}
-    # a shin reaches down to its ankle, and to the ground where the foot turns over
-    legs = feet | {parents[foot] for foot in feet}
-    desired = run.reference_position[:-1]
-    weight = character.mass * float(run.parameters["gravity"])
-    return _Tracked(
-        clip,
-        read_clip(character, clip).wraps,
-        outcome,
-        joint_errors(run.layout, run.position[:-1], desired),
-        _on_the_ground(character, desired[::_EACH], feet),
-        _on_the_ground(character, run.position[::_EACH], legs),
-        float(np.linalg.norm(run.effort[:, :3], axis=1).mean()) / weight,
-    )
+def _track(runner: StudyRunner, clip: str) -> RunResult:
+    return runner.run(RunSpec(clip, _CHARACTER, _DURATION, {"reference": "clip", "clip": clip}))
 
 
 def _on_the_ground(
@@ -148,93 +99,71 @@ def _on_the_ground(
     )
 
 
-def _row(run: _Tracked) -> tuple[str | int | float | bool | None, ...]:
-    summary = run.outcome.summary
-    return (
-        run.clip,
-        run.loops,
-        float(run.errors.mean()),
-        run.bound,
-        float(run.errors.max()),
-        _number(summary["root_error_mean_m"]),
-        run.force_share,
-        run.falls,
-        bool(run.captured),
-        _number(summary["saturated_fraction"]),
-        _number(summary["real_time_factor"]),
+def _row(character: Character, clip: str, outcome: RunResult) -> Row:
+    """A row of the table.
+
+    A fall: below half of the height, or unexpected links on the ground.
+    """
+    recording, errors, feet = (
+        outcome.recording,
+        joint_errors(outcome.recording),
+        set(character.feet),
     )
+    parents = {link.name: character.links[link.parent].name for link in character.links[1:]}
+    # a shin reaches down to its ankle, and to the ground where the foot turns over
+    legs = feet | {parents[foot] for foot in feet}
+    captured = _is_down(character, recording.reference_position[:-1:_EACH], feet)
+    down = _is_down(character, recording.position[::_EACH], legs) and not captured
+    return {
+        "clip": clip,
+        "loops": read_clip(character, clip).wraps,
+        "mean joint error (rad)": float(errors.mean()),
+        "bound (rad)": _BOUNDS.get(clip, _BOUND),
+        "largest joint error (rad)": float(errors.max()),
+        "mean root error (m)": outcome.measured("root_error_mean_m"),
+        "root force / weight": root_force_share(recording),
+        "fell": bool(outcome.summary["fell"] or down or outcome.diverged),
+        "down in the capture": captured,
+        "share saturated": outcome.measured("saturated_fraction"),
+        "real-time factor": outcome.measured("real_time_factor"),
+    }
 
 
-def _number(value: object) -> float | None:
-    return float(value) if isinstance(value, int | float) else None
+def _is_down(character: Character, positions: FloatArray, besides: set[str]) -> bool:
+    """True if links other than `besides` touch the ground in any of positions (t, n)."""
+    heights = clearances(character, positions)
+    return any(heights[name].min() < _TOUCH for name in heights.keys() - besides)
 
 
-def _fall_note(runs: Sequence[_Tracked]) -> str:
-    fallen = [run.clip for run in runs if run.falls]
-    down = [run.clip for run in runs if run.captured]
-    return (
-        f"falls: {', '.join(fallen) or 'none'}; in the capture itself on the ground with more than "
-        f"the feet: {', '.join(down) or 'none'}"
-    )
-
-
-def _curves(runs: Sequence[_Tracked]) -> tuple[Sequence[str], FloatArray]:
-    """Each clip's joint error over time, mean over the joints; NaN after its end."""
-    longest = max(runs, key=lambda run: len(run.errors))
-    columns = [longest.outcome.recording.times[: len(longest.errors)]]
-    for run in runs:
-        errors = run.errors.mean(axis=1)
-        missing = len(longest.errors) - len(errors)
-        columns.append(np.pad(errors, (0, missing), constant_values=np.nan))
-    return ("time_s", *(f"{run.clip}_rad" for run in runs)), np.column_stack(columns)
-
-
-def _draw(runs: Sequence[_Tracked]) -> "Figure":
-    figure, (means, others) = make_panels(2, 1, (11.0, 7.5), same_x=True)
-    places = np.arange(len(runs))
-    errors = [float(run.errors.mean()) for run in runs]
+def _draw(result: StudyResult) -> None:
+    clips, errors = result.column("clip"), result.column("mean joint error (rad)")
+    means, others = result.add_panels(result.name, 2, 1, (11.0, 7.5), same_x=True)
+    places = np.arange(len(clips))
     means.bar(places, errors, 0.7, color="tab:blue", label="mean over joints and time")
-    means.hlines(
-        [run.bound for run in runs],
-        places - 0.45,
-        places + 0.45,
-        color="tab:red",
-        linewidth=2.0,
-        label="bound",
-    )
-    falls = ", ".join(run.clip for run in runs if run.falls) or "no clip"
+    marks = means.hlines(result.column("bound (rad)"), places - 0.45, places + 0.45, label="bound")
+    marks.set(color="tab:red", linewidth=2.0)
+    falls = _named(result, "fell") or "no clip"
     label(means, "", "joint error (rad)", f"tracked with root force and torque: {falls} falls")
-    roots = [_number(run.outcome.summary["root_error_mean_m"]) or 0.0 for run in runs]
+    roots = [error or 0.0 for error in result.column("mean root error (m)")]
     others.bar(places - 0.2, roots, 0.4, color="tab:orange", label="mean root error (m)")
-    twin = others.twinx()
-    twin.bar(
-        places + 0.2,
-        [run.force_share for run in runs],
-        0.4,
-        color="tab:green",
-        label="root force / weight",
-    )
+    twin, shares = others.twinx(), result.column("root force / weight")
+    twin.bar(places + 0.2, shares, 0.4, color="tab:green", label="root force / weight")
     twin.set_ylabel("root force / weight")
     twin.legend(loc="upper right", fontsize="small")
     for panel in (others, twin):
         panel.margins(y=0.2)  # for the legends
     label(others, "", "root error (m)", legend="upper left")
-    others.set_xticks(places, [run.clip for run in runs], rotation=30, ha="right")
-    return figure
+    others.set_xticks(places, clips, rotation=30, ha="right")
 
 
-def _pictures(runs: Sequence[_Tracked]) -> dict[str, Picture]:
+def _draw_poses(result: StudyResult, recordings: Mapping[str, Recording]) -> None:
     """Poses of some clips over one cycle, the capture as a ghost."""
     pictures = {}
-    for run in runs:
-        if run.clip in _PICTURED:
-            recording = run.outcome.recording
-            last = min(_PICTURED[run.clip], float(recording.times[-2]))  # the last has no ghost
-            times = np.linspace(0.0, last, _PICTURES).tolist()
-            pictures[f"{run.clip}; the capture in green"] = strip(
-                recording, times, ghost=True, size=_SIZE
-            )
-    return pictures
-
-
-STUDY = ClipsStudy()
+    for clip, recording in recordings.items():
+        if clip not in _PICTURED:
+            continue
+        last = min(_PICTURED[clip], float(recording.times[-2]))  # the last has no ghost
+        times = np.linspace(0.0, last, _PICTURES).tolist()
+        picture = strip(recording, times, ghost=True, size=_SIZE)
+        pictures[f"{clip}; the capture in green"] = picture
+    result.add_pictures("clips_poses", pictures)

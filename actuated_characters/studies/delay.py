@@ -1,26 +1,25 @@
-"""How fast control must be, and how late it may come: the walk by rate and delay of commands."""
+"""Tracking of the walk by the rate of control and the delay of commands."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from actuated_characters.metrics.error_measures import fall_time, joint_errors
-from actuated_characters.studies.framework.plots import label, make_panels
-from actuated_characters.studies.framework.study import RunSpec, StudyResult, StudyRunner
-from actuated_characters.studies.framework.tracking import delayed_spectral_radius
-from controller_node import parameters as controller_parameters
-from controller_node.control_laws import GainArrays
-from msgs_config.arrays import FloatArray
+from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.studies.framework.plots import label
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
+from actuated_characters.studies.framework.tracking import (
+    delayed_spectral_radius,
+    fall_time,
+    joint_errors,
+)
+from controller_node.parameters import make_settings
+from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.loading import load_character
-from msgs_config.character.model import Character
-from msgs_config.parameters import resolve
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+TITLE = "tracking of the walk by control rate and delay, with root assistance"
+RUNS = 16
 
 _CHARACTER = "humanoid"
 _RATES = (120, 240, 480, 960)  # Hz, of control
@@ -30,96 +29,32 @@ _DURATION = 3.0  # s
 _WORST, _BEST = 0.6, 0.05  # rad, the ends of the map's colours
 
 
-@dataclass(frozen=True)
-class _Cell:
-    """What became of one rate and delay."""
-
-    rate: int  # Hz
-    delay: int  # ticks
-    error: float  # rad, mean joint error until the end
-    end: float  # s
-    diverged: bool
-    fall: float | None  # s
-    growth: float  # by theory, of a small deviation a tick
-
-    @property
-    def delay_ms(self) -> float:
-        return 1e3 * self.delay / self.rate
-
-    @property
-    def fails(self) -> bool:
-        return self.diverged or self.fall is not None
-
-    @property
-    def said(self) -> str:
-        """What became of it, in a few words."""
-        if self.diverged:
-            return f"diverges\n{self.end:.2f} s"
-        if self.fall is not None:
-            return f"falls\n{self.fall:.2f} s"
-        return f"{self.error:.3f}"
+def run(runner: StudyRunner, result: StudyResult) -> None:
+    """Walk with root assistance at each rate, the commands late by each number of ticks."""
+    plan = make_plan(_CHARACTER, _DURATION, WALK, {}, {})
+    result.rows += [_measure(runner, plan, rate, delay) for rate in _RATES for delay in _DELAYS]
+    shape = len(_RATES), len(_DELAYS)
+    late = np.reshape(result.column("delay (ms)"), shape)
+    errors = np.reshape(result.column("mean joint error (rad)"), shape)
+    falls = [time is not None for time in result.column("falls at (s)")]
+    failed = np.reshape(np.logical_or(result.column("diverged"), falls), shape)
+    lines, grid = result.add_panels(result.name, 1, 2, (13.0, 5.5))
+    _draw_lines(lines, late, errors, failed)
+    _draw_map(grid, np.where(failed, _WORST, errors), [_describe(row) for row in result.rows])
+    result.notes += [
+        "stable PD foresees its own period, not a late command: one tick of delay is "
+        "harmless from 480 Hz on, two ticks shake the character at any rate",
+        "the error of a run that diverged is that until then",
+    ]
 
 
-class DelayStudy:
-    """The humanoid walks with root assistance; its commands come late by some ticks."""
+def _growth_by_theory(plan: Plan, rate: int, delay: int) -> float:
+    """Growth a tick of small deviations from the rest pose in the air, under the plan's gains.
 
-    name = "delay"
-    title = "tracking of the walk by control rate and delay, with root assistance"
-    runs = len(_RATES) * len(_DELAYS)
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Walk at each rate with each delay."""
-        character = load_character(_CHARACTER)
-        cells = [_measure(runner, character, rate, delay) for rate in _RATES for delay in _DELAYS]
-        return StudyResult(
-            columns=(
-                "rate (Hz)",
-                "delay (ticks)",
-                "delay (ms)",
-                "mean joint error (rad)",
-                "ends at (s)",
-                "diverged",
-                "falls at (s)",
-                "growth a tick by theory",
-            ),
-            rows=[
-                (
-                    cell.rate,
-                    cell.delay,
-                    cell.delay_ms,
-                    cell.error,
-                    cell.end,
-                    cell.diverged,
-                    cell.fall,
-                    cell.growth,
-                )
-                for cell in cells
-            ],
-            figures={self.name: _draw(cells)},
-            notes=(
-                "stable PD foresees its own period, not a late command: one tick of delay is "
-                "harmless from 480 Hz on, two ticks shake the character at any rate",
-                "the error of a run that diverged is that until then",
-            ),
-        )
-
-
-def small_deviations(
-    character: Character, rate: int, delay: int, substeps: int, given: Mapping[str, object]
-) -> float:
-    """Growth a tick of small deviations from the rest pose in the air, under the default gains.
-
-    Args:
-        character: The character.
-        rate: Of control, Hz.
-        delay: Ticks by which commands come late.
-        substeps: Steps of the engine a tick.
-        given: The controller's parameters that are not at their defaults.
+    `rate` is that of control in Hz, `delay` the ticks by which commands come late.
     """
-    parameters = controller_parameters.PARAMETERS
-    own = controller_parameters.character_parameters(character)
-    values = resolve(parameters + own, given)
-    gains: GainArrays = controller_parameters.make_settings(character, values).gains
+    character = plan.character
+    gains = make_settings(character, plan.controller).gains
     model = DynamicsModel(character)
     model.update(np.array(character.rest_position), np.zeros(character.layout.size))
     return delayed_spectral_radius(
@@ -128,84 +63,61 @@ def small_deviations(
         gains.damping,
         1.0 / rate,
         delay_ticks=delay,
-        substeps=substeps,
+        substeps=_ENGINE_RATE // rate,
     )
 
 
-def _measure(runner: StudyRunner, character: Character, rate: int, delay: int) -> _Cell:
+def _measure(runner: StudyRunner, plan: Plan, rate: int, delay: int) -> Row:
     substeps = _ENGINE_RATE // rate
-    outcome = runner.run(
-        RunSpec(
-            f"{rate}Hz_{delay}ticks",
-            _CHARACTER,
-            _DURATION,
-            {"reference": "clip", "clip": "walk"},
-            {"rate": rate, "substeps": substeps, "command_delay_ticks": delay},
-        )
-    )
+    simulator = {"rate": rate, "substeps": substeps, "command_delay_ticks": delay}
+    case = RunSpec(f"{rate}Hz_{delay}ticks", _CHARACTER, _DURATION, WALK, simulator)
+    outcome = runner.run(case)
     run = outcome.recording
-    times, desired = run.times[:-1], run.reference_position[:-1]
-    return _Cell(
-        rate,
-        delay,
-        float(joint_errors(run.layout, run.position[:-1], desired).mean()),
-        float(run.times[-1]),
-        bool(outcome.diverged),
-        fall_time(times, run.position[:-1, 2], desired[:, 2]),
-        small_deviations(character, rate, delay, substeps, {"character": _CHARACTER}),
-    )
+    return {
+        "rate (Hz)": rate,
+        "delay (ticks)": delay,
+        "delay (ms)": 1e3 * delay / rate,
+        "mean joint error (rad)": float(joint_errors(run).mean()),
+        "ends at (s)": float(run.times[-1]),
+        "diverged": bool(outcome.diverged),
+        "falls at (s)": fall_time(run),
+        "growth a tick by theory": _growth_by_theory(plan, rate, delay),
+    }
 
 
-def _draw(cells: Sequence[_Cell]) -> "Figure":
-    figure, (lines, grid) = make_panels(1, 2, (13.0, 5.5))
-    for rate in _RATES:
-        own = [cell for cell in cells if cell.rate == rate]
-        held = [cell for cell in own if not cell.fails]
-        (line,) = lines.plot(
-            [cell.delay_ms for cell in held],
-            [cell.error for cell in held],
-            "o-",
-            label=f"{rate} Hz",
-        )
-        lost = [cell for cell in own if cell.fails]
-        lines.plot(
-            [cell.delay_ms for cell in lost],
-            [_WORST] * len(lost),
-            "x",
-            color=line.get_color(),
-            markersize=9,
-            markeredgewidth=2,
-        )
-    lines.plot([], [], "kx", label="diverges or falls")
-    lines.set_yscale("log")
-    lines.set_yticks([0.05, 0.1, 0.2, 0.4], ["0.05", "0.1", "0.2", "0.4"])
-    lines.set_yticks([], minor=True)
-    label(lines, "delay of commands (ms)", "mean joint error (rad)", "walk, 3 s, root assistance")
-    _draw_map(grid, cells)
-    return figure
+def _describe(row: Row) -> str:
+    """The outcome at one rate and delay, in a few words."""
+    text = f"{row['mean joint error (rad)']:.3f}"
+    if row["diverged"]:
+        text = f"diverges\n{row['ends at (s)']:.2f} s"
+    elif row["falls at (s)"] is not None:
+        text = f"falls\n{row['falls at (s)']:.2f} s"
+    return f"{text}\n(x {row['growth a tick by theory']:.3f})"
 
 
-def _draw_map(axes: "Axes", cells: Sequence[_Cell]) -> None:
-    errors: FloatArray = np.array([_WORST if cell.fails else cell.error for cell in cells])
-    table = errors.reshape(len(_RATES), len(_DELAYS))
-    axes.imshow(np.log(table), cmap="viridis_r", vmin=np.log(_BEST), vmax=np.log(_WORST))
-    for number, cell in enumerate(cells):
-        row, column = divmod(number, len(_DELAYS))
-        dark = table[row, column] > (_WORST * _BEST) ** 0.5
-        text = f"{cell.said}\n(x {cell.growth:.3f})"
-        color = "white" if dark else "black"
+def _draw_lines(axes: Axes, late: FloatArray, errors: FloatArray, failed: BoolArray) -> None:
+    """Errors over delays in ms, a line a rate; a cross where the walk fails."""
+    for rate, times, error, lost in zip(_RATES, late, errors, failed, strict=True):
+        (line,) = axes.plot(times[~lost], error[~lost], "o-", label=f"{rate} Hz")
+        (crosses,) = axes.plot(times[lost], [_WORST] * lost.sum(), "x", color=line.get_color())
+        crosses.set(markersize=9, markeredgewidth=2)
+    axes.plot([], [], "kx", label="diverges or falls")
+    axes.set_yscale("log")
+    axes.set_yticks([0.05, 0.1, 0.2, 0.4], ["0.05", "0.1", "0.2", "0.4"])
+    axes.set_yticks([], minor=True)
+    label(axes, "delay of commands (ms)", "mean joint error (rad)", "walk, 3 s, root assistance")
+
+
+def _draw_map(axes: Axes, errors: FloatArray, texts: Sequence[str]) -> None:
+    axes.imshow(np.log(errors), cmap="viridis_r", vmin=np.log(_BEST), vmax=np.log(_WORST))
+    for (row, column), text in zip(np.ndindex(errors.shape), texts, strict=True):
+        color = "white" if errors[row, column] > (_WORST * _BEST) ** 0.5 else "black"
         axes.text(column, row, text, ha="center", va="center", fontsize="small", color=color)
     axes.set_xticks(range(len(_DELAYS)), [str(delay) for delay in _DELAYS])
     axes.set_yticks(range(len(_RATES)), [str(rate) for rate in _RATES])
-    label(
-        axes,
-        "delay of commands (ticks)",
-        "control rate (Hz)",
+    title = (
         "mean joint error (rad); in brackets theory: growth of\n"
-        "small deviations a tick, above 1 unstable",
-        legend=None,
+        "small deviations a tick, above 1 unstable"
     )
+    label(axes, "delay of commands (ticks)", "control rate (Hz)", title, legend=None)
     axes.grid(visible=False)
-
-
-STUDY = DelayStudy()

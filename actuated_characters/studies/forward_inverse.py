@@ -5,235 +5,216 @@ motion needs root forces that no joint gives.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import yaml
+from matplotlib.axes import Axes
 
 from actuated_characters.runs.plan import make_plan
-from actuated_characters.studies.framework.motion_replay import (
-    effort_table,
-    efforts_along,
-    errors_of,
-    orders,
-)
-from actuated_characters.studies.framework.plots import THEORY, label, make_panels
-from actuated_characters.studies.framework.study import (
-    Cell,
-    RunResult,
-    RunSpec,
-    StudyResult,
-    StudyRunner,
-)
+from actuated_characters.studies.framework.plots import THEORY, label
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
+from actuated_characters.studies.framework.tracking import joint_errors
+from controller_node.effort_series import write_effort_series
+from controller_node.references.base import Reference
 from controller_node.references.files.clip import read_clip
-from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+TITLE = "inverse dynamics of a motion, fed forward without feedback"
+RUNS = 9
 
 _ARM, _HUMANOID = "kuka", "humanoid"
 _ARM_RATES, _WALK_RATES = (120, 240, 480, 960, 1920), (240, 480, 960)  # Hz
 _ARM_LENGTH, _WALK_LENGTH = 1.2, 1.5  # s
 _EARLY = 0.2  # s, after which errors are compared; later they are as large as can be
-_KEYFRAMES = {  # the arm's: time in s, angles in rad
+_KEYFRAMES: Mapping[float, Mapping[str, float]] = {  # the arm's: time in s, angles in rad
     0.0: {},
-    0.6: {"joint_1": 0.6, "joint_2": 0.2, "joint_4": -1.0, "joint_6": 0.4},
-    1.2: {"joint_1": -0.2, "joint_2": 0.8, "joint_4": -1.7, "joint_5": 0.5},
+    0.6: {
+        "lbr_iiwa_joint_1": 0.6,
+        "lbr_iiwa_joint_2": 0.2,
+        "lbr_iiwa_joint_4": -1.0,
+        "lbr_iiwa_joint_6": 0.4,
+    },
+    1.2: {
+        "lbr_iiwa_joint_1": -0.2,
+        "lbr_iiwa_joint_2": 0.8,
+        "lbr_iiwa_joint_4": -1.7,
+        "lbr_iiwa_joint_5": 0.5,
+    },
 }
-_CLIP, _A_CYCLE, _CYCLES = "walk", 12, 1.5  # keyframes a cycle of the clip
-_COLUMNS = (
-    "character",
-    "ground",
-    "root efforts",
-    "rate (Hz)",
-    "joint error after 0.2 s (rad)",
-    "order in the tick",
-    "joint error at the end (rad)",
-    "largest root error (m)",
-    "fell",
-)
-
-
-@dataclass(frozen=True)
-class _Motion:
-    """What is to be done."""
-
-    character: str
-    keyframes: str  # path of their file
-    duration: float  # s
-
-    @property
-    def reference(self) -> dict[str, object]:
-        """The parameters that say it."""
-        return {"reference": "keyframes", "keyframes": self.keyframes}
+_A_CYCLE, _CYCLES = 12, 1.5  # keyframes a cycle of the clip
 
 
 @dataclass(frozen=True)
 class _Inverse:
-    """What inverse dynamics says of a motion at a rate."""
+    """The inverse dynamics of a motion at a rate."""
 
-    motion: _Motion
+    case: RunSpec  # that feeds it forward
     rate: int  # Hz
     times: FloatArray  # (t,) s
     efforts: FloatArray  # (t, n)
     weight: float  # N
-    file: str  # what the law `feedforward` reads
 
 
 @dataclass(frozen=True)
 class _Return:
-    """What came back of a motion whose inverse dynamics was fed forward."""
+    """The run in which the inverse dynamics of a motion was fed forward."""
 
     inverse: _Inverse
     outcome: RunResult
-    root: str  # what was done with the root efforts
+    root: str  # "none", "fed forward" or "left out": the root efforts
     ground: bool
+    times: FloatArray  # (t,) s
+    error: FloatArray  # (t,) rad, mean over the joints
 
     @property
     def early(self) -> float:
-        """The mean joint error (rad) after `_EARLY`."""
-        times, error = errors_of(self.outcome.recording)
-        return float(np.interp(_EARLY, times, error))
+        """The error (rad) after `_EARLY`."""
+        return float(np.interp(_EARLY, self.times, self.error))
 
 
-class ForwardInverseStudy:
-    """When inverse dynamics is the inverse of the simulation."""
-
-    name = "forward_inverse"
-    title = "inverse dynamics of a motion, fed forward without feedback"
-    runs = len(_ARM_RATES) + len(_WALK_RATES) + 1
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """An arm and a walk in the air at several rates; the walk on the ground by its joints."""
-        arm = _Motion(_ARM, _arm_keyframes(runner), _ARM_LENGTH)
-        keyframes, cycle = _walk_keyframes(runner)
-        walk = _Motion(_HUMANOID, keyframes, _WALK_LENGTH)
-        arms = [_give_back(runner, _invert(runner, arm, rate)) for rate in _ARM_RATES]
-        inverses = [_invert(runner, walk, rate) for rate in _WALK_RATES]
-        whole = [_give_back(runner, each, root="fed forward", ground=False) for each in inverses]
-        joints = _give_back(runner, inverses[0], root="left out")
-        return StudyResult(
-            columns=_COLUMNS,
-            rows=[*_rows(arms), *_rows(whole), *_rows([joints])],
-            figures={
-                "forward_inverse_errors": _draw_errors(arms, whole, joints),
-                "forward_inverse_root": _draw_root(inverses[-1], cycle, whole[-1], joints),
-            },
-            curves=_curves([*arms, *whole, joints], inverses[-1]),
-            notes=_notes(arms, whole, inverses[-1], cycle),
+def run(runner: StudyRunner, result: StudyResult) -> None:
+    """An arm and a walk in the air at several rates; the walk on the ground by its joints."""
+    keyframes, cycle = _sample_walk()
+    reach = _write_keyframes(runner, _ARM, _KEYFRAMES)
+    walk = _write_keyframes(runner, _HUMANOID, keyframes)
+    arms = [
+        _give_back(runner, _invert(runner, _ARM, reach, _ARM_LENGTH, rate)) for rate in _ARM_RATES
+    ]
+    inverses = [_invert(runner, _HUMANOID, walk, _WALK_LENGTH, rate) for rate in _WALK_RATES]
+    whole = [_give_back(runner, each, root="fed forward", ground=False) for each in inverses]
+    joints = _give_back(runner, inverses[0], root="left out")
+    result.rows += [*_rows(arms), *_rows(whole), *_rows([joints])]
+    for each in (*arms, *whole, joints):
+        air = "" if each.ground else "_air"
+        result.add_curves(
+            f"{result.name}_{each.inverse.case.character}_{each.inverse.rate}{air}",
+            {"time_s": each.times, "joint_error_rad": each.error},
         )
+    finest = inverses[-1]
+    root = {
+        "time_s": finest.times,
+        "root_force_n": np.linalg.norm(finest.efforts[:, :3], axis=1),
+        "root_torque_nm": np.linalg.norm(finest.efforts[:, 3:6], axis=1),
+    }
+    result.add_curves("forward_inverse_root", root)
+    _draw_errors(result, arms, whole, joints)
+    _draw_root(result, finest, cycle, whole[-1], joints)
+    _add_notes(result, arms, whole, cycle)
 
 
-def _arm_keyframes(runner: StudyRunner) -> str:
-    return _write_keyframes(
-        runner,
-        _ARM,
-        [
-            (time, {f"lbr_iiwa_{name}": angle for name, angle in pose.items()})
-            for time, pose in _KEYFRAMES.items()
-        ],
-    )
-
-
-def _walk_keyframes(runner: StudyRunner) -> tuple[str, float]:
-    """The clip as a smooth motion, from rest; the file, and the time in s of a cycle.
+def _sample_walk() -> tuple[dict[float, dict[str, float]], float]:
+    """The clip as keyframes of a smooth motion, from rest, and the time in s of a cycle.
 
     The clip itself is linear between its frames: its velocity jumps, for which no effort is
     large enough.
     """
-    plan = make_plan(_HUMANOID, _WALK_LENGTH, {"reference": "clip", "clip": _CLIP}, {}, {})
-    cycle = float(read_clip(plan.character, _CLIP).times[-1])
-    names, keyframes = plan.character.layout.dof_names, []
+    plan = make_plan(_HUMANOID, _WALK_LENGTH, WALK, {}, {})
+    cycle = float(read_clip(plan.character, str(WALK["clip"])).times[-1])
+    names, keyframes = plan.character.layout.dof_names, {}
     for number in range(round(_A_CYCLE * _CYCLES) + 1):
         time = number * cycle / _A_CYCLE
         position = plan.reference.sample(time).configuration.position
-        keyframes.append((time, dict(zip(names, position.tolist(), strict=True))))
-    return _write_keyframes(runner, _HUMANOID, keyframes), cycle
+        keyframes[time] = dict(zip(names, position.tolist(), strict=True))
+    return keyframes, cycle
 
 
 def _write_keyframes(
-    runner: StudyRunner, character: str, keyframes: Sequence[tuple[float, Mapping[str, float]]]
-) -> str:
-    content = {
-        "interpolation": "smooth",
-        "keyframes": [{"time": time, "pose": dict(pose)} for time, pose in keyframes],
-    }
-    return runner.write(f"{character}_keyframes.yaml", yaml.safe_dump(content))
+    runner: StudyRunner, character: str, poses: Mapping[float, Mapping[str, float]]
+) -> dict[str, object]:
+    """Write a motion as poses at times in s; returns the reference's parameters."""
+    keyframes = [{"time": time, "pose": dict(pose)} for time, pose in poses.items()]
+    content = {"interpolation": "smooth", "keyframes": keyframes}
+    path = runner.path(f"{character}_keyframes.yaml")
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return {"reference": "keyframes", "keyframes": str(path)}
 
 
-def _invert(runner: StudyRunner, motion: _Motion, rate: int) -> _Inverse:
+def _invert(
+    runner: StudyRunner,
+    character: str,
+    reference: Mapping[str, object],
+    duration: float,
+    rate: int,
+) -> _Inverse:
     """Inverse dynamics at each tick of a run."""
-    plan = make_plan(motion.character, motion.duration, motion.reference, {"rate": rate}, {})
-    model = DynamicsModel(plan.character)
-    times = np.arange(plan.ticks) / rate
+    plan = make_plan(character, duration, reference, {"rate": rate}, {})
+    model, times = DynamicsModel(plan.character), np.arange(plan.ticks) / rate
     efforts = efforts_along(model, plan.reference, times, 1.0 / rate)
-    table = effort_table(plan.character.layout, times, efforts)
-    file = runner.write(f"{motion.character}_{rate}_efforts.csv", table)
-    return _Inverse(motion, rate, times, efforts, model.weight, file)
+    file = runner.path(f"{character}_{rate}_efforts.csv")
+    write_effort_series(file, plan.character.layout, times, efforts)
+    controller = {"law": "feedforward", "feedforward": str(file)}
+    label = f"{character}-{rate}"
+    case = RunSpec(label, character, duration, reference, {"rate": rate}, controller)
+    return _Inverse(case, rate, times, efforts, model.weight)
+
+
+def efforts_along(
+    model: DynamicsModel, reference: Reference, times: FloatArray, period: float
+) -> FloatArray:
+    """The generalised efforts (t, n) of a reference at times (t,) in s: `M dv/dt + C`.
+
+    `dv/dt` is the change of the reference's velocity over the tick, so that a jump counts too.
+    """
+    efforts = []
+    upcoming = reference.sample(float(times[0]))
+    for time in times.tolist():
+        now, upcoming = upcoming, reference.sample(time + period)
+        model.update(now.configuration.position, now.velocity)
+        efforts.append(model.inverse_dynamics((upcoming.velocity - now.velocity) / period))
+    return np.array(efforts)
 
 
 def _give_back(
     runner: StudyRunner, inverse: _Inverse, *, root: str = "none", ground: bool = True
 ) -> _Return:
-    """Feed efforts forward; the root's only if that is what is said of them."""
-    motion = inverse.motion
-    outcome = runner.run(
-        RunSpec(
-            label=f"{motion.character}-{inverse.rate}{'' if ground else '-air'}",
-            character=motion.character,
-            duration=motion.duration,
-            reference=motion.reference,
-            simulator={"rate": inverse.rate, "terrain": "plane" if ground else "none"},
-            controller={
-                "law": "feedforward",
-                "feedforward": inverse.file,
-                "root_assistance": root == "fed forward",
-            },
-        )
+    """Feed efforts forward; the root's only if `root` is "fed forward"."""
+    case = inverse.case
+    case = replace(
+        case,
+        label=f"{case.label}{'' if ground else '-air'}",
+        simulator={**case.simulator, "terrain": "plane" if ground else "none"},
+        controller={**case.controller, "root_assistance": root == "fed forward"},
     )
-    return _Return(inverse, outcome, root, ground)
+    outcome = runner.run(case)
+    run = outcome.recording
+    return _Return(inverse, outcome, root, ground, run.times[:-1], joint_errors(run).mean(axis=1))
 
 
-def _rows(returns: Sequence[_Return]) -> list[list[Cell]]:
-    steps: list[float | None] = [
-        None,
-        *orders([1.0 / each.inverse.rate for each in returns], [each.early for each in returns]),
-    ]
-    rows: list[list[Cell]] = []
-    for each, step in zip(returns, steps, strict=True):
-        summary = each.outcome.summary
-        farthest, fell = summary["root_error_max_m"], summary["fell"]
-        rows.append(
-            [
-                each.inverse.motion.character,
-                "yes" if each.ground else "no",
-                each.root,
-                each.inverse.rate,
-                each.early,
-                step,
-                float(errors_of(each.outcome.recording)[1][-1]),
-                farthest if isinstance(farthest, float) else None,
-                fell if isinstance(fell, bool) else None,
-            ]
-        )
-    return rows
-
-
-def within_a_cycle(times: FloatArray, cycle: float) -> BoolArray:
-    """Which times (t,) are in one cycle (s), after the walk has set off from rest."""
-    start = cycle / _A_CYCLE
-    inside: BoolArray = (times >= start) & (times < start + cycle)
-    return inside
-
-
-def _notes(
-    arms: Sequence[_Return], whole: Sequence[_Return], inverse: _Inverse, cycle: float
-) -> list[str]:
-    vertical = float(inverse.efforts[within_a_cycle(inverse.times, cycle), 2].mean())
+def _rows(returns: Sequence[_Return]) -> list[Row]:
+    steps = orders([1.0 / each.inverse.rate for each in returns], [each.early for each in returns])
     return [
+        {
+            "character": each.inverse.case.character,
+            "ground": "yes" if each.ground else "no",
+            "root efforts": each.root,
+            "rate (Hz)": each.inverse.rate,
+            "joint error after 0.2 s (rad)": each.early,
+            "order in the tick": step,
+            "joint error at the end (rad)": float(each.error[-1]),
+            "largest root error (m)": each.outcome.measured("root_error_max_m"),
+            "fell": each.outcome.measured("fell"),
+        }
+        for each, step in zip(returns, (None, *steps), strict=True)
+    ]
+
+
+def orders(periods: Sequence[float], errors: Sequence[float]) -> list[float]:
+    """The power of the tick (s) with which the error shrinks, from each tick to the next one."""
+    both = pairwise(zip(np.log(periods), np.log(errors), strict=True))
+    return [float((e1 - e0) / (h1 - h0)) for (h0, e0), (h1, e1) in both]
+
+
+def _add_notes(
+    result: StudyResult, arms: Sequence[_Return], whole: Sequence[_Return], cycle: float
+) -> None:
+    inverse, start = whole[-1].inverse, cycle / _A_CYCLE  # when the walk has set off from rest
+    in_cycle = (inverse.times >= start) & (inverse.times < start + cycle)
+    vertical = float(inverse.efforts[in_cycle, 2].mean())
+    result.notes += [
         "The arm has a motor for each degree of freedom: its motion comes back, but for an error "
         f"in proportion to the tick ({arms[0].early:.2g} rad at {arms[0].inverse.rate} Hz, "
         f"{arms[-1].early:.2g} rad at {arms[-1].inverse.rate} Hz, after {_EARLY:g} s).",
@@ -244,47 +225,24 @@ def _notes(
     ]
 
 
-def _curves(
-    returns: Sequence[_Return], inverse: _Inverse
-) -> dict[str, tuple[list[str], FloatArray]]:
-    curves = {}
-    for each in returns:
-        ground = "" if each.ground else "_air"
-        name = f"forward_inverse_{each.inverse.motion.character}_{each.inverse.rate}{ground}"
-        errors = np.column_stack(errors_of(each.outcome.recording))
-        curves[name] = (["time_s", "joint_error_rad"], errors)
-    curves["forward_inverse_root"] = (
-        ["time_s", "root_force_n", "root_torque_nm"],
-        np.column_stack([inverse.times, *_root_norms(inverse)]),
-    )
-    return curves
-
-
-def _root_norms(inverse: _Inverse) -> tuple[FloatArray, FloatArray]:
-    """Size of the root's force (t,) in N and torque (t,) in N m."""
-    force: FloatArray = np.linalg.norm(inverse.efforts[:, :3], axis=1)
-    torque: FloatArray = np.linalg.norm(inverse.efforts[:, 3:6], axis=1)
-    return force, torque
-
-
-def _draw_errors(arms: Sequence[_Return], whole: Sequence[_Return], joints: _Return) -> "Figure":
-    figure, panels = make_panels(1, 3, (12.0, 4.2))
+def _draw_errors(
+    result: StudyResult, arms: Sequence[_Return], whole: Sequence[_Return], joints: _Return
+) -> None:
+    *panels, ticks = result.add_panels("forward_inverse_errors", 1, 3, (12.0, 4.2))
     titles = ("arm (kuka)", "walk in the air, with root efforts")
-    for axes, returns, title in zip(panels, (arms, whole), titles, strict=False):
+    for axes, returns, title in zip(panels, (arms, whole), titles, strict=True):
         for each in returns:
-            times, error = errors_of(each.outcome.recording)
-            axes.semilogy(times[1:], error[1:], label=f"{each.inverse.rate} Hz")
+            axes.semilogy(each.times[1:], each.error[1:], label=f"{each.inverse.rate} Hz")
         axes.set_ylim(1e-6, 5.0)
         axes.axvline(_EARLY, color="grey", linewidth=0.8, linestyle=":")
         label(axes, "time (s)", "mean joint error (rad)", title, legend="lower right")
-    times, error = errors_of(joints.outcome.recording)
-    panels[1].semilogy(times[1:], error[1:], color="black", label="without, on the ground")
+    without = "without, on the ground"
+    panels[1].semilogy(joints.times[1:], joints.error[1:], color="black", label=without)
     panels[1].legend(loc="lower right", fontsize="small")
-    _draw_orders(panels[2], {"arm": arms, "walk in the air": whole})
-    return figure
+    _draw_orders(ticks, {"arm": arms, "walk in the air": whole})
 
 
-def _draw_orders(axes: "Axes", families: Mapping[str, Sequence[_Return]]) -> None:
+def _draw_orders(axes: Axes, families: Mapping[str, Sequence[_Return]]) -> None:
     for name, returns in families.items():
         ticks = np.array([1e3 / each.inverse.rate for each in returns])  # ms
         errors = np.array([each.early for each in returns])
@@ -297,24 +255,22 @@ def _draw_orders(axes: "Axes", families: Mapping[str, Sequence[_Return]]) -> Non
     label(axes, "tick (ms)", f"error after {_EARLY:g} s (rad)", "the error shrinks with the tick")
 
 
-def _draw_root(inverse: _Inverse, cycle: float, whole: _Return, joints: _Return) -> "Figure":
-    figure, panels = make_panels(1, 3, (12.0, 4.2))
-    force, torque = _root_norms(inverse)
-    shown = inverse.times >= cycle / _A_CYCLE
-    panels[0].plot(inverse.times[shown], force[shown], label="force")
-    panels[0].axhline(inverse.weight, **THEORY, label="weight")
-    panels[0].set_ylim(bottom=0.0)
-    label(panels[0], "time (s)", "root force (N)", "what the walk needs and no joint gives")
-    panels[1].plot(inverse.times[shown], torque[shown], color="tab:purple")
-    label(panels[1], "time (s)", "root torque (N m)", "and the torque", legend=None)
+def _draw_root(
+    result: StudyResult, inverse: _Inverse, cycle: float, whole: _Return, joints: _Return
+) -> None:
+    forces, torques, heights = result.add_panels("forward_inverse_root", 1, 3, (12.0, 4.2))
+    curves, shown = result.curves["forward_inverse_root"], inverse.times >= cycle / _A_CYCLE
+    times = inverse.times[shown]
+    forces.plot(times, curves["root_force_n"][shown], label="force")
+    forces.axhline(inverse.weight, **THEORY, label="weight")
+    forces.set_ylim(bottom=0.0)
+    label(forces, "time (s)", "root force (N)", "what the walk needs and no joint gives")
+    torques.plot(times, curves["root_torque_nm"][shown], color="tab:purple")
+    label(torques, "time (s)", "root torque (N m)", "and the torque", legend=None)
     for name, each in (("root efforts, no ground", whole), ("joints alone, ground", joints)):
         run = each.outcome.recording
-        panels[2].plot(run.times, run.position[:, 2], label=name)
+        heights.plot(run.times, run.position[:, 2], label=name)
     run = joints.outcome.recording
-    panels[2].plot(run.times, run.reference_position[:, 2], **THEORY, label="reference")
-    panels[2].set_ylim(bottom=0.0)
-    label(panels[2], "time (s)", "height of the root (m)", "fed forward, no feedback")
-    return figure
-
-
-STUDY = ForwardInverseStudy()
+    heights.plot(run.times, run.reference_position[:, 2], **THEORY, label="reference")
+    heights.set_ylim(bottom=0.0)
+    label(heights, "time (s)", "height of the root (m)", "fed forward, no feedback")

@@ -1,28 +1,24 @@
 """Small, normal and large stiffness and damping, with the reference's velocity and without."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.error_measures import joint_errors
-from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.stills import strip
-from actuated_characters.studies.framework.plots import THEORY, label, make_panels, show_pictures
-from actuated_characters.studies.framework.study import (
-    Cell,
-    RunResult,
-    RunSpec,
-    StudyResult,
-    StudyRunner,
+from actuated_characters.studies.framework.plots import THEORY, label
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
+from actuated_characters.studies.framework.tracking import (
+    inertialess_response,
+    joint_errors,
+    lag,
+    overshoot,
 )
-from actuated_characters.studies.framework.tracking import inertialess_response, lag, overshoot
 from msgs_config.arrays import FloatArray
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
+TITLE = "stiffness and damping x 0.1, 1, 10: the walk, with root assistance"
+RUNS = 10
 
 _CHARACTER, _KNEE = "humanoid", "right_knee"
 _RATE, _DURATION = 240, 4.0  # Hz, s
@@ -42,89 +38,55 @@ _PICTURES, _SIZE = 10, (180, 230)
 _PICTURED = (1.27, 2.54)  # s, the second cycle
 
 
-@dataclass(frozen=True)
-class _Knee:
-    """The knee's angle, its reference, and what theory says of a knee without inertia."""
-
-    times: FloatArray  # (t,) s
-    angle: FloatArray  # (t,) rad
-    reference: FloatArray  # (t,) rad
-    theory: FloatArray  # (t,) rad
-
-    def settled(self) -> "_Knee":
-        """Without the start."""
-        rows = self.times >= _SETTLED
-        return _Knee(self.times[rows], self.angle[rows], self.reference[rows], self.theory[rows])
-
-    def lags(self) -> tuple[float, float]:
-        """By which it comes after its reference, and should by theory, s."""
-        known = self.settled()
-        late, expected = (
-            lag(angle, known.reference, 1.0 / _RATE, _LONGEST_LAG)
-            for angle in (known.angle, known.theory)
-        )
-        return late, expected
-
-
-class GainsStudy:
-    """The humanoid walks with root assistance, so that what is seen is the joints' gains."""
-
-    name = "gains"
-    title = "stiffness and damping x 0.1, 1, 10: the walk, with root assistance"
-    runs = 10
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Walk by each pair of factors, with and without the reference's velocity."""
-        runs = {
-            (factors, velocity): runner.run(_case(factors, velocity))
-            for factors in dict.fromkeys(_FACTORS.values())
-            for velocity in _VELOCITIES
-        }
-        return StudyResult(
-            columns=(
-                "gains",
-                "reference velocity",
-                "joint error (rad)",
-                "knee overshoot / range",
-                "knee lag (ms)",
-                "by theory (ms)",
-                "share saturated",
-                "ends at (s)",
-            ),
-            rows=[
-                _row(name, velocity, runs[factors, velocity])
-                for name, factors in _FACTORS.items()
-                for velocity in _VELOCITIES
-            ],
-            figures={
-                self.name: _draw(runs),
-                "gains_poses": show_pictures(_pictures(runs)),
-            },
-            curves={"gains_knee": _curves(runs)},
-            notes=_notes(runs),
-        )
-
-
 _Runs = Mapping[tuple[tuple[float, float], str], RunResult]
 
 
+def run(runner: StudyRunner, result: StudyResult) -> None:
+    """Walk by each pair of factors, with and without the reference's velocity.
+
+    With root assistance, so that what is seen is the joints' gains.
+    """
+    runs = {
+        (factors, velocity): runner.run(_case(factors, velocity))
+        for factors in dict.fromkeys(_FACTORS.values())
+        for velocity in _VELOCITIES
+    }
+    result.rows += [
+        _row(name, velocity, runs[factors, velocity])
+        for name, factors in _FACTORS.items()
+        for velocity in _VELOCITIES
+    ]
+    _draw(result, runs)
+    _draw_poses(result, runs)
+    times, _, reference, _ = _knee(runs[(1.0, 1.0), "clip"].recording, (1.0, 1.0))
+    curves = {"time_s": times, "reference_rad": reference}
+    result.notes += [
+        "without the reference's velocity damping holds back: a slow motion lags by kd / kp; with "
+        "it, it does not",
+        "small damping does not oscillate here, as stable PD has a damping kp h of its own",
+    ]
+    for ((p, d), velocity), outcome in runs.items():
+        curves[f"p{p:g}_d{d:g}_{velocity}_rad"] = _knee(outcome.recording, (p, d))[1]
+        if outcome.diverged:
+            result.notes.append(
+                f"stiffness x {p:g}, damping x {d:g}, velocity {velocity}: {outcome.diverged}; "
+                "efforts at their limits are not those that the implicit solve counts on"
+            )
+    result.add_curves("gains_knee", curves)
+
+
 def _case(factors: tuple[float, float], velocity: str) -> RunSpec:
-    stiffness, damping = factors
-    return RunSpec(
-        f"p{stiffness:g}_d{damping:g}_{velocity}",
-        _CHARACTER,
-        _DURATION,
-        {"reference": "clip", "clip": "walk"},
-        {"rate": _RATE},
-        {
-            "gain_scale.p": stiffness,
-            "gain_scale.d": damping,
-            "reference_velocity": velocity,
-        },
-    )
+    p, d = factors
+    controller = {"gain_scale.p": p, "gain_scale.d": d, "reference_velocity": velocity}
+    label = f"p{p:g}_d{d:g}_{velocity}"
+    return RunSpec(label, _CHARACTER, _DURATION, WALK, {"rate": _RATE}, controller)
 
 
-def _knee(run: Recording, factors: tuple[float, float]) -> _Knee:
+def _knee(run: Recording, factors: tuple[float, float]) -> FloatArray:
+    """Times in s, the knee's angle, its reference, and that by theory, without inertia, in rad.
+
+    Rows of an array (4, t).
+    """
     entry, gains = run.layout.joint(_KNEE).start, run.character.gains[_KNEE]
     reference = run.reference_position[:-1, entry]  # the last state may have none
     theory = inertialess_response(
@@ -134,73 +96,58 @@ def _knee(run: Recording, factors: tuple[float, float]) -> _Knee:
         factors[1] * gains.damping,
         1.0 / _RATE,
     )
-    return _Knee(run.times[:-1], run.position[:-1, entry], reference, theory)
+    return np.array((run.times[:-1], run.position[:-1, entry], reference, theory))
 
 
-def _row(name: str, velocity: str, outcome: RunResult) -> tuple[Cell, ...]:
-    run = outcome.recording
-    errors = joint_errors(run.layout, run.position[:-1], run.reference_position[:-1])
-    saturated = outcome.summary["saturated_fraction"]
-    knee: tuple[Cell, ...] = (None, None, None)
+def _row(name: str, velocity: str, outcome: RunResult) -> Row:
+    run, overshoots, late, expected = outcome.recording, None, None, None
     if not outcome.diverged:
-        angles = _knee(run, _FACTORS[name])
-        known = angles.settled()
-        late, expected = angles.lags()
-        knee = overshoot(known.angle, known.reference), 1e3 * late, 1e3 * expected
-    return (
-        name,
-        velocity,
-        float(errors.mean()),
-        *knee,
-        saturated if isinstance(saturated, float) else None,
-        float(run.times[-1]),
-    )
+        knee = _knee(run, _FACTORS[name])
+        _, angle, reference, theory = knee[:, knee[0] >= _SETTLED]
+        overshoots = overshoot(angle, reference)
+        late, expected = (
+            1e3 * lag(values, reference, 1.0 / _RATE, _LONGEST_LAG) for values in (angle, theory)
+        )
+    return {
+        "gains": name,
+        "reference velocity": velocity,
+        "joint error (rad)": float(joint_errors(run).mean()),
+        "knee overshoot / range": overshoots,
+        "knee lag (ms)": late,
+        "by theory (ms)": expected,
+        "share saturated": outcome.measured("saturated_fraction"),
+        "ends at (s)": float(run.times[-1]),
+    }
 
 
-def _notes(runs: _Runs) -> Sequence[str]:
-    notes = [
-        "without the reference's velocity damping holds back: a slow motion lags by kd / kp; with "
-        "it, it does not",
-        "small damping does not oscillate here, as stable PD has a damping kp h of its own",
-    ]
-    for (factors, velocity), outcome in runs.items():
-        if outcome.diverged:
-            notes.append(
-                f"stiffness x {factors[0]:g}, damping x {factors[1]:g}, velocity {velocity}: "
-                f"{outcome.diverged}; efforts at their limits are not those that the implicit "
-                "solve counts on"
-            )
-    return notes
-
-
-def _draw(runs: _Runs) -> "Figure":
-    figure, panels = make_panels(2, 3, (13.0, 7.0), same_x=True)
+def _draw(result: StudyResult, runs: _Runs) -> None:
+    panels = result.add_panels(result.name, 2, 3, (13.0, 7.0), same_x=True)
+    lags = zip(result.column("knee lag (ms)"), result.column("by theory (ms)"), strict=True)
     for panel, (name, factors) in zip(panels, _FACTORS.items(), strict=True):
-        said = []
+        texts = []
         for velocity, named in _VELOCITIES.items():
             outcome = runs[factors, velocity]
-            knee = _knee(outcome.recording, factors)
-            (line,) = panel.plot(knee.times, knee.angle, label=named, linewidth=2.0, alpha=0.8)
-            panel.plot(knee.times, knee.theory, **{**THEORY, "color": line.get_color()})
+            times, angle, _, theory = _knee(outcome.recording, factors)
+            (line,) = panel.plot(times, angle, label=named, linewidth=2.0, alpha=0.8)
+            panel.plot(times, theory, **{**THEORY, "color": line.get_color()})
+            late, expected = next(lags)
             if outcome.diverged:
-                panel.plot(knee.times[-1:], knee.angle[-1:], "x", color="tab:red", markersize=10)
-                said.append("diverges")
+                panel.plot(times[-1:], angle[-1:], "x", color="tab:red", markersize=10)
+                texts.append("diverges")
             else:
-                late, expected = knee.lags()
-                said.append(f"{round(1e3 * late)} ms (theory {round(1e3 * expected)})")
-        reference = _knee(runs[factors, "clip"].recording, factors)
-        panel.plot(reference.times, reference.reference, "k", linewidth=0.8, label="reference")
-        title = f"{name}\nlag {said[0]}; without velocity {said[1]}"
+                texts.append(f"{round(late)} ms (theory {round(expected)})")
+        times, _, reference, _ = _knee(runs[factors, "clip"].recording, factors)
+        panel.plot(times, reference, "k", linewidth=0.8, label="reference")
+        title = f"{name}\nlag {texts[0]}; without velocity {texts[1]}"
         label(panel, "time (s)", "right knee (rad)", title, legend=None)
         panel.title.set_fontsize("small")
         panel.set_xlim(0.0, _SHOWN)
-        panel.set_ylim(float(reference.reference.min()) - 0.4, 0.4)
+        panel.set_ylim(float(reference.min()) - 0.4, 0.4)
     panels[0].plot([], [], label="theory: no inertia", **THEORY)
     panels[0].legend(loc="lower left", fontsize="x-small", ncols=2)
-    return figure
 
 
-def _pictures(runs: _Runs) -> dict[str, Picture]:
+def _draw_poses(result: StudyResult, runs: _Runs) -> None:
     """Poses of the second cycle, the reference as a ghost; its velocity followed."""
     pictures = {}
     for name, factors in _FACTORS.items():
@@ -210,20 +157,4 @@ def _pictures(runs: _Runs) -> dict[str, Picture]:
         pictures[f"{name}, with reference velocity; the reference in green"] = strip(
             run, times, columns=_PICTURES, ghost=True, size=_SIZE
         )
-    return pictures
-
-
-def _curves(runs: _Runs) -> tuple[Sequence[str], FloatArray]:
-    """The knee's reference and its angles; NaN after a divergence."""
-    whole = [outcome.recording for outcome in runs.values() if not outcome.diverged]
-    longest = _knee(whole[0], (1.0, 1.0))
-    names, columns = ["time_s", "reference_rad"], [longest.times, longest.reference]
-    for (factors, velocity), outcome in runs.items():
-        angle = _knee(outcome.recording, factors).angle
-        missing = len(longest.times) - len(angle)
-        columns.append(np.pad(angle, (0, missing), constant_values=np.nan))
-        names.append(f"p{factors[0]:g}_d{factors[1]:g}_{velocity}_rad")
-    return names, np.column_stack(columns)
-
-
-STUDY = GainsStudy()
+    result.add_pictures("gains_poses", pictures)

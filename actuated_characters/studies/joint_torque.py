@@ -1,11 +1,10 @@
-"""What a joint torque is: the sum of forces between two bodies, and nothing to both together."""
+"""A joint torque as forces between two bodies that sum to zero, and change no momentum."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.runs.planned_wrenches import PlannedPush
@@ -17,15 +16,16 @@ from actuated_characters.studies.framework.bodies import (
     momenta,
     write_hinged_boxes,
 )
-from actuated_characters.studies.framework.plots import THEORY, label, make_panels
-from actuated_characters.studies.framework.study import Cell, RunSpec, StudyResult, StudyRunner
+from actuated_characters.studies.framework.plots import THEORY, label
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import HOLD, RunSpec, StudyRunner
 from controller_node.effort_series import write_effort_series
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
+TITLE = "joint torque: forces between two bodies that sum to zero"
+RUNS = 5
 
 _RATE, _FINE_RATE = 240, 1920  # Hz
 _DURATION = 2.0  # s
@@ -46,77 +46,74 @@ class _Run:
     recording: Recording
     momenta: Momenta
 
+    @property
+    def hinge(self) -> FloatArray:
+        """The hinge's angle (t + 1,) in rad."""
+        return self.recording.position[:, self.recording.layout.dof_names.index(HINGE)]
 
-class JointTorqueStudy:
-    """Two boxes on a hinge, floating: driven by a torque, by forces between them, and as a whole.
+    @property
+    def off_line(self) -> FloatArray:
+        """Distance (t + 1,) in m of the centre of mass from where its first velocity leads it."""
+        centre, times = self.momenta.centre, self.recording.times
+        mass_velocity = (centre[1] - centre[0]) / (times[1] - times[0])
+        straight = centre[0] + times[:, np.newaxis] * mass_velocity
+        off: FloatArray = np.linalg.norm(centre - straight, axis=1)
+        return off
+
+    @property
+    def changes(self) -> tuple[FloatArray, FloatArray]:
+        """Distances (t + 1,) of P in kg m/s and L in kg m^2/s from their first values."""
+        linear, angular = (
+            np.linalg.norm(values - values[0], axis=1)
+            for values in (self.momenta.linear, self.momenta.angular)
+        )
+        return linear, angular
+
+
+def run(runner: StudyRunner, result: StudyResult) -> None:
+    """Drive two boxes on a hinge, floating: by a torque, by forces between them, as a whole.
 
     The torque is prescribed over time. The forces that do the same depend on how the boxes lie, so
     they are worked out from the states that the torque has led to.
     """
-
-    name = "joint_torque"
-    title = "joint torque: forces between two bodies that sum to zero"
-    runs = 5
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Run the torque at two rates, then the forces, a root force, and nothing at all."""
-        boxes = write_hinged_boxes(
-            runner, "hinged", _PARENT, _CHILD, joint_in_parent=(0.0, 0.0, 0.0)
-        )
-        by_torque = _run(runner, boxes, "torque")
-        at_fine_rate = _run(runner, boxes, "torque_fine", rate=_FINE_RATE)
-        pushes = balanced_pushes(by_torque.recording, _profile(_times(_RATE)))
-        by_forces = _run(runner, boxes, "forces", torque=0.0, pushes=pushes)
-        by_root = _run(runner, boxes, "root_force", force=_FORCE, rate=_FINE_RATE)
-        passive = _run(runner, boxes, "nothing", torque=0.0)
-        runs = {
-            f"joint torque, {_RATE} Hz": by_torque,
-            f"joint torque, {_FINE_RATE} Hz": at_fine_rate,
-            "forces between the bodies": by_forces,
-            f"and a root force of {_FORCE:g} N, {_FINE_RATE} Hz": by_root,
-            "neither": passive,
-        }
-        apart = np.abs(by_torque.recording.position - by_forces.recording.position).max()
-        return StudyResult(
-            columns=(
-                "driven by",
-                "hinge at the end (rad)",
-                "state off that of the torque (rad, m)",
-                "P changed by (kg m/s)",
-                "L changed by (kg m^2/s)",
-                "centre of mass off its line (m)",
-            ),
-            rows=[_row(name, run, by_torque) for name, run in runs.items()],
-            figures={self.name: _draw(by_torque, by_forces, at_fine_rate, by_root, passive)},
-            curves={
-                "joint_torque_hinge": (
-                    ("time_s", "hinge_by_torque_rad", "hinge_by_forces_rad"),
-                    np.column_stack(
-                        (
-                            by_torque.recording.times,
-                            _angle(by_torque.recording),
-                            _angle(by_forces.recording),
-                        )
-                    ),
-                )
-            },
-            notes=(
-                f"three pairs of forces move the boxes as the torque sum r x f does: positions "
-                f"agree within {apart:.1e}; what of it is not along the hinge's axis the hinge "
-                "holds",
-                "a joint torque changes neither P nor L; what is left falls with the step. "
-                "A root force does",
-            ),
-        )
+    boxes = write_hinged_boxes(runner, "hinged", _PARENT, _CHILD)
+    by_torque = _run(runner, boxes, "torque")
+    at_fine_rate = _run(runner, boxes, "torque_fine", rate=_FINE_RATE)
+    pushes = balanced_pushes(by_torque.recording, _profile(_RATE))
+    by_forces = _run(runner, boxes, "forces", torque=0.0, pushes=pushes)
+    by_root = _run(runner, boxes, "root_force", force=_FORCE, rate=_FINE_RATE)
+    passive = _run(runner, boxes, "nothing", torque=0.0)
+    apart = np.abs(by_torque.recording.position - by_forces.recording.position).max(axis=1)
+    for name, run in (
+        (f"joint torque, {_RATE} Hz", by_torque),
+        (f"joint torque, {_FINE_RATE} Hz", at_fine_rate),
+        ("forces between the bodies", by_forces),
+        (f"and a root force of {_FORCE:g} N, {_FINE_RATE} Hz", by_root),
+        ("neither", passive),
+    ):
+        result.rows.append(_row(name, run, by_torque))
+    hinge, difference, *others = result.add_panels(result.name, 2, 2, (11.0, 7.0))
+    times = by_torque.recording.times
+    hinge.plot(times, by_torque.hinge, linewidth=2.5, alpha=0.7, label="by a joint torque")
+    hinge.plot(times, by_forces.hinge, "k--", label="by 3 pairs of forces")
+    hinge.plot(times, passive.hinge, color="tab:gray", label="by neither")
+    label(hinge, "time (s)", "angle of the hinge (rad)", "the same motion: τ = Σ r × f, Σ f = 0")
+    difference.semilogy(times, np.maximum(apart, _SMALLEST), label="largest entry")
+    label(difference, "time (s)", "position apart (rad, m)", "the two runs differ by rounding")
+    _draw_momentum(others, by_torque, at_fine_rate, by_root)
+    curves = {"hinge_by_torque_rad": by_torque.hinge, "hinge_by_forces_rad": by_forces.hinge}
+    result.add_curves("joint_torque_hinge", {"time_s": times, **curves})
+    result.notes += [
+        f"three pairs of forces move the boxes as the torque sum r x f does: positions agree "
+        f"within {apart.max():.1e}; what of it is not along the hinge's axis the hinge holds",
+        "a joint torque changes neither P nor L; what is left falls with the step. "
+        "A root force does",
+    ]
 
 
-def _times(rate: int) -> FloatArray:
-    times: FloatArray = np.arange(round(_DURATION * rate)) / rate
-    return times
-
-
-def _profile(times: FloatArray) -> FloatArray:
-    """The torque (t,) in N m at times in s: one way, and back."""
+def _profile(rate: int) -> FloatArray:
+    """The torque (t,) in N m at ticks of a rate in Hz: one way, and back."""
+    times = np.arange(round(_DURATION * rate)) / rate
     torque: FloatArray = _TORQUE * np.sin(2.0 * np.pi * times / _DURATION)
     return torque
 
@@ -131,13 +128,17 @@ def _run(
     rate: int = _RATE,
     pushes: Sequence[PlannedPush] = (),
 ) -> _Run:
-    times = _times(rate)
-    series = _write_series(runner, boxes, name, torque * _profile(times), times, force)
+    layout, torques = load_character(boxes).layout, torque * _profile(rate)
+    efforts = np.zeros((len(torques), layout.size))
+    efforts[:, layout.dof_names.index(HINGE)] = torques
+    efforts[:, 0] = force
+    path = runner.path(f"{name}.csv")
+    write_effort_series(path, layout, np.arange(len(torques)) / rate, efforts)
     case = RunSpec(
         label=name,
         character=boxes,
         duration=_DURATION,
-        reference={"reference": "hold"},
+        reference=HOLD,
         simulator={
             **IN_SPACE,
             "rate": rate,
@@ -146,31 +147,13 @@ def _run(
         },
         controller={
             "law": "feedforward",
-            "feedforward": series,
+            "feedforward": str(path),
             "root_assistance": bool(force),
         },
         pushes=pushes,
     )
-    recording = runner.run(case).recording
-    return _Run(recording, momenta(recording.character, recording.position, recording.velocity))
-
-
-def _write_series(
-    runner: StudyRunner,
-    boxes: str,
-    name: str,
-    torques: FloatArray,
-    times: FloatArray,
-    force: float,
-) -> str:
-    """Write the law's file: torques (t,) of the hinge in N m, force of the root along x in N."""
-    layout = load_character(boxes).layout
-    efforts = np.zeros((len(times), layout.size))
-    efforts[:, layout.dof_names.index(HINGE)] = torques
-    efforts[:, 0] = force
-    path = runner.write(f"{name}.csv", "")
-    write_effort_series(Path(path), layout, times, efforts)
-    return path
+    run = runner.run(case).recording
+    return _Run(run, momenta(run.character, run.position, run.velocity))
 
 
 def forces_of_torque(points: FloatArray, forces: FloatArray, axis: FloatArray) -> FloatArray:
@@ -209,69 +192,38 @@ def _push(stamp_ns: int, link: str, force: FloatArray, point: FloatArray) -> Pla
     return PlannedPush(stamp_ns, link, (*force.tolist(), 0.0, 0.0, 0.0), (x, y, z))
 
 
-def _angle(recording: Recording) -> FloatArray:
-    """The hinge's angle (t,) in rad."""
-    return recording.position[:, recording.layout.dof_names.index(HINGE)]
+def _row(name: str, run: _Run, other: _Run) -> Row:
+    ours, theirs = run.recording.position, other.recording.position
+    linear, angular = run.changes
+    return {
+        "driven by": name,
+        "hinge at the end (rad)": float(run.hinge[-1]),
+        "state off that of the torque (rad, m)": (
+            float(np.abs(ours - theirs).max()) if len(ours) == len(theirs) else None
+        ),
+        "P changed by (kg m/s)": float(linear.max()),
+        "L changed by (kg m^2/s)": float(angular.max()),
+        "centre of mass off its line (m)": float(run.off_line.max()),
+    }
 
 
-def off_line(run: Momenta, times: FloatArray) -> FloatArray:
-    """How far (t,) the centre of mass is off where its first velocity would have it, m."""
-    mass_velocity = np.diff(run.centre[:2], axis=0)[0] / (times[1] - times[0])
-    straight = run.centre[0] + times[:, np.newaxis] * mass_velocity
-    off: FloatArray = np.linalg.norm(run.centre - straight, axis=1)
-    return off
-
-
-def _row(name: str, run: _Run, other: _Run) -> tuple[Cell, ...]:
-    recording, momentum = run.recording, run.momenta
-    same_ticks = len(recording.times) == len(other.recording.times)
-    apart = np.abs(recording.position - other.recording.position).max() if same_ticks else None
-    return (
-        name,
-        float(_angle(recording)[-1]),
-        None if apart is None else float(apart),
-        float(np.linalg.norm(momentum.linear - momentum.linear[0], axis=1).max()),
-        float(np.linalg.norm(momentum.angular - momentum.angular[0], axis=1).max()),
-        float(off_line(momentum, recording.times).max()),
-    )
-
-
-def _draw(
-    by_torque: _Run, by_forces: _Run, at_fine_rate: _Run, by_root: _Run, passive: _Run
-) -> "Figure":
-    """The hinge by torque and by forces; the centre of mass; the momentum of both boxes."""
-    figure, (hinge, apart, centre, momentum) = make_panels(2, 2, (11.0, 7.0))
-    times = by_torque.recording.times
-    hinge.plot(
-        times, _angle(by_torque.recording), linewidth=2.5, alpha=0.7, label="by a joint torque"
-    )
-    hinge.plot(times, _angle(by_forces.recording), "k--", label="by 3 pairs of forces")
-    hinge.plot(times, _angle(passive.recording), color="tab:gray", label="by neither")
-    label(hinge, "time (s)", "angle of the hinge (rad)", "the same motion: τ = Σ r × f, Σ f = 0")
-    off = np.abs(by_torque.recording.position - by_forces.recording.position).max(axis=1)
-    apart.semilogy(times, np.maximum(off, _SMALLEST), label="largest entry")
-    label(apart, "time (s)", "position apart (rad, m)", "the two runs differ by rounding")
-    mass = by_root.recording.character.mass
-    runs = (
+def _draw_momentum(
+    panels: Sequence[Axes], by_torque: _Run, at_fine_rate: _Run, by_root: _Run
+) -> None:
+    """The centre of mass of both boxes, and their momentum."""
+    centre, momentum = panels
+    times, mass = by_torque.recording.times, by_root.recording.character.mass
+    for run, name, color in (
         (by_torque, f"joint torque, {_RATE} Hz", "tab:blue"),
         (at_fine_rate, f"joint torque, {_FINE_RATE} Hz", "tab:orange"),
         (by_root, f"and a root force, {_FINE_RATE} Hz", "tab:green"),
-    )
-    for run, name, color in runs:
-        clock = run.recording.times
-        centre.semilogy(
-            clock, np.maximum(off_line(run.momenta, clock), _SMALLEST), color=color, label=name
-        )
-        change = run.momenta.linear - run.momenta.linear[0]
-        momentum.plot(clock, np.linalg.norm(change, axis=1), color=color, label=f"P, {name}")
-        turn = run.momenta.angular - run.momenta.angular[0]
-        momentum.plot(clock, np.linalg.norm(turn, axis=1), ":", color=color, label=f"L, {name}")
+    ):
+        clock, (linear, angular) = run.recording.times, run.changes
+        centre.semilogy(clock, np.maximum(run.off_line, _SMALLEST), color=color, label=name)
+        momentum.plot(clock, linear, color=color, label=f"P, {name}")
+        momentum.plot(clock, angular, ":", color=color, label=f"L, {name}")
     centre.semilogy(times[1:], 0.5 * _FORCE / mass * times[1:] ** 2, label="f t² / 2 m", **THEORY)
     centre.set_ylim(1e-7, 10.0)
     momentum.plot(times, _FORCE * times, label="f t", **THEORY)
     label(centre, "time (s)", "centre of mass off its line (m)", "only the root force moves it")
     label(momentum, "time (s)", "change of P (kg m/s), L (kg m²/s)", "and only that adds momentum")
-    return figure
-
-
-STUDY = JointTorqueStudy()

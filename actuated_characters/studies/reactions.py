@@ -2,20 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics import error_measures
 from actuated_characters.render.stills import strip
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.reactions import mode_spans
-from actuated_characters.studies.framework.study import Cell, RunSpec, StudyResult, StudyRunner
+from actuated_characters.studies.framework.result import Row, StudyResult
+from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
+from actuated_characters.studies.framework.tracking import joint_errors
 from msgs_config.arrays import FloatArray
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
+TITLE = "a walk that is hit by a ball against the chest, behaviour reactive"
+RUNS = 7
 
 IMPULSES = (5.0, 10.0, 20.0, 40.0)  # N s
 HIT = 1.0  # s
@@ -24,27 +24,29 @@ _SPEED = 8.0  # m/s
 _LENGTH, _LONG = 4.0, 8.0  # s, of the runs; of those that fall and get up
 _RAGDOLL_HIT = 0.15  # s: later it is out of the ball's way
 _AROUND = 0.05  # s before and after the hit between which the ball's momentum is compared
-_AS_BEFORE = 1.1  # times the largest error of who is not hit
+_AS_BEFORE = 1.1  # times the largest error without a hit
 _PEAK = 1.5  # s after the hit in which the root's largest displacement is looked for
 _MODES = ("REACT", "BLEND", "LIMP")
-_WIDTH = 12.0  # inches of a picture of poses
-_MOMENTS = {
-    "ragdoll": (0.0, 0.1, 0.15, 0.25, 0.4, 0.6, 0.9, 3.0),
-    "active_ragdoll": (0.9, 1.05, 1.4, 1.9, 3.0, 4.0, 5.0, 6.5),
-    "reactive": (0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.25, 3.0),
-}  # s
-_TITLES = {
-    "ragdoll": "ragdoll, 40 N s: no torque but that of the soft limits, no assistance",
-    "active_ragdoll": "active ragdoll, 40 N s: limp and without assistance, which comes back as "
-    "it gets up",
-    "reactive": "reactive, 20 N s: soft, with at most 0.2 of the weight, then along the clip that "
-    "was found",
+_POSES = {  # of a run: what is seen, and when, s
+    "ragdoll": (
+        "ragdoll, 40 N s: no torque but that of the soft limits, no assistance",
+        (0.0, 0.1, 0.15, 0.25, 0.4, 0.6, 0.9, 3.0),
+    ),
+    "active_ragdoll": (
+        "active ragdoll, 40 N s: limp and without assistance, which comes back as it gets up",
+        (0.9, 1.05, 1.4, 1.9, 3.0, 4.0, 5.0, 6.5),
+    ),
+    "reactive": (
+        "reactive, 20 N s: soft, with at most 0.2 of the weight, then along the clip that was "
+        "found",
+        (0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.25, 3.0),
+    ),
 }
 
 
 @dataclass(frozen=True)
 class Reaction:
-    """What a hit has done."""
+    """The effects of a hit."""
 
     impulse: float  # N s, that the ball has lost until shortly after it touched
     peak: float  # m, how far the root is at the most from where it would have been
@@ -53,65 +55,58 @@ class Reaction:
     error: FloatArray  # (t + 1,) rad, mean of the joints, from the clip at that time
 
 
-class ReactionStudy:
-    """The walking humanoid, hit against the chest from in front."""
+def run(runner: StudyRunner, result: StudyResult) -> None:
+    """Hit the walking humanoid harder and harder against the chest, from in front.
 
-    name = "reactions"
-    title = "a walk that is hit by a ball against the chest, behaviour reactive"
-    runs = len(IMPULSES) + 3
-
-    def run(self, runner: StudyRunner) -> StudyResult:
-        """Let it be hit harder and harder; and others: one that is limp, and one that gets up."""
-
-        def run(label: str, behaviour: str, impulse: float = 0.0, **more: float) -> Recording:
-            return runner.run(_case(label, behaviour, impulse, **more)).recording
-
-        strongest = IMPULSES[-1]
-        alone = run("alone", "reactive", length=_LONG)
-        hits = {
-            impulse: run(
-                f"reactive_{impulse:g}Ns",
-                "reactive",
-                impulse,
-                length=_LONG if impulse == strongest else _LENGTH,
-            )
-            for impulse in IMPULSES
-        }
-        others = {
-            "ragdoll": run("ragdoll", "ragdoll", strongest, at=_RAGDOLL_HIT, distance=1.0),
-            "active_ragdoll": run("active_ragdoll", "active_ragdoll", strongest, length=_LONG),
-        }
-        reactions = {impulse: measure(run, alone, HIT) for impulse, run in hits.items()}
-        poses = {**others, "reactive": hits[20.0]}
-        return StudyResult(
-            columns=(
-                "planned impulse (N s)",
-                "measured impulse (N s)",
-                "largest displacement of the root (m)",
-                "back on the clip (s)",
-                *(f"{mode} (s)" for mode in _MODES),
-            ),
-            rows=[_row(impulse, reactions[impulse], hits[impulse]) for impulse in IMPULSES],
-            figures={
-                self.name: _draw(alone, hits, reactions),
-                **{f"{self.name}_{name}": _poses(name, run) for name, run in poses.items()},
-            },
-            curves={
-                f"{self.name}_{impulse:g}Ns": (
-                    ("time_s", "root_displacement_m", "joint_error_rad"),
-                    np.column_stack((hits[impulse].times, each.displacement, each.error)),
-                )
-                for impulse, each in reactions.items()
-            },
-            notes=(
-                "assistance: full while it follows a clip, at most 0.2 of the weight in REACT, "
-                "none in LIMP; the ragdoll has none",
-            ),
+    And two others: one that is limp, and one that gets up.
+    """
+    strongest = IMPULSES[-1]
+    alone = runner.run(_case("alone", "reactive", length=_LONG)).recording
+    hits = {}
+    for impulse in IMPULSES:
+        length = _LONG if impulse == strongest else _LENGTH
+        case = _case(f"reactive_{impulse:g}Ns", "reactive", impulse, length=length)
+        hits[impulse] = runner.run(case).recording
+    limp = _case("ragdoll", "ragdoll", strongest, at=_RAGDOLL_HIT, distance=1.0)
+    rising = _case("active_ragdoll", "active_ragdoll", strongest, length=_LONG)
+    poses = {case.label: runner.run(case).recording for case in (limp, rising)}
+    reactions = {impulse: measure(hit, alone, HIT) for impulse, hit in hits.items()}
+    for impulse, reaction in reactions.items():
+        result.rows.append(_row(impulse, reaction, hits[impulse]))
+        curves = {"root_displacement_m": reaction.displacement, "joint_error_rad": reaction.error}
+        result.add_curves(f"{result.name}_{impulse:g}Ns", {"time_s": hits[impulse].times, **curves})
+    _draw(result, alone, hits, reactions)
+    for name, recording in {**poses, "reactive": hits[20.0]}.items():
+        title, times = _POSES[name]
+        result.add_pictures(
+            f"{result.name}_{name}",
+            {title: strip(recording, times)},
+            title_height=0.4,
+            title_place="center",
         )
+    result.notes.append(
+        "assistance: full while it follows a clip, at most 0.2 of the weight in REACT, "
+        "none in LIMP; the ragdoll has none"
+    )
+
+
+def _row(planned: float, reaction: Reaction, run: Recording) -> Row:
+    spans = mode_spans(run)
+    lasting = {
+        f"{mode} (s)": sum((span.duration for span in spans if span.mode == mode), start=0.0)
+        for mode in _MODES
+    }
+    return {
+        "planned impulse (N s)": planned,
+        "measured impulse (N s)": reaction.impulse,
+        "largest displacement of the root (m)": reaction.peak,
+        "back on the clip (s)": reaction.back,
+        **lasting,
+    }
 
 
 def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
-    """What a hit at a time in s has done, by the same run without it.
+    """The effects of a hit at a time in s, by comparison with the same run without it.
 
     Args:
         run: A run of one ball.
@@ -119,8 +114,8 @@ def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
         hit: When it touches, s.
     """
     states = slice(len(run.times))
-    error = joint_errors(run, alone.reference_position[states])
-    usual = joint_errors(alone, alone.reference_position)[alone.times >= hit]
+    error = joint_errors(run, alone.reference_position[states]).mean(axis=1)
+    usual = joint_errors(alone, alone.reference_position).mean(axis=1)[alone.times >= hit]
     displacement = np.linalg.norm(run.position[:, :3] - alone.position[states, :3], axis=1)
     times, after = run.times, run.times >= hit
     is_off = np.flatnonzero(after & (error > _AS_BEFORE * np.nanmax(usual)))  # the last has none
@@ -135,12 +130,6 @@ def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
         displacement=displacement,
         error=error,
     )
-
-
-def joint_errors(run: Recording, reference: FloatArray) -> FloatArray:
-    """Mean distance (t + 1,) in rad of the joints from a reference (t + 1, n)."""
-    mean: FloatArray = error_measures.joint_errors(run.layout, run.position, reference).mean(axis=1)
-    return mean
 
 
 def lost_momentum(run: Recording, hit: float) -> float:
@@ -165,37 +154,31 @@ def _case(
     distance: float = 2.0,
     length: float = _LENGTH,
 ) -> RunSpec:
-    mass = impulse / _SPEED
-    throw = f"mass={mass} speed={_SPEED} at={at} from=front target=chest distance={distance}"
+    throw = f"mass={impulse / _SPEED} speed={_SPEED} at={at} from=front target=chest"
     return RunSpec(
         label,
         "humanoid",
         length,
-        reference={"reference": "clip", "clip": "walk"},
+        WALK,
         controller={"behaviour": behaviour},
-        throws=[throw] if impulse else [],
+        throws=[f"{throw} distance={distance}"] if impulse else [],
     )
 
 
-def _row(planned: float, reaction: Reaction, run: Recording) -> tuple[Cell, ...]:
-    spans = mode_spans(run)
-    lasting = [
-        sum((span.duration for span in spans if span.mode == mode), start=0.0) for mode in _MODES
-    ]
-    return (planned, reaction.impulse, reaction.peak, reaction.back, *lasting)
-
-
 def _draw(
-    alone: Recording, hits: Mapping[float, Recording], reactions: Mapping[float, Reaction]
-) -> "Figure":
-    """One panel an impulse with the root's displacement and height, and its modes above it."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 9), layout="constrained")
-    panels = figure.subplots(len(hits), 2, sharex="row")
+    result: StudyResult,
+    alone: Recording,
+    hits: Mapping[float, Recording],
+    reactions: Mapping[float, Reaction],
+) -> None:
+    """Two panels an impulse: the root's displacement and the joint error, and the modes."""
+    title = "hit against the chest at 1 s; the assistance is full in TRACK and BLEND"
+    panels = result.add_panels(result.name, len(hits), 2, (11.0, 9.0), title=title, same_x="row")
     marks, modes = Marks(), list[tuple[float, float, str]]()  # of all of them, for the legend
-    usual = joint_errors(alone, alone.reference_position)
-    for (impulse, run), (moved, error) in zip(hits.items(), panels, strict=True):
+    usual = joint_errors(alone, alone.reference_position).mean(axis=1)
+    for (impulse, run), (moved, error) in zip(
+        hits.items(), zip(panels[::2], panels[1::2], strict=True), strict=True
+    ):
         reaction = reactions[impulse]
         marks = Marks(
             throws=[float(run.times[tick]) for tick, each in enumerate(run.throws) if each],
@@ -212,26 +195,7 @@ def _draw(
             panel.set_ylim(bottom=0.0)
             panel.grid(alpha=0.3)
             marks.draw(panel, filled=False)
-    for panel in panels[-1]:
+    for panel in panels[-2:]:
         panel.set_xlabel("time (s)")
-    panels[0, 1].legend(fontsize="small")
-    replace(marks, modes=modes).explained(figure)
-    figure.suptitle("hit against the chest at 1 s; the assistance is full in TRACK and BLEND")
-    return figure
-
-
-def _poses(name: str, run: Recording) -> "Figure":
-    """Pictures from before the hit until it is over."""
-    from matplotlib.figure import Figure
-
-    picture = strip([run], _MOMENTS[name])
-    height, width, _ = picture.shape
-    figure = Figure(figsize=(_WIDTH, _WIDTH * height / width + 0.4), layout="constrained")
-    panel = figure.subplots()
-    panel.imshow(picture)
-    panel.set_title(_TITLES[name], fontsize="medium")
-    panel.set_axis_off()
-    return figure
-
-
-STUDY = ReactionStudy()
+    panels[1].legend(fontsize="small")
+    replace(marks, modes=modes).explained(result.figures[result.name])

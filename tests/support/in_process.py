@@ -8,6 +8,8 @@ from actuated_characters.bags.recording import ModeChange, Recording
 from actuated_characters.metrics.run_metrics import Measurement, Tick
 from actuated_characters.runs.plan import Plan, make_plan
 from actuated_characters.runs.planned_throws import plan_throws
+from actuated_characters.studies.catalogue import load_study
+from actuated_characters.studies.framework.result import StudyResult
 from actuated_characters.studies.framework.study import RunResult, RunSpec
 from controller_node.behaviours.base import ModeReport
 from controller_node.parameters import make_controller
@@ -45,11 +47,13 @@ class InProcessRunner:
             diverged = str(error)
         return RunResult(run.recording(), run.summary(), diverged)
 
-    def write(self, name: str, text: str) -> str:
-        """Write a file; returns its path."""
-        path = self._directory / name
-        path.write_text(text, encoding="utf-8")
-        return str(path)
+    def study(self, name: str) -> StudyResult:
+        """Run all of a study."""
+        return load_study(name).run(self)
+
+    def path(self, name: str) -> Path:
+        """Where a file that runs need is to be written."""
+        return self._directory / name
 
 
 class _Run:

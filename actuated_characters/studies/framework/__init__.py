@@ -1,1 +1,1 @@
-"""What the studies share."""
+"""The frame of all studies: runs, results, figures, and measures that several use."""

@@ -58,16 +58,13 @@ def write_box(runner: StudyRunner, box: Box) -> str:
     return _write(runner, box.name, box.link())
 
 
-def write_hinged_boxes(
-    runner: StudyRunner, name: str, parent: Box, child: Box, *, joint_in_parent: Vector
-) -> str:
-    """Write two boxes that float, joined by a hinge about y; returns the character's path.
+def write_hinged_boxes(runner: StudyRunner, name: str, parent: Box, child: Box) -> str:
+    """Write two boxes that float, joined by a hinge about y at the origins of both.
 
-    The hinge is at the child's origin, and at `joint_in_parent` (m) in the parent's frame.
+    Returns the character's path.
     """
     joint = f"""  <joint name="{HINGE}" type="continuous">
-    <parent link="{parent.name}"/><child link="{child.name}"/>
-    <origin xyz="{_listed(joint_in_parent)}"/><axis xyz="0 1 0"/>
+    <parent link="{parent.name}"/><child link="{child.name}"/><axis xyz="0 1 0"/>
   </joint>
 """
     return _write(runner, name, parent.link() + child.link() + joint)
@@ -75,8 +72,10 @@ def write_hinged_boxes(
 
 def _write(runner: StudyRunner, name: str, elements: str) -> str:
     text = f'<?xml version="1.0"?>\n<robot name="{name}">\n{elements}</robot>\n'
-    runner.write(f"{name}.urdf", text)
-    return runner.write(f"{name}.yaml", f"urdf: {name}.urdf\ninertia: file\n")
+    runner.path(f"{name}.urdf").write_text(text, encoding="utf-8")
+    path = runner.path(f"{name}.yaml")
+    path.write_text(f"urdf: {name}.urdf\ninertia: file\n", encoding="utf-8")
+    return str(path)
 
 
 def _listed(numbers: Sequence[float]) -> str:

@@ -1,7 +1,7 @@
-"""What the studies' figures share."""
+"""The common look of the figures of studies and reports."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 from msgs_config.arrays import FloatArray
 
@@ -9,18 +9,17 @@ if TYPE_CHECKING:  # it takes a second to import
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from actuated_characters.render.engine.renderer import Picture
-
-_WIDTH, _TITLE = 12.0, 0.3  # inches, of a figure of pictures and of a name in it
-
 THEORY: dict[str, Any] = {"color": "black", "linestyle": "--", "linewidth": 1.0}
-"""How a line of theory is drawn."""
+"""The style of a line of theory."""
 
 
 def make_panels(
-    rows: int, columns: int, size: tuple[float, float], *, same_x: bool = False
+    rows: int, columns: int, size: tuple[float, float], *, same_x: bool | Literal["row"] = False
 ) -> "tuple[Figure, list[Axes]]":
-    """An empty figure of a size in inches, and its panels row by row."""
+    """An empty figure of a size in inches, and its panels row by row.
+
+    `same_x` says which of them share their axis: all, or those of a row.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size, layout="constrained")
@@ -29,7 +28,7 @@ def make_panels(
 
 
 def label(axes: "Axes", x: str, y: str, title: str = "", *, legend: Any = "best") -> None:
-    """Name what a panel shows, with units; `legend` is where that lies, None for no legend."""
+    """Label a panel's axes, with units; `legend` is the place of its legend, None for none."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title, fontsize="medium")
@@ -50,17 +49,3 @@ def draw_over_theory(
         axes.plot(times, simulated[:, column], linewidth=2.5, alpha=0.7, label=name)
         named = "theory" if column == len(names) - 1 else None
         axes.plot(times, theory[:, column], label=named, **THEORY)
-
-
-def show_pictures(pictures: "Mapping[str, Picture]", *, columns: int = 1) -> "Figure":
-    """Rendered pictures row by row in a figure, each below its name."""
-    rows = -(-len(pictures) // columns)
-    height, width = next(iter(pictures.values())).shape[:2]
-    tall = _WIDTH / columns * height / width + _TITLE
-    figure, panels = make_panels(rows, columns, (_WIDTH, rows * tall))
-    for panel in panels:
-        panel.set_axis_off()
-    for panel, (name, picture) in zip(panels, pictures.items(), strict=False):
-        panel.imshow(picture)
-        panel.set_title(name, fontsize="medium", loc="left")
-    return figure

@@ -1,6 +1,5 @@
-"""Makes a study's runs, over topics, and keeps what it found."""
+"""Makes a study's runs, over topics."""
 
-import csv
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -14,15 +13,14 @@ from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned_throws import plan_throws
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.run_directory import prepare_directory, read_figures
-from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyResult
+from actuated_characters.studies.framework.study import RunResult, RunSpec
 from msgs_config.errors import RunError
 
 Report = Callable[[str, float], None]
-"""Is told a run's label, and which share of it is done."""
+"""Called with a run's label and the share of it that is done."""
 
 _DIVERGED = "diverged at tick"
 _UNREAD = ["odom", "visualization", "controller_node/net_wrench"]  # topics, at a cost each tick
-_DPI = 110
 
 
 class TopicRunner:
@@ -67,12 +65,10 @@ class TopicRunner:
                 directory.parent.rmdir()
         return RunResult(recording, summary, diverged)
 
-    def write(self, name: str, text: str) -> str:
-        """Write a file below the study."""
+    def path(self, name: str) -> Path:
+        """The path for a file of that name; its directory exists."""
         self._directory.mkdir(parents=True, exist_ok=True)
-        path = self._directory / name
-        path.write_text(text, encoding="utf-8")
-        return str(path)
+        return self._directory / name
 
 
 def _check_pushes(pushes: Sequence[PlannedPush], run: Recording) -> None:
@@ -84,25 +80,3 @@ def _check_pushes(pushes: Sequence[PlannedPush], run: Recording) -> None:
         applied = run.applied_wrench[tick] if run.applied_wrench else None
         if applied is None or push.link not in applied.links:
             raise RunError(f"the push on '{push.link}' at {push.stamp_ns} ns did not act")
-
-
-def write_result(directory: Path, name: str, result: StudyResult) -> list[Path]:
-    """Write table (CSV), curves (CSV) and pictures (PNG and SVG); returns the files."""
-    directory.mkdir(parents=True, exist_ok=True)
-    assert name not in result.curves, "the table has that file's name"
-    table = directory / f"{name}.csv"
-    with table.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(result.columns)
-        writer.writerows(result.rows)
-    files = [table]
-    for stem, (columns, values) in result.curves.items():
-        path = directory / f"{stem}.csv"
-        np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
-        files.append(path)
-    for stem, figure in result.figures.items():
-        for suffix in ("png", "svg"):
-            path = directory / f"{stem}.{suffix}"
-            figure.savefig(path, dpi=_DPI)
-            files.append(path)
-    return files

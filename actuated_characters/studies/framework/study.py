@@ -1,23 +1,24 @@
-"""What a study is: runs that are asked for one by one, and what was found by them."""
+"""A study: runs that it asks for one by one, and a result that it fills."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from pathlib import Path
+from typing import Protocol
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.runs.planned_wrenches import PlannedPush
-from msgs_config.arrays import FloatArray
+from actuated_characters.studies.framework.result import StudyResult
+from msgs_config.character.model import Vector
+from msgs_config.messages.clock import FIRST_TICK, TickClock
 
-if TYPE_CHECKING:  # it takes a second to import
-    from matplotlib.figure import Figure
-
-Cell = str | int | float | bool | None
-"""What a table's field holds; None where nothing can be said."""
+WALK: Mapping[str, object] = {"reference": "clip", "clip": "walk"}
+HOLD: Mapping[str, object] = {"reference": "hold"}
+"""References that several studies track."""
 
 
 @dataclass(frozen=True)
 class RunSpec:
-    """One run of a study: what `actuated_characters run` takes."""
+    """One run of a study, with the options of `actuated_characters run`."""
 
     label: str  # unique in its study; also the name of its directory
     character: str  # a shipped one, or a file's path
@@ -30,17 +31,28 @@ class RunSpec:
     contacts: bool = False  # whether to record them
 
 
+def plan_push(time: float, rate: int, link: str, force: Vector) -> PlannedPush:
+    """A force in N, world axes, on a link's centre of mass from the tick at a time in s on."""
+    stamp = TickClock(rate).stamp_ns(FIRST_TICK + round(time * rate))
+    return PlannedPush(stamp, link, (*force, 0.0, 0.0, 0.0))
+
+
 @dataclass(frozen=True)
 class RunResult:
-    """What a run gave."""
+    """A run's recording and summary."""
 
     recording: Recording
     summary: Mapping[str, object]  # of summary.json
     diverged: str = ""  # why it ended before its time; "" if it did not
 
+    def measured(self, name: str) -> float | bool | None:
+        """A number or a yes or no of summary.json; None where that has none."""
+        value = self.summary[name]
+        return value if isinstance(value, bool | int | float) else None
+
 
 class StudyRunner(Protocol):
-    """Where runs are made."""
+    """Makes the runs of a study."""
 
     def run(self, case: RunSpec) -> RunResult:
         """Run a case over topics, to its end or until it diverges.
@@ -50,30 +62,22 @@ class StudyRunner(Protocol):
         """
         ...
 
-    def write(self, name: str, text: str) -> str:
-        """Write a file that runs need, such as a URDF, below the study; returns its path."""
+    def path(self, name: str) -> Path:
+        """The path for a file that runs need, such as a URDF, below the study's directory."""
         ...
 
 
 @dataclass(frozen=True)
-class StudyResult:
-    """A table, pictures, and the curves behind them."""
+class Study:
+    """One of the lecture's topics: a module's `TITLE`, `RUNS` and `run`."""
 
-    columns: Sequence[str]  # with their units
-    rows: Sequence[Sequence[Cell]]
-    figures: Mapping[str, "Figure"]  # by the name of their files
-    curves: Mapping[str, tuple[Sequence[str], FloatArray]] = field(default_factory=dict)
-    # by the name of a CSV file: column names, and an array with a column for each
-    notes: Sequence[str] = ()  # sentences that say what is seen
-
-
-class Study(Protocol):
-    """One of the lecture's topics."""
-
-    name: str
+    name: str  # of the module, of the command's argument and of the files
     title: str  # one line
     runs: int  # how many it asks for, about; for the progress bar
+    fill: Callable[[StudyRunner, StudyResult], None]  # makes the runs, and adds what they show
 
     def run(self, runner: StudyRunner) -> StudyResult:
-        """Run its cases and say what was found."""
-        ...
+        """Make the runs and return the filled result."""
+        result = StudyResult(self.name)
+        self.fill(runner, result)
+        return result

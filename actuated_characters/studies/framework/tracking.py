@@ -1,12 +1,29 @@
-"""How well a motion is tracked: overshoot, lag, and what theory says."""
+"""Measures of tracking: errors, overshoot, lag, time of a fall; and their theory."""
 
 import numpy as np
 
+from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics import error_measures
 from msgs_config.arrays import FloatArray
 
 
+def joint_errors(run: Recording, reference: FloatArray | None = None) -> FloatArray:
+    """Angle (r, j) in rad of each of j hinges and balls from where it is to be.
+
+    `reference` (r, n) is that of the first r states; by default the run's own, before each tick.
+    """
+    desired = run.reference_position[:-1] if reference is None else reference
+    return error_measures.joint_errors(run.layout, run.position[: len(desired)], desired)
+
+
+def root_force_share(run: Recording, ticks: int | None = None) -> float:
+    """Size of the root's force over the character's weight, mean over so many first ticks."""
+    weight = run.character.mass * float(run.parameters["gravity"])
+    return float(np.linalg.norm(run.effort[:ticks, :3], axis=1).mean()) / weight
+
+
 def overshoot(angle: FloatArray, reference: FloatArray) -> float:
-    """How far an angle (t,) goes beyond the extremes of its reference (t,), over their distance.
+    """Overshoot of an angle (t,) beyond the extremes of its reference (t,), over their distance.
 
     Negative where it stays within both. Of a step it is the overshoot of the step's response.
     """
@@ -65,6 +82,15 @@ def inertialess_response(
     return angle
 
 
+def fall_time(run: Recording) -> float | None:
+    """Time in s at which the root first is below half of its desired height; None if never.
+
+    A reference below 0.5 m lies by intention, which is no fall.
+    """
+    height, desired = run.position[:-1, 2], run.reference_position[:-1, 2]
+    return error_measures.fall_time(run.times[:-1], height, desired)
+
+
 def delayed_spectral_radius(
     mass_matrix: FloatArray,
     stiffness: FloatArray,
@@ -91,22 +117,14 @@ def delayed_spectral_radius(
     """
     size, blocks = len(stiffness), 2 + delay_ticks
     implicit = mass_matrix + np.diag(damping * period)
-    by_position = -np.linalg.solve(implicit, np.diag(stiffness))
-    by_velocity = -np.linalg.solve(implicit, np.diag(damping + stiffness * period))
-    one, moved = np.eye(size), period * period * (substeps + 1) / (2 * substeps)
-    # of position, velocity, and what was asked for a tick ago, two ticks ago, ...
-    step = np.zeros((blocks, size, blocks, size))
-    step[0, :, 0], step[0, :, 1], step[1, :, 1] = one, period * one, one
-    asked = np.zeros((size, blocks, size))
-    asked[:, 0], asked[:, 1] = by_position, by_velocity
-    acting = asked
-    if delay_ticks:
-        acting = np.zeros_like(asked)
-        acting[:, blocks - 1] = one
-        step[2] = asked
-    for block in range(3, blocks):
-        step[block, :, block - 1] = one
-    step[0] += moved * acting
-    step[1] += period * acting
-    matrix = step.reshape(blocks * size, blocks * size)
+    # blocks: position, velocity, and what was asked for a tick ago, two ticks ago, ...
+    every = np.eye(blocks * size).reshape(blocks, size, blocks * size)
+    asked = np.zeros((size, blocks * size))
+    asked[:, :size] = -np.linalg.solve(implicit, np.diag(stiffness))
+    asked[:, size : 2 * size] = -np.linalg.solve(implicit, np.diag(damping + stiffness * period))
+    acting = every[-1] if delay_ticks else asked
+    moved = period * period * (substeps + 1) / (2 * substeps)
+    position = every[0] + period * every[1] + moved * acting
+    velocity = every[1] + period * acting
+    matrix = np.concatenate((position, velocity, *([asked] * bool(delay_ticks)), *every[2:-1]))
     return float(np.abs(np.linalg.eigvals(matrix)).max())

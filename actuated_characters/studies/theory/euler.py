@@ -45,13 +45,11 @@ class Motion:
     angular_velocity: FloatArray  # (t, 3) rad/s, body axes
 
 
-def net_load(loads: Sequence[Load], turn_xyzw: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Force (3,) in N and torque (..., 3) in N m about the centre, world, at turns (..., 4)."""
-    return _net_load(loads, rotations.matrix(turn_xyzw))
+def net_load(loads: Sequence[Load], turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Force (3,) in N and torque (..., 3) in N m about the centre, world.
 
-
-def _net_load(loads: Sequence[Load], turn: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """`net_load` at rotation matrices (..., 3, 3)."""
+    `turn` (..., 3, 3) are rotation matrices of the body.
+    """
     force, torque = np.zeros(3), np.zeros((*turn.shape[:-2], 3))
     for load in loads:
         force += load.force
@@ -93,7 +91,7 @@ def _rate(body: RigidBody, loads: Sequence[Load], state: FloatArray) -> FloatArr
     """The rate (13,) of centre, quaternion, velocity and angular velocity: `dq/dt = q w / 2`."""
     turn, velocity, spin = state[3:7], state[7:10], state[10:13]
     matrix = rotations.matrix(rotations.normalised(turn))
-    force, torque = _net_load(loads, matrix)
+    force, torque = net_load(loads, matrix)
     torque_in_body = matrix.T @ torque
     vector, scalar = turn[:3], turn[3]
     turning = 0.5 * np.append(scalar * spin + cross(vector, spin), -vector @ spin)

@@ -1,4 +1,4 @@
-"""How the mass of `lift` answers to a law, what theory says of that, and where it is unstable."""
+"""Responses of the mass of `lift` to control laws, their theory, and bounds of stability."""
 
 import math
 from collections.abc import Callable
@@ -14,12 +14,11 @@ STIFFNESS, CRITICAL = 100.0, 20.0  # N/m, N s/m: the character's own
 _RESOLUTION = 1.05  # of a bound: one that is stable and one that is not are this near
 _BRACKET = (0.7, 1.4)  # of the bound by theory, where the search begins
 _TAIL = RATE // 2  # states that a steady state is the mean of, where nothing swings
-_SECOND_ORDER = ("p", "pd", "stable_pd", "pd_gravity")
 
 
 @dataclass(frozen=True)
 class Gains:
-    """A law and its gains."""
+    """A law and its gains, and the theory of both."""
 
     law: str
     stiffness: float  # N/m
@@ -31,10 +30,34 @@ class Gains:
         """Critically damped, in continuous time."""
         return cls(law, stiffness, second_order.critical_damping(stiffness, MASS))
 
+    @property
+    def error_by_theory(self) -> float:
+        """The steady-state error, m: `m g / kp`, unless the law removes it."""
+        return 0.0 if self.law in ("pd_gravity", "pid") else WEIGHT / self.stiffness
+
+    @property
+    def ratio_by_theory(self) -> float | None:
+        """The damping ratio: of stable PD in its own closed form, else of continuous time."""
+        if self.law == "pid":
+            return None
+        if self.law == "stable_pd":
+            return second_order.stable_pd_damping_ratio(self.stiffness, self.damping, MASS, PERIOD)
+        return second_order.damping_ratio(self.stiffness, self.damping, MASS)
+
+    @property
+    def stable_by_theory(self) -> bool:
+        """True if the law with these gains is stable; PID by its bound in continuous time."""
+        gains = self.stiffness, self.damping, MASS
+        if self.law == "pid":
+            return self.integral < second_order.largest_integral_gain(*gains)
+        if self.law == "stable_pd":
+            return second_order.stable_pd_is_stable(*gains, PERIOD)
+        return second_order.explicit_is_stable(*gains, PERIOD)
+
 
 @dataclass(frozen=True)
 class Response:
-    """How the mass went, from rest at 0 towards the target, and what that was like."""
+    """A motion of the mass, from rest at 0 m towards the target, and its measures."""
 
     gains: Gains
     times: FloatArray  # (t,) s
@@ -43,52 +66,23 @@ class Response:
 
     @property
     def stable(self) -> bool:
-        """Whether it came nearer to its rest rather than farther from it."""
-        wider = second_order.swings_wider(self.height, TARGET - error_by_theory(self.gains))
+        """True if the motion decays towards its rest instead of growing."""
+        wider = second_order.swings_wider(self.height, TARGET - self.gains.error_by_theory)
         return not (self.diverged or wider)
 
     @property
     def rest(self) -> float:
-        """Where it came to rest (m), or what it swings about."""
-        if self.gains.law in _SECOND_ORDER:
-            return second_order.identify(self.height, PERIOD).rest
-        return float(self.height[-_TAIL:].mean())
+        """The height (m) at which the mass comes to rest, or about which it swings."""
+        if self.gains.law == "pid":
+            return float(self.height[-_TAIL:].mean())
+        return second_order.identify(self.height, PERIOD).rest
 
     @property
     def ratio(self) -> float | None:
-        """Its damping ratio; a PID is not of second order."""
-        if self.gains.law not in _SECOND_ORDER:
+        """The damping ratio; None for PID, which is not of second order."""
+        if self.gains.law == "pid":
             return None
         return second_order.identify(self.height, PERIOD).damping_ratio
-
-
-def error_by_theory(gains: Gains) -> float:
-    """The steady-state error, m."""
-    if gains.law in ("pd_gravity", "pid"):
-        return 0.0
-    return second_order.steady_state_error(WEIGHT, gains.stiffness)
-
-
-def ratio_by_theory(gains: Gains) -> float | None:
-    """The damping ratio: of stable PD in its own closed form, else of continuous time."""
-    if gains.law not in _SECOND_ORDER:
-        return None
-    if gains.law == "stable_pd":
-        return second_order.stable_pd_damping_ratio(gains.stiffness, gains.damping, MASS, PERIOD)
-    return second_order.damping_ratio(gains.stiffness, gains.damping, MASS)
-
-
-def stable_by_theory(gains: Gains) -> bool:
-    """Whether a law with these gains is stable; PID by its bound in continuous time."""
-    if gains.law == "pid":
-        limit = second_order.largest_integral_gain(gains.stiffness, gains.damping, MASS)
-        return gains.integral < limit
-    known = (
-        second_order.stable_pd_is_stable
-        if gains.law == "stable_pd"
-        else second_order.explicit_is_stable
-    )
-    return known(gains.stiffness, gains.damping, MASS, PERIOD)
 
 
 @dataclass(frozen=True)

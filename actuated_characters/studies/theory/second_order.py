@@ -1,4 +1,4 @@
-"""One mass under PD or PID control: what theory says of it, and what a recorded motion shows.
+"""One mass under PD or PID control: closed forms, and the identification of a recorded motion.
 
 m is the mass (kg), kp the stiffness (N/m), kd the damping (N s/m), ki the integral gain (N/(m s)),
 h the control period (s). Sources: Astrom and Murray 2008, "Feedback Systems", chapters 6 and 10;
@@ -33,13 +33,8 @@ def stable_pd_damping_ratio(stiffness: float, damping: float, mass: float, perio
 
 
 def overshoot(ratio: float) -> float:
-    """How far beyond its end a step response goes, as a share of the way: `exp(-pi z / ...)`."""
+    """Overshoot of a step response as a share of the step: `exp(-pi z / sqrt(1 - z^2))`."""
     return math.exp(-math.pi * ratio / math.sqrt(1.0 - ratio**2)) if ratio < 1.0 else 0.0
-
-
-def steady_state_error(load: float, stiffness: float) -> float:
-    """Where a spring holds a constant load (N): the error in m, `load / kp`."""
-    return load / stiffness
 
 
 def largest_integral_gain(stiffness: float, damping: float, mass: float) -> float:
@@ -48,12 +43,12 @@ def largest_integral_gain(stiffness: float, damping: float, mass: float) -> floa
 
 
 def explicit_is_stable(stiffness: float, damping: float, mass: float, period: float) -> bool:
-    """Whether explicit PD is stable: `kp h^2 + 2 kd h < 4 m`."""
+    """True if explicit PD is stable: `kp h^2 + 2 kd h < 4 m`."""
     return stiffness * period**2 + 2.0 * damping * period < 4.0 * mass
 
 
 def stable_pd_is_stable(stiffness: float, damping: float, mass: float, period: float) -> bool:
-    """Whether stable PD is stable: `3 kp h^2 < 4 m + 2 kd h`."""
+    """True if stable PD is stable: `3 kp h^2 < 4 m + 2 kd h`."""
     return 3.0 * stiffness * period**2 < 4.0 * mass + 2.0 * damping * period
 
 
@@ -75,7 +70,7 @@ def largest_stable_pd_stiffness(mass: float, period: float) -> float:
 
 @dataclass(frozen=True)
 class Oscillation:
-    """What a motion of second order is like."""
+    """Parameters of a motion of second order."""
 
     damping_ratio: float
     frequency: float  # undamped, rad/s
@@ -99,13 +94,13 @@ def identify(track: FloatArray, period: float) -> Oscillation:
 
 
 def measured_overshoot(track: FloatArray, rest: float) -> float:
-    """How far a track (t,) goes beyond where it comes to rest, as a share of the way there."""
+    """Overshoot of a track (t,) beyond its rest, as a share of the way there."""
     way = rest - track[0]
     return max(0.0, float(((track - rest) / way).max()))
 
 
 def settling_time(times: FloatArray, track: FloatArray, rest: float) -> float | None:
-    """When (s) a track (t,) is within 2 % of its way for good; None if it never is."""
+    """Time in s from which a track (t,) stays within 2 % of its way; None if it never does."""
     outside = np.flatnonzero(np.abs(track - rest) > _SETTLED * abs(rest - track[0]))
     if not len(outside):
         return 0.0
@@ -114,7 +109,7 @@ def settling_time(times: FloatArray, track: FloatArray, rest: float) -> float | 
 
 
 def swings_wider(track: FloatArray, rest: float) -> bool:
-    """Whether a track (t,) is farther from its rest in its last quarter than in its second."""
+    """True if a track (t,) is farther from its rest in its last quarter than in its second."""
     distance, quarter = np.abs(track - rest), len(track) // 4
     return bool(distance[-quarter:].max() > distance[quarter : 2 * quarter].max())
 
@@ -129,7 +124,7 @@ def step_response(
     """
     frequency = math.sqrt(stiffness / mass)
     ratio = damping_ratio(stiffness, damping, mass)
-    rest = 1.0 - steady_state_error(load, stiffness)
+    rest = 1.0 - load / stiffness
     if abs(ratio - 1.0) < 1e-9:
         away: FloatArray = (1.0 + frequency * times) * np.exp(-frequency * times)
     else:

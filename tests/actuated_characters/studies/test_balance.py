@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 
 class Weakling:
-    """A runner in which all who are pushed harder than by an impulse lie down."""
+    """A runner in which every character that is pushed harder than by an impulse lies down."""
 
     def __init__(self, outcome: RunResult, impulse: float) -> None:
         self._outcome = outcome
@@ -32,13 +32,12 @@ class Weakling:
         down[-1, 2] = 0.1
         return replace(self._outcome, recording=replace(run, position=down))
 
-    def write(self, name: str, text: str) -> str:
+    def path(self, name: str) -> Path:
         raise AssertionError("it needs no file")
 
 
 @pytest.fixture(scope="module")
-def stood(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
-    runner = InProcessRunner(tmp_path_factory.mktemp("balance"))
+def stood(runner: InProcessRunner) -> RunResult:
     return runner.run(balance._case("stand", 2.0))
 
 
@@ -48,20 +47,17 @@ def test_it_stands_by_joint_efforts_alone(stood: RunResult) -> None:
     assert not stood.recording.effort[:, :6].any()
 
 
-def test_without_the_virtual_force_it_falls(tmp_path: Path) -> None:
-    outcome = InProcessRunner(tmp_path).run(
-        balance._case("without", 2.0, {"balance.enabled": False})
-    )
+def test_without_the_virtual_force_it_falls(runner: InProcessRunner) -> None:
+    outcome = runner.run(balance._case("without", 2.0, {"balance.enabled": False}))
 
     assert not balance.survives(outcome)
     assert 0.5 < balance.standing_time(outcome.recording) < 2.0
 
 
 @pytest.mark.parametrize(("x", "y"), balance._DIRECTIONS.values(), ids=balance._DIRECTIONS)
-def test_a_push_has_its_impulse_and_its_direction(tmp_path: Path, x: float, y: float) -> None:
-    """Momentum: over the push's tenth of a second the centre of mass gains about J / m."""
-    runner = InProcessRunner(tmp_path)
-
+def test_a_push_has_its_impulse_and_its_direction(
+    runner: InProcessRunner, x: float, y: float
+) -> None:
     run = runner.run(balance._case("pushed", 1.2, impulse=(6.0 * x, 6.0 * y))).recording
 
     wrenches = [w.wrenches[0, :2] for w in run.applied_wrench if w is not None and len(w.links)]
@@ -76,10 +72,10 @@ def test_bisection_finds_the_largest_impulse(stood: RunResult, bearable: float) 
 
     assert limit.survived <= bearable < limit.fell
     assert limit.fell - limit.survived <= 0.5
-    assert len(runner.impulses) <= balance.STUDY.runs / 4
+    assert len(runner.impulses) <= balance.RUNS / 4
 
 
-def test_who_lies_on_the_back_in_the_end_has_not_survived(stood: RunResult) -> None:
+def test_a_character_on_its_back_has_not_survived(stood: RunResult) -> None:
     run = stood.recording
     position = run.position.copy()
     backwards = rotations.exp(np.array((0.0, -1.5, 0.0)))

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.studies.catalogue import load_study
-from actuated_characters.studies.equation import TickTime, close
-from actuated_characters.studies.framework.study import RunSpec, StudyResult
+from actuated_characters.studies.equation import close
+from actuated_characters.studies.framework.study import RunSpec
 from msgs_config.messages.wrenches import WrenchArrays
 from tests.support.in_process import InProcessRunner
 
@@ -19,32 +18,19 @@ NOTICED = 1e-3
 
 
 @pytest.fixture(scope="module")
-def runner(tmp_path_factory: pytest.TempPathFactory) -> InProcessRunner:
-    return InProcessRunner(tmp_path_factory.mktemp("equation"))
-
-
-@pytest.fixture(scope="module")
-def result(runner: InProcessRunner) -> StudyResult:
-    return load_study("equation").run(runner)
-
-
-@pytest.fixture(scope="module")
 def stood(runner: InProcessRunner) -> Recording:
     """Half a second of standing with assistance, its contacts recorded."""
     return runner.run(RunSpec("short", "humanoid", 0.5, contacts=True)).recording
 
 
 def test_the_equation_closes_in_every_tick_and_not_without_the_contacts(
-    result: StudyResult,
+    runner: InProcessRunner,
 ) -> None:
-    rows = {str(row[0]): dict(zip(result.columns, row, strict=True)) for row in result.rows}
+    result = runner.study("equation")
 
-    assert set(rows) == {"walk", "stand", "fall"}
-    for row in rows.values():
-        largest, without = row["largest"], row["p50 without contacts"]
-        assert isinstance(largest, float) and isinstance(without, float)
-        assert largest < ROUNDING
-        assert without > 0.1
+    assert result.column("run") == ["walk", "stand", "fall"]
+    assert max(result.column("largest")) < ROUNDING
+    assert min(result.column("p50 without contacts")) > 0.1
 
 
 def test_standing_still_ground_and_assistance_carry_the_weight(stood: Recording) -> None:
@@ -86,9 +72,3 @@ def test_what_was_not_so_shows(stood: Recording, what: str) -> None:
     # Assert: in that tick, and, of a velocity, in the next one that begins with it
     shown = np.flatnonzero(relative > NOTICED).tolist()
     assert shown == ([tick, tick + 1] if what == "velocity" else [tick])
-
-
-def test_the_parts_of_a_tick_add_up_to_it() -> None:
-    tick = TickTime(physics=120.0, control=60.0, over_topics=700.0)
-
-    assert tick.physics + tick.control + tick.transport == tick.over_topics
