@@ -14,8 +14,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Vector3
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, MultiDOFJointState
+from std_msgs.msg import Header
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
@@ -49,6 +52,23 @@ def split_stamp(stamp_ns: int) -> tuple[int, int]:
     return divmod(stamp_ns, NANOSECONDS_PER_SECOND)
 
 
+def read_stamp(stamp: Time) -> int:
+    """A message's stamp in ns."""
+    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
+
+
+def make_header(stamp_ns: int, frame_id: str) -> Header:
+    """The header of a typed message."""
+    seconds, nanoseconds = split_stamp(stamp_ns)
+    return Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame_id)
+
+
+def make_vector(xyz: Sequence[float]) -> Vector3:
+    """A typed vector of three numbers."""
+    x, y, z = xyz
+    return Vector3(x=x, y=y, z=z)
+
+
 def with_stamp(raw: bytes, stamp_ns: int) -> bytes:
     """A serialised little-endian message that begins with a stamp, with another one instead."""
     return raw[:_STAMP] + struct.pack("<iI", *split_stamp(stamp_ns)) + raw[_NAMES_START:]
@@ -69,24 +89,21 @@ def frame_id_of(raw: bytes) -> str:
     return raw[_FRAME_START : _FRAME_START + length].rstrip(b"\0").decode(errors="replace")
 
 
-def padding(length: int, alignment: int) -> int:
+def _padding(length: int, alignment: int) -> int:
     """How many bytes a serialised item of this alignment is preceded by, after `length` bytes."""
     return -length % alignment
 
 
-def cdr_names(names: Sequence[str], frame_id: str = "") -> bytes:
+def _cdr_names(names: Sequence[str], frame_id: str) -> bytes:
     """The bytes from after the stamp to the end of the names."""
-    content = bytearray(_cdr_text(frame_id))
-    content += struct.pack("<I", len(names))
-    for name in names:
-        content += _cdr_text(name)
-    return bytes(content)
+    count = struct.pack("<I", len(names))
+    return _cdr_text(frame_id) + count + b"".join(map(_cdr_text, names))
 
 
 def _cdr_text(text: str) -> bytes:
-    """A text with its length, padded for whatever comes after it, which is never a double."""
+    """A text with its length, padded for the next item, which is never a double."""
     content = text.encode() + b"\0"
-    return struct.pack("<I", len(content)) + content + bytes(padding(len(content), 4))
+    return struct.pack("<I", len(content)) + content + bytes(_padding(len(content), 4))
 
 
 def decode(raw: bytes, message_type: type) -> Any:
@@ -96,7 +113,8 @@ def decode(raw: bytes, message_type: type) -> Any:
         MessageError: the bytes are no such message.
     """
     try:
-        _check_lengths(raw, _ENTRY_BYTES.get(message_type, ()))
+        if message_type in _ENTRY_BYTES:
+            _check_lengths(raw, _ENTRY_BYTES[message_type])
         return deserialize_message(raw, message_type)
     except Exception as error:  # rclpy has no type of its own for what cannot be decoded
         raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
@@ -105,15 +123,13 @@ def decode(raw: bytes, message_type: type) -> Any:
 def _check_lengths(raw: bytes, entry_bytes: Sequence[int]) -> None:
     """Raise struct.error or ValueError if lists are longer than the message is.
 
-    The middleware finds that, too, but prints a line of its own at each such message. The lists
-    are names, after the header, and then some of doubles, of so many bytes an entry.
+    The middleware finds that, too, but prints a line at each such message. The lists are names,
+    after the header, and then some of doubles, of so many bytes an entry.
     """
-    if not entry_bytes:
-        return
     order = "<" if raw[1] & 1 else ">"
 
     def count_at(offset: int) -> tuple[int, int]:
-        offset += padding(offset, 4)  # the encapsulation header has four bytes as well
+        offset += _padding(offset, 4)  # the encapsulation header has four bytes as well
         (count,) = struct.unpack_from(f"{order}I", raw, offset)
         return count, offset + 4
 
@@ -125,7 +141,7 @@ def _check_lengths(raw: bytes, entry_bytes: Sequence[int]) -> None:
     for size in entry_bytes:
         count, offset = count_at(offset)
         if count:
-            offset += padding(offset - 4, 8) + size * count
+            offset += _padding(offset - 4, 8) + size * count
     if offset > len(raw):
         raise ValueError("a list is longer than the message")
 
@@ -134,7 +150,7 @@ class JointStateEncoder:
     """Serialises JointState messages that all have the same names and `frame_id`."""
 
     def __init__(self, names: Sequence[str], frame_id: str = "") -> None:
-        self._head = CDR_LITTLE_ENDIAN + bytes(8) + cdr_names(names, frame_id)
+        self._head = CDR_LITTLE_ENDIAN + bytes(8) + _cdr_names(names, frame_id)
 
     def encode(
         self,
@@ -149,26 +165,8 @@ class JointStateEncoder:
         for values in (position, velocity, effort):
             content += struct.pack("<I", len(values))
             if len(values):
-                content += bytes(padding(len(content) - 4, 8)) + values.tobytes()
+                content += bytes(_padding(len(content) - 4, 8)) + values.tobytes()
         return bytes(content)
-
-
-class DoublesEncoder:
-    """Serialises messages of a stamp, texts that never change and, after all else, doubles.
-
-    So are `nav_msgs/Odometry` and `geometry_msgs/WrenchStamped`.
-    """
-
-    def __init__(self, *texts: str) -> None:
-        """The texts in the message's order, its `frame_id` first."""
-        head = CDR_LITTLE_ENDIAN + bytes(8) + b"".join(_cdr_text(text) for text in texts)
-        self._head = head + bytes(padding(len(head) - 4, 8))
-
-    def encode(self, stamp_ns: int, values: FloatArray) -> bytes:
-        """The serialised message with all its doubles (m,), in the message's order."""
-        content = bytearray(self._head)
-        struct.pack_into("<iI", content, 4, *split_stamp(stamp_ns))
-        return bytes(content + values.tobytes())
 
 
 def encode_clock(stamp_ns: int) -> bytes:
@@ -196,14 +194,13 @@ class JointStateDecoder:
     def _decode_slowly(self, raw: bytes) -> JointArrays:
         message = decode(raw, JointState)
         names, frame_id = tuple(message.name), str(message.header.frame_id)
-        head = cdr_names(names, frame_id)
+        head = _cdr_names(names, frame_id)
         if raw.startswith(head, _NAMES_START):
             if len(self._kept) == _MAX_KEPT_SENDERS:  # each start of a simulator is a new sender
                 del self._kept[next(iter(self._kept))]
             self._kept[head] = names, frame_id
-        stamp = message.header.stamp
         return JointArrays(
-            stamp_ns=stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec,
+            stamp_ns=read_stamp(message.header.stamp),
             names=names,
             position=np.array(message.position, dtype=float),
             velocity=np.array(message.velocity, dtype=float),
@@ -221,7 +218,7 @@ def _read_doubles(raw: bytes, offset: int, names: tuple[str, ...], frame_id: str
             (count,) = struct.unpack_from("<I", raw, offset)
             offset += 4
             if count:
-                offset += padding(offset - 4, 8)
+                offset += _padding(offset - 4, 8)
             arrays.append(np.frombuffer(raw, "<f8", count, offset).copy() if count else _EMPTY)
             offset += 8 * count
     except (struct.error, ValueError) as error:

@@ -8,16 +8,21 @@ in kg, m and m/s, world axes; everything else in the message is unused. Where th
 from dataclasses import dataclass
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, Vector3
+from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, decode
+from msgs_config.messages.joint_state import (
+    JointStateDecoder,
+    JointStateEncoder,
+    decode,
+    make_header,
+    make_vector,
+    read_stamp,
+)
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, throw_of
-from msgs_config.messages.wrenches import WORLD, encode_multi_dof
-
-_POSE, _TWIST = slice(0, 7), slice(7, 13)
+from msgs_config.messages.wrenches import WORLD
 
 
 @dataclass(frozen=True)
@@ -60,8 +65,23 @@ def ball_names(count: int) -> tuple[str, ...]:
 
 def encode_balls(balls: BallStates, frame_id: str = WORLD) -> bytes:
     """The serialised message."""
-    rows = (balls.motion[:, _POSE], balls.motion[:, _TWIST], ())
-    return encode_multi_dof(balls.stamp_ns, balls.names, *rows, frame_id=frame_id)
+    rows = balls.motion.tolist()
+    message = MultiDOFJointState(
+        header=make_header(balls.stamp_ns, frame_id),
+        joint_names=list(balls.names),
+        transforms=[
+            Transform(
+                translation=make_vector(row[:3]),
+                rotation=Quaternion(x=row[3], y=row[4], z=row[5], w=row[6]),
+            )
+            for row in rows
+        ],
+        twist=[
+            Twist(linear=make_vector(row[7:10]), angular=make_vector(row[10:13])) for row in rows
+        ],
+    )
+    raw: bytes = serialize_message(message)
+    return raw
 
 
 def decode_balls(raw: bytes) -> BallStates:
@@ -71,14 +91,13 @@ def decode_balls(raw: bytes) -> BallStates:
         MessageError: the bytes are no such message.
     """
     message = decode(raw, MultiDOFJointState)
-    stamp = message.header.stamp
     rows = []
     for pose, twist in zip(message.transforms, message.twist, strict=False):
         at, turn, w = _xyz(pose.translation), _xyz(pose.rotation), pose.rotation.w
         rows.append((*at, *turn, w, *_xyz(twist.linear), *_xyz(twist.angular)))
-    stamp_ns = stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
     motion = np.array(rows, dtype=float).reshape(-1, 13)
-    return BallStates(stamp_ns, tuple(message.joint_names)[: len(rows)], motion)
+    names = tuple(message.joint_names)[: len(rows)]
+    return BallStates(read_stamp(message.header.stamp), names, motion)
 
 
 def _xyz(vector: Vector3 | Quaternion) -> tuple[float, float, float]:
