@@ -5,9 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from geometry_msgs.msg import Wrench, WrenchStamped
 from rclpy.node import Node
-from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
@@ -20,12 +18,7 @@ from controller_node.strength import Strengths
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import (
-    JointStateEncoder,
-    make_header,
-    make_vector,
-    split_stamp,
-)
+from msgs_config.messages.joint_state import DoublesEncoder, JointStateEncoder, split_stamp
 from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.topics import Outgoing
@@ -57,6 +50,7 @@ class Publishers:
         self._layout = layout
         self._commanded = commanded
         self.bind(session or ANONYMOUS)
+        self._wrench_encoder = DoublesEncoder(WORLD)
         self._initial_states = topics.create_publisher(node, topics.INITIAL_STATE)
         self._references = topics.create_publisher(node, topics.REFERENCE)
         self._wrenches = topics.create_publisher(node, topics.NET_WRENCH)
@@ -147,7 +141,4 @@ class Publishers:
         """The serialised message."""
         configuration = self._layout.configuration(answer.state.position)
         force, torque = net_wrench(self._layout, configuration, answer.effort)
-        header = make_header(answer.state.stamp_ns, WORLD)
-        wrench = Wrench(force=make_vector(force.tolist()), torque=make_vector(torque.tolist()))
-        raw: bytes = serialize_message(WrenchStamped(header=header, wrench=wrench))
-        return raw
+        return self._wrench_encoder.encode(answer.state.stamp_ns, np.concatenate((force, torque)))

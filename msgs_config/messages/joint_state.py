@@ -9,16 +9,14 @@ its size, counted from the end of the four bytes of encapsulation header.
 """
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Vector3
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, MultiDOFJointState
-from std_msgs.msg import Header
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
@@ -55,18 +53,6 @@ def split_stamp(stamp_ns: int) -> tuple[int, int]:
 def read_stamp(stamp: Time) -> int:
     """A message's stamp in ns."""
     return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
-
-
-def make_header(stamp_ns: int, frame_id: str) -> Header:
-    """The header of a typed message."""
-    seconds, nanoseconds = split_stamp(stamp_ns)
-    return Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame_id)
-
-
-def make_vector(xyz: Sequence[float]) -> Vector3:
-    """A typed vector of three numbers."""
-    x, y, z = xyz
-    return Vector3(x=x, y=y, z=z)
 
 
 def with_stamp(raw: bytes, stamp_ns: int) -> bytes:
@@ -146,11 +132,30 @@ def _check_lengths(raw: bytes, entry_bytes: Sequence[int]) -> None:
         raise ValueError("a list is longer than the message")
 
 
+def encode_head(names: Sequence[str], frame_id: str = "") -> bytes:
+    """A serialised message up to the end of its names, with a stamp of zero."""
+    return CDR_LITTLE_ENDIAN + bytes(8) + _cdr_names(names, frame_id)
+
+
+def encode_arrays(head: bytes, lists: Iterable[FloatArray]) -> bytes:
+    """A serialised message of a head and of lists of doubles (m,) or of rows of them (m, k).
+
+    Not by rclpy, whose writer leaves in the gaps before the doubles what the memory held before:
+    the same message would not be the same bytes twice.
+    """
+    content = bytearray(head)
+    for values in lists:
+        content += struct.pack("<I", len(values))
+        if len(values):
+            content += bytes(_padding(len(content) - 4, 8)) + values.tobytes()
+    return bytes(content)
+
+
 class JointStateEncoder:
     """Serialises JointState messages that all have the same names and `frame_id`."""
 
     def __init__(self, names: Sequence[str], frame_id: str = "") -> None:
-        self._head = CDR_LITTLE_ENDIAN + bytes(8) + _cdr_names(names, frame_id)
+        self._head = encode_head(names, frame_id)
 
     def encode(
         self,
@@ -160,13 +165,23 @@ class JointStateEncoder:
         effort: FloatArray = _EMPTY,
     ) -> bytes:
         """The serialised message; each array is (n,) or empty."""
-        content = bytearray(self._head)
-        struct.pack_into("<iI", content, 4, *split_stamp(stamp_ns))
-        for values in (position, velocity, effort):
-            content += struct.pack("<I", len(values))
-            if len(values):
-                content += bytes(_padding(len(content) - 4, 8)) + values.tobytes()
-        return bytes(content)
+        return encode_arrays(with_stamp(self._head, stamp_ns), (position, velocity, effort))
+
+
+class DoublesEncoder:
+    """Serialises messages of a stamp, texts that never change and, after all else, doubles.
+
+    So are `nav_msgs/Odometry` and `geometry_msgs/WrenchStamped`.
+    """
+
+    def __init__(self, *texts: str) -> None:
+        """The texts in the message's order, its `frame_id` first."""
+        head = CDR_LITTLE_ENDIAN + bytes(8) + b"".join(_cdr_text(text) for text in texts)
+        self._head = head + bytes(_padding(len(head) - 4, 8))
+
+    def encode(self, stamp_ns: int, values: FloatArray) -> bytes:
+        """The serialised message with all its doubles (m,), in the message's order."""
+        return with_stamp(self._head, stamp_ns) + values.tobytes()
 
 
 def encode_clock(stamp_ns: int) -> bytes:

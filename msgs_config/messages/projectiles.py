@@ -8,8 +8,7 @@ in kg, m and m/s, world axes; everything else in the message is unused. Where th
 from dataclasses import dataclass
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
-from rclpy.serialization import serialize_message
+from geometry_msgs.msg import Quaternion, Vector3
 from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
@@ -17,12 +16,13 @@ from msgs_config.messages.joint_state import (
     JointStateDecoder,
     JointStateEncoder,
     decode,
-    make_header,
-    make_vector,
+    encode_arrays,
+    encode_head,
     read_stamp,
+    with_stamp,
 )
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, throw_of
-from msgs_config.messages.wrenches import WORLD
+from msgs_config.messages.wrenches import NO_ROWS, WORLD
 
 
 @dataclass(frozen=True)
@@ -65,23 +65,8 @@ def ball_names(count: int) -> tuple[str, ...]:
 
 def encode_balls(balls: BallStates, frame_id: str = WORLD) -> bytes:
     """The serialised message."""
-    rows = balls.motion.tolist()
-    message = MultiDOFJointState(
-        header=make_header(balls.stamp_ns, frame_id),
-        joint_names=list(balls.names),
-        transforms=[
-            Transform(
-                translation=make_vector(row[:3]),
-                rotation=Quaternion(x=row[3], y=row[4], z=row[5], w=row[6]),
-            )
-            for row in rows
-        ],
-        twist=[
-            Twist(linear=make_vector(row[7:10]), angular=make_vector(row[10:13])) for row in rows
-        ],
-    )
-    raw: bytes = serialize_message(message)
-    return raw
+    head = with_stamp(encode_head(balls.names, frame_id), balls.stamp_ns)
+    return encode_arrays(head, (balls.motion[:, :7], balls.motion[:, 7:], NO_ROWS))
 
 
 def decode_balls(raw: bytes) -> BallStates:

@@ -9,15 +9,24 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from geometry_msgs.msg import Transform, Wrench
-from rclpy.serialization import serialize_message
 from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.messages.joint_state import decode, make_header, make_vector, read_stamp
+from msgs_config.geometry.rotations import IDENTITY_XYZW
+from msgs_config.messages.joint_state import (
+    decode,
+    encode_arrays,
+    encode_head,
+    read_stamp,
+    with_stamp,
+)
 
 WORLD = "world"
 """The frame of everything that is given in the world."""
+
+NO_ROWS = np.zeros((0, 6))
+"""An empty list of a MultiDOFJointState, whose others are of 7 (translation, rotation xyzw), of 6
+(linear, angular) and of 6 numbers (force, torque)."""
 
 Rows: TypeAlias = FloatArray | Sequence[FloatArray] | Sequence[tuple[float, ...]]
 
@@ -53,19 +62,13 @@ class WrenchArrays:
 
 def encode_wrenches(wrenches: WrenchArrays) -> bytes:
     """The serialised message."""
-    message = MultiDOFJointState(
-        header=make_header(wrenches.stamp_ns, wrenches.frame_id),
-        joint_names=list(wrenches.links),
-        transforms=[
-            Transform(translation=make_vector(point)) for point in wrenches.points.tolist()
-        ],
-        wrench=[
-            Wrench(force=make_vector(row[:3]), torque=make_vector(row[3:]))
-            for row in wrenches.wrenches.tolist()
-        ],
-    )
-    raw: bytes = serialize_message(message)
-    return raw
+    transforms = NO_ROWS
+    if len(wrenches.points):
+        turns = np.tile(IDENTITY_XYZW, (len(wrenches.points), 1))
+        transforms = np.hstack((wrenches.points, turns))
+    head = encode_head(wrenches.links, wrenches.frame_id)
+    lists = (transforms, NO_ROWS, wrenches.wrenches)
+    return encode_arrays(with_stamp(head, wrenches.stamp_ns), lists)
 
 
 def decode_wrenches(raw: bytes) -> WrenchArrays:

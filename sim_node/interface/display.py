@@ -1,15 +1,16 @@
 """What ROS tools show: the base as odometry and transform, and the shapes as markers."""
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, TransformStamped
-from nav_msgs.msg import Odometry
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from std_msgs.msg import Header
 
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import make_header, make_vector
+from msgs_config.messages.joint_state import DoublesEncoder, split_stamp
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WORLD
 from sim_node.interface.markers import MarkerEncoder
@@ -19,6 +20,10 @@ try:  # a full ROS install has it, the wheels have not
     from tf2_msgs.msg import TFMessage
 except ImportError:
     TFMessage = None
+
+_ODOMETRY_DOUBLES = 85  # position, orientation, 36 of a covariance, twist, 36 of a covariance
+_POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
+_LINEAR, _ANGULAR = slice(43, 46), slice(46, 49)
 
 
 class Display:
@@ -32,6 +37,7 @@ class Display:
         self._transforms = None
         if TFMessage is not None:
             self._transforms = node.create_publisher(TFMessage, "/tf", topics.STREAM_QOS)
+        self._odometry_encoder = DoublesEncoder(WORLD, self._base)
         self._throws: tuple[ProjectileThrow, ...] = ()  # whose balls are shown
         self._markers = MarkerEncoder(actor.character)
 
@@ -49,11 +55,10 @@ class Display:
             return
         origin, turn = self._actor.base_frame()
         if odometry:
-            self._odometry.publish(self._describe_odometry(origin, turn))
+            self._odometry.publish(self._encode_odometry(origin, turn))
         if self._transforms and transforms:
-            header = make_header(self._actor.state.stamp_ns, WORLD)
-            transform = TransformStamped(header=header, child_frame_id=self._base)
-            transform.transform.translation = make_vector(origin.tolist())
+            transform = TransformStamped(header=self._header(), child_frame_id=self._base)
+            transform.transform.translation = _vector(origin)
             transform.transform.rotation = _quaternion(turn)
             self._transforms.publish(TFMessage(transforms=[transform]))
 
@@ -77,18 +82,24 @@ class Display:
         if self._markers.takes_away:  # once is enough
             self._markers = MarkerEncoder(self._actor.character, self._throws)
 
-    def _describe_odometry(self, origin: FloatArray, turn: FloatArray) -> Odometry:
-        """The message; its covariances are not known, which zeros say."""
-        state = self._actor.state
-        message = Odometry(header=make_header(state.stamp_ns, WORLD), child_frame_id=self._base)
-        place, twist = message.pose.pose, message.twist.twist
-        place.position.x, place.position.y, place.position.z = origin.tolist()
-        place.orientation = _quaternion(turn)
+    def _header(self) -> Header:
+        seconds, nanoseconds = split_stamp(self._actor.state.stamp_ns)
+        return Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=WORLD)
+
+    def _encode_odometry(self, origin: FloatArray, turn: FloatArray) -> bytes:
+        """The serialised message; its covariances are not known, which zeros say."""
+        values = np.zeros(_ODOMETRY_DOUBLES)
+        values[_POSITION], values[_ORIENTATION] = origin, turn
         if self._actor.layout.has_floating_base:
-            linear = rotations.rotate(rotations.conjugate(turn), state.velocity[:3])
-            twist.linear = make_vector(linear.tolist())
-            twist.angular = make_vector(state.velocity[3:6].tolist())
-        return message
+            velocity = self._actor.state.velocity
+            values[_LINEAR] = rotations.rotate(rotations.conjugate(turn), velocity[:3])
+            values[_ANGULAR] = velocity[3:6]
+        return self._odometry_encoder.encode(self._actor.state.stamp_ns, values)
+
+
+def _vector(values: FloatArray) -> Vector3:
+    x, y, z = values.tolist()
+    return Vector3(x=x, y=y, z=z)
 
 
 def _quaternion(xyzw: FloatArray) -> Quaternion:
