@@ -14,9 +14,8 @@ from msgs_config.errors import ActuatedCharactersError
 
 MAX_FILE_BYTES = 16 * 1024 * 1024
 MAX_YAML_CHARACTERS = 128 * 1024  # PyYAML is slow: a second for as much
-MAX_YAML_VALUE = 1000  # characters of a key or value
-MAX_NESTING = 64
-MAX_XML_ELEMENTS = 100_000
+MAX_XML_CHARACTERS = 2 * 1024 * 1024
+MAX_XML_NESTING = 64
 _PACKAGE = "package://"
 
 
@@ -79,9 +78,7 @@ def parse_yaml(
     place: str,
     text: str,
     error: type[ActuatedCharactersError],
-    *,
     most: int = MAX_YAML_CHARACTERS,
-    most_of_value: int = MAX_YAML_VALUE,
 ) -> Any:
     """The value that a YAML text stands for; numbers are decimal, as in YAML 1.2 and JSON.
 
@@ -90,7 +87,6 @@ def parse_yaml(
         text: The YAML text.
         error: The class of the error.
         most: Characters of the text that are read at most.
-        most_of_value: Characters of a key or value.
 
     Raises:
         error: the text is no YAML, is too large, or nests too deep.
@@ -98,9 +94,9 @@ def parse_yaml(
     if len(text) > most:
         raise error(f"{place}: larger than {most >> 10} KiB")
     try:
-        loader = _PlainLoader(text)
-        loader.most_of_value = most_of_value
-        return loader.get_single_data()
+        return _PlainLoader(text).get_single_data()
+    except RecursionError as cause:
+        raise error(f"{place}: not valid YAML: nested too deep") from cause
     except (yaml.YAMLError, ValueError) as cause:  # ValueError: a number of too many digits
         where = getattr(cause, "problem_mark", None)
         line = f", line {where.line + 1}" if where is not None else ""
@@ -126,30 +122,13 @@ _PLAIN_VALUES = {  # what a value without quotes is; anything else is a text
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Plain data alone, and nothing by which a small text becomes deep or large.
+    """Plain data alone.
 
     PyYAML follows YAML 1.1, where `1e-1` is a text, `010` is eight and `1:30` ninety. Here they
     are 0.1, ten and a text, as in YAML 1.2; dates are texts as well.
     """
 
     yaml_implicit_resolvers: dict[str, list[Any]] = {}  # noqa: RUF012 (PyYAML's own name)
-    most_of_value = MAX_YAML_VALUE
-    _depth = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self._depth == MAX_NESTING:
-            raise yaml.MarkedYAMLError(
-                problem=f"deeper than {MAX_NESTING} levels", problem_mark=self.get_mark()
-            )
-        self._depth += 1
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        if isinstance(node, yaml.ScalarNode) and len(node.value) > self.most_of_value:
-            raise yaml.MarkedYAMLError(
-                problem=f"a value of more than {self.most_of_value} characters",
-                problem_mark=node.start_mark,
-            )
-        return node
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         # a mapping that is merged (`<<`) is copied: ten merges of ten, a few times over, are
@@ -168,36 +147,25 @@ def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> El
     Raises:
         error: the text is no XML, declares a document type, or is too deep or too large.
     """
-    parser = ElementTree.XMLParser(target=_PlainTreeBuilder())
+    if len(text) > MAX_XML_CHARACTERS:
+        raise error(f"{path}: larger than {MAX_XML_CHARACTERS >> 20} MiB")
+    parser = ElementTree.XMLParser(target=_TreeBuilder())
     try:
         parser.feed(text.strip("\0 \t\r\n"))
         root: ElementTree.Element = parser.close()
     except (ElementTree.ParseError, ValueError) as cause:  # ValueError: an unknown encoding
         raise error(f"{path}: not valid XML: {str(cause)[:200]}") from cause
+    level = [root]
+    for _ in range(MAX_XML_NESTING):
+        level = [child for element in level for child in element]
+    if level:  # the engine's parser calls itself for each level
+        raise error(f"{path}: not valid XML: deeper than {MAX_XML_NESTING} elements")
     return root
 
 
-class _PlainTreeBuilder(ElementTree.TreeBuilder):
-    """Elements alone, and nothing by which a small text becomes deep or large."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._depth = 0
-        self._count = 0
+class _TreeBuilder(ElementTree.TreeBuilder):
+    """Elements without a document type, by whose entities a small text becomes a large one."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         # it comes before the entities that it declares
         raise ElementTree.ParseError("a document type (DOCTYPE) is not allowed")
-
-    def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:
-        self._depth += 1
-        self._count += 1
-        if self._depth > MAX_NESTING:
-            raise ElementTree.ParseError(f"deeper than {MAX_NESTING} elements")
-        if self._count > MAX_XML_ELEMENTS:
-            raise ElementTree.ParseError(f"more than {MAX_XML_ELEMENTS} elements")
-        return super().start(tag, attrs)
-
-    def end(self, tag: str) -> ElementTree.Element:
-        self._depth -= 1
-        return super().end(tag)

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from msgs_config.character.engine_urdf import engine_urdf
+from msgs_config.character.engine_urdf import write_engine_urdf
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 
@@ -52,7 +52,7 @@ def load_urdf(client: int, loading: UrdfOptions) -> int:
     Raises:
         CharacterError: the engine refuses the file, or one of its meshes does not exist.
     """
-    text = engine_urdf(loading)
+    text = write_engine_urdf(loading)
     # not URDF_MAINTAIN_LINK_ORDER: it crashes where a file lists a link before its parent
     flags = 0
     if loading.self_collision:

@@ -12,7 +12,7 @@ Bounds = tuple[float | None, float | None]
 _KINDS = ("revolute", "continuous", "prismatic")
 
 
-def with_bounds(
+def write_bounds(
     robot: ElementTree.Element, bounds: dict[str, Bounds], scale: float, file: Path
 ) -> str:
     """The text of a URDF with other bounds, so that whoever reads it obeys them.

@@ -2,7 +2,8 @@
 
 Filling and reading dozens of name strings is most of the cost of such a message. Names are
 constant, so the bytes up to and with them are kept, and only the stamp and the doubles are
-written or read. Whatever does not look like what was kept goes through rclpy's own decoder.
+written or read. `sensor_msgs/MultiDOFJointState` has the same form: a header, names and lists of
+doubles.
 
 The form is plain CDR, little endian (OMG DDSI-RTPS 2.3, section 10): every item is aligned to
 its size, counted from the end of the four bytes of encapsulation header.
@@ -11,12 +12,11 @@ its size, counted from the end of the four bytes of encapsulation header.
 import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from builtin_interfaces.msg import Time
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState, MultiDOFJointState
+from sensor_msgs.msg import JointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
@@ -29,7 +29,8 @@ _STAMP = 4  # after the encapsulation header
 _NAMES_START = 12  # after the encapsulation header and the stamp
 _FRAME_START = 16  # after the length of the frame's name
 _MAX_KEPT_SENDERS = 16
-_ENTRY_BYTES = {JointState: (8, 8, 8), MultiDOFJointState: (56, 48, 48)}
+_JOINT_STATE_WIDTHS = (1, 1, 1)
+_BYTE_ORDERS = {b"\0\0": ">", b"\0\1": "<"}  # by the encapsulation header's first two bytes
 _EMPTY = np.zeros(0)
 
 
@@ -48,11 +49,6 @@ class JointArrays:
 def split_stamp(stamp_ns: int) -> tuple[int, int]:
     """Seconds and nanoseconds of a stamp."""
     return divmod(stamp_ns, NANOSECONDS_PER_SECOND)
-
-
-def read_stamp(stamp: Time) -> int:
-    """A message's stamp in ns."""
-    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
 
 
 def with_stamp(raw: bytes, stamp_ns: int) -> bytes:
@@ -98,38 +94,73 @@ def decode(raw: bytes, message_type: type) -> Any:
     Raises:
         MessageError: the bytes are no such message.
     """
+    if message_type is JointState:  # the middleware would print a line if a list is too long
+        read_message(raw, _JOINT_STATE_WIDTHS)
     try:
-        if message_type in _ENTRY_BYTES:
-            _check_lengths(raw, _ENTRY_BYTES[message_type])
         return deserialize_message(raw, message_type)
     except Exception as error:  # rclpy has no type of its own for what cannot be decoded
         raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
 
 
-def _check_lengths(raw: bytes, entry_bytes: Sequence[int]) -> None:
-    """Raise struct.error or ValueError if lists are longer than the message is.
+class NamedLists(NamedTuple):
+    """A message of a header, names, and lists of structures of doubles."""
 
-    The middleware finds that, too, but prints a line at each such message. The lists are names,
-    after the header, and then some of doubles, of so many bytes an entry.
+    stamp_ns: int
+    frame_id: str
+    names: tuple[str, ...]
+    lists: list[FloatArray]  # (m * width,) each
+
+
+def read_message(raw: bytes, widths: Sequence[int]) -> NamedLists:
+    """The content of a serialised message whose lists have so many doubles an entry.
+
+    Raises:
+        MessageError: the bytes are no such message.
     """
-    order = "<" if raw[1] & 1 else ">"
+    try:
+        order = _BYTE_ORDERS[raw[:2]]
+        seconds, nanoseconds = struct.unpack_from(f"{order}iI", raw, _STAMP)
+        frame_id, offset = _read_text(raw, _NAMES_START, order)
+        count, offset = _read_count(raw, offset, order)
+        names = []
+        for _ in range(count):
+            name, offset = _read_text(raw, offset, order)
+            names.append(name)
+        lists = _read_lists(raw, offset, order, widths)
+    except (KeyError, struct.error, ValueError) as error:
+        raise MessageError(f"{len(raw)} bytes that are no message of names and numbers") from error
+    stamp_ns = seconds * NANOSECONDS_PER_SECOND + nanoseconds
+    return NamedLists(stamp_ns, frame_id, tuple(names), lists)
 
-    def count_at(offset: int) -> tuple[int, int]:
-        offset += _padding(offset, 4)  # the encapsulation header has four bytes as well
-        (count,) = struct.unpack_from(f"{order}I", raw, offset)
-        return count, offset + 4
 
-    length, offset = count_at(_NAMES_START)
-    names, offset = count_at(offset + length)
-    for _ in range(names):
-        length, offset = count_at(offset)
-        offset += length
-    for size in entry_bytes:
-        count, offset = count_at(offset)
+def _read_count(raw: bytes, offset: int, order: str) -> tuple[int, int]:
+    """A length, and the offset behind it."""
+    offset += _padding(offset, 4)  # the encapsulation header has four bytes as well
+    (count,) = struct.unpack_from(f"{order}I", raw, offset)
+    return count, offset + 4
+
+
+def _read_text(raw: bytes, offset: int, order: str) -> tuple[str, int]:
+    """A text, and the offset behind it."""
+    length, offset = _read_count(raw, offset, order)
+    end = offset + length
+    if length and raw.find(b"\0", offset, end) != end - 1:
+        raise ValueError("a text that does not end where it should")
+    return str(raw[offset : max(end - 1, offset)], "utf-8"), end
+
+
+def _read_lists(raw: bytes, offset: int, order: str, widths: Sequence[int]) -> list[FloatArray]:
+    """Lists of structures of so many doubles each, every list flat: (m * width,)."""
+    lists = []
+    for width in widths:
+        count, offset = _read_count(raw, offset, order)
+        values = _EMPTY
         if count:
-            offset += _padding(offset - 4, 8) + size * count
-    if offset > len(raw):
-        raise ValueError("a list is longer than the message")
+            offset += _padding(offset - 4, 8)
+            values = np.frombuffer(raw, f"{order}f8", count * width, offset).astype(float)
+        lists.append(values)
+        offset += values.nbytes
+    return lists
 
 
 def encode_head(names: Sequence[str], frame_id: str = "") -> bytes:
@@ -203,43 +234,25 @@ class JointStateDecoder:
         """
         for head, texts in self._kept.items():
             if raw.startswith(head, _NAMES_START) and raw.startswith(CDR_LITTLE_ENDIAN):
-                return _read_doubles(raw, _NAMES_START + len(head), *texts)
-        return self._decode_slowly(raw)
-
-    def _decode_slowly(self, raw: bytes) -> JointArrays:
-        message = decode(raw, JointState)
-        names, frame_id = tuple(message.name), str(message.header.frame_id)
+                return _read_arrays(raw, _NAMES_START + len(head), *texts)
+        stamp_ns, frame_id, names, lists = read_message(raw, _JOINT_STATE_WIDTHS)
         head = _cdr_names(names, frame_id)
         if raw.startswith(head, _NAMES_START):
             if len(self._kept) == _MAX_KEPT_SENDERS:  # each start of a simulator is a new sender
                 del self._kept[next(iter(self._kept))]
             self._kept[head] = names, frame_id
-        return JointArrays(
-            stamp_ns=read_stamp(message.header.stamp),
-            names=names,
-            position=np.array(message.position, dtype=float),
-            velocity=np.array(message.velocity, dtype=float),
-            effort=np.array(message.effort, dtype=float),
-            frame_id=frame_id,
-        )
+        position, velocity, effort = lists
+        return JointArrays(stamp_ns, names, position, velocity, effort, frame_id)
 
 
-def _read_doubles(raw: bytes, offset: int, names: tuple[str, ...], frame_id: str) -> JointArrays:
-    """The rest of a message whose names end at `offset`."""
-    seconds, nanoseconds = struct.unpack_from("<iI", raw, 4)
-    arrays = []
+def _read_arrays(raw: bytes, offset: int, names: tuple[str, ...], frame_id: str) -> JointArrays:
+    """The content of a little-endian message whose names are known and end at `offset`."""
     try:
-        for _ in range(3):
-            (count,) = struct.unpack_from("<I", raw, offset)
-            offset += 4
-            if count:
-                offset += _padding(offset - 4, 8)
-            arrays.append(np.frombuffer(raw, "<f8", count, offset).copy() if count else _EMPTY)
-            offset += 8 * count
+        position, velocity, effort = _read_lists(raw, offset, "<", _JOINT_STATE_WIDTHS)
     except (struct.error, ValueError) as error:
         raise MessageError(f"a JointState cut off after {len(raw)} bytes") from error
+    seconds, nanoseconds = struct.unpack_from("<iI", raw, _STAMP)
     stamp_ns = seconds * NANOSECONDS_PER_SECOND + nanoseconds
-    position, velocity, effort = arrays
     return JointArrays(stamp_ns, names, position, velocity, effort, frame_id)
 
 

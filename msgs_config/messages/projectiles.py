@@ -8,21 +8,18 @@ in kg, m and m/s, world axes; everything else in the message is unused. Where th
 from dataclasses import dataclass
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, Vector3
-from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.joint_state import (
     JointStateDecoder,
     JointStateEncoder,
-    decode,
     encode_arrays,
     encode_head,
-    read_stamp,
+    read_message,
     with_stamp,
 )
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, throw_of
-from msgs_config.messages.wrenches import NO_ROWS, WORLD
+from msgs_config.messages.wrenches import NO_ROWS, WIDTHS, WORLD
 
 
 @dataclass(frozen=True)
@@ -75,15 +72,8 @@ def decode_balls(raw: bytes) -> BallStates:
     Raises:
         MessageError: the bytes are no such message.
     """
-    message = decode(raw, MultiDOFJointState)
-    rows = []
-    for pose, twist in zip(message.transforms, message.twist, strict=False):
-        at, turn, w = _xyz(pose.translation), _xyz(pose.rotation), pose.rotation.w
-        rows.append((*at, *turn, w, *_xyz(twist.linear), *_xyz(twist.angular)))
-    motion = np.array(rows, dtype=float).reshape(-1, 13)
-    names = tuple(message.joint_names)[: len(rows)]
-    return BallStates(read_stamp(message.header.stamp), names, motion)
-
-
-def _xyz(vector: Vector3 | Quaternion) -> tuple[float, float, float]:
-    return vector.x, vector.y, vector.z
+    stamp_ns, _, names, lists = read_message(raw, WIDTHS)
+    poses, twists = lists[0].reshape(-1, 7), lists[1].reshape(-1, 6)
+    count = min(len(names), len(poses), len(twists))
+    motion = np.hstack((poses[:count], twists[:count]))
+    return BallStates(stamp_ns, names[:count], motion)

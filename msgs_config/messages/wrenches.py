@@ -9,24 +9,23 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 from msgs_config.messages.joint_state import (
-    decode,
     encode_arrays,
     encode_head,
-    read_stamp,
+    read_message,
     with_stamp,
 )
 
 WORLD = "world"
 """The frame of everything that is given in the world."""
 
+WIDTHS = (7, 6, 6)
+"""Numbers an entry of transforms (translation, rotation xyzw), twist (linear, angular) and wrench
+(force, torque) of a MultiDOFJointState."""
 NO_ROWS = np.zeros((0, 6))
-"""An empty list of a MultiDOFJointState, whose others are of 7 (translation, rotation xyzw), of 6
-(linear, angular) and of 6 numbers (force, torque)."""
 
 Rows: TypeAlias = FloatArray | Sequence[FloatArray] | Sequence[tuple[float, ...]]
 
@@ -77,14 +76,10 @@ def decode_wrenches(raw: bytes) -> WrenchArrays:
     Raises:
         MessageError: the bytes are no such message.
     """
-    message = decode(raw, MultiDOFJointState)
-    wrenches = [
-        (w.force.x, w.force.y, w.force.z, w.torque.x, w.torque.y, w.torque.z)
-        for w in message.wrench
-    ]
-    points = [(t.translation.x, t.translation.y, t.translation.z) for t in message.transforms]
-    stamp_ns, frame_id = read_stamp(message.header.stamp), str(message.header.frame_id)
-    return WrenchArrays.of_rows(stamp_ns, message.joint_names, wrenches, points, frame_id)
+    stamp_ns, frame_id, links, lists = read_message(raw, WIDTHS)
+    transforms, _, wrenches = lists
+    points = transforms.reshape(-1, 7)[:, :3].copy()
+    return WrenchArrays(stamp_ns, links, wrenches.reshape(-1, 6), points, frame_id)
 
 
 def select(

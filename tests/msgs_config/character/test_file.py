@@ -472,12 +472,12 @@ def test_a_soft_limit_is_as_its_file_says(write: WriteCharacter) -> None:
 
 
 WRONG_LIMITS = {
-    "no bounds": ("{stiffness: 1}", ["soft_limit.lower", "three numbers"]),
-    "two numbers": (LIMIT.replace("[-1, -0.5, 0]", "[-1, 0]"), ["lower", "three numbers"]),
-    "a word": (LIMIT.replace("[-1,", "[low,"), ["lower", "three numbers"]),
-    "a flag": (LIMIT.replace("[-1,", "[no,"), ["lower", "three numbers"]),
-    "not a number": (LIMIT.replace("[-1,", "[.nan,"), ["lower", "three numbers"]),
-    "beyond half a turn": (LIMIT.replace("[1,", "[3.2,"), ["upper", "-pi to pi"]),
+    "no bounds": ("{stiffness: 1}", ["soft_limit.lower", "3 finite numbers"]),
+    "two numbers": (LIMIT.replace("[-1, -0.5, 0]", "[-1, 0]"), ["lower", "3 finite numbers"]),
+    "a word": (LIMIT.replace("[-1,", "[low,"), ["lower", "3 finite numbers"]),
+    "a flag": (LIMIT.replace("[-1,", "[no,"), ["lower", "3 finite numbers"]),
+    "not a number": (LIMIT.replace("[-1,", "[.nan,"), ["lower", "3 finite numbers"]),
+    "beyond half a turn": (LIMIT.replace("[1,", "[3.2,"), ["upper", "from -3.14159 to 3.14159"]),
     "crossed": (LIMIT.replace("[1,", "[-2,"), ["soft_limit.lower", "'upper'"]),
     "no stiffness": (LIMIT.replace("stiffness: 40, ", ""), ["stiffness"]),
     "a negative damping": (LIMIT.replace("damping: 2", "damping: -2"), ["damping", "-2"]),
@@ -622,7 +622,7 @@ REFUSED = {
     ),
     "clips with half a base": (
         PREAMBLE + "clips: {files: 'a_*.txt', joints: [height], base_rotation: [0, 1]}",
-        ["clips.base_rotation", "three numbers"],
+        ["clips.base_rotation", "3 finite numbers"],
     ),
     "clips with other quaternions": (
         PREAMBLE + "clips: {files: 'a_*.txt', joints: [height], quaternion: zyx}",
