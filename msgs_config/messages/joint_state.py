@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
@@ -29,7 +29,11 @@ _STAMP = 4  # after the encapsulation header
 _NAMES_START = 12  # after the encapsulation header and the stamp
 _FRAME_START = 16  # after the length of the frame's name
 _MAX_KEPT_SENDERS = 16
-_JOINT_STATE_WIDTHS = (1, 1, 1)
+_WIDTHS = {  # doubles in an entry of each list
+    JointState: (1, 1, 1),  # position, velocity, effort
+    # transforms (translation, rotation xyzw), twist (linear, angular), wrench (force, torque)
+    MultiDOFJointState: (7, 6, 6),
+}
 _BYTE_ORDERS = {b"\0\0": ">", b"\0\1": "<"}  # by the encapsulation header's first two bytes
 _EMPTY = np.zeros(0)
 
@@ -95,7 +99,7 @@ def decode(raw: bytes, message_type: type) -> Any:
         MessageError: the bytes are no such message.
     """
     if message_type is JointState:  # the middleware would print a line if a list is too long
-        read_message(raw, _JOINT_STATE_WIDTHS)
+        read_message(raw, JointState)
     try:
         return deserialize_message(raw, message_type)
     except Exception as error:  # rclpy has no type of its own for what cannot be decoded
@@ -111,8 +115,8 @@ class NamedLists(NamedTuple):
     lists: list[FloatArray]  # (m * width,) each
 
 
-def read_message(raw: bytes, widths: Sequence[int]) -> NamedLists:
-    """The content of a serialised message whose lists have so many doubles an entry.
+def read_message(raw: bytes, message_type: type) -> NamedLists:
+    """The content of a serialised JointState or MultiDOFJointState.
 
     Raises:
         MessageError: the bytes are no such message.
@@ -126,9 +130,9 @@ def read_message(raw: bytes, widths: Sequence[int]) -> NamedLists:
         for _ in range(count):
             name, offset = _read_text(raw, offset, order)
             names.append(name)
-        lists = _read_lists(raw, offset, order, widths)
+        lists = _read_lists(raw, offset, order, _WIDTHS[message_type])
     except (KeyError, struct.error, ValueError) as error:
-        raise MessageError(f"{len(raw)} bytes that are no message of names and numbers") from error
+        raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
     stamp_ns = seconds * NANOSECONDS_PER_SECOND + nanoseconds
     return NamedLists(stamp_ns, frame_id, tuple(names), lists)
 
@@ -235,7 +239,7 @@ class JointStateDecoder:
         for head, texts in self._kept.items():
             if raw.startswith(head, _NAMES_START) and raw.startswith(CDR_LITTLE_ENDIAN):
                 return _read_arrays(raw, _NAMES_START + len(head), *texts)
-        stamp_ns, frame_id, names, lists = read_message(raw, _JOINT_STATE_WIDTHS)
+        stamp_ns, frame_id, names, lists = read_message(raw, JointState)
         head = _cdr_names(names, frame_id)
         if raw.startswith(head, _NAMES_START):
             if len(self._kept) == _MAX_KEPT_SENDERS:  # each start of a simulator is a new sender
@@ -248,7 +252,7 @@ class JointStateDecoder:
 def _read_arrays(raw: bytes, offset: int, names: tuple[str, ...], frame_id: str) -> JointArrays:
     """The content of a little-endian message whose names are known and end at `offset`."""
     try:
-        position, velocity, effort = _read_lists(raw, offset, "<", _JOINT_STATE_WIDTHS)
+        position, velocity, effort = _read_lists(raw, offset, "<", _WIDTHS[JointState])
     except (struct.error, ValueError) as error:
         raise MessageError(f"a JointState cut off after {len(raw)} bytes") from error
     seconds, nanoseconds = struct.unpack_from("<iI", raw, _STAMP)

@@ -8,6 +8,7 @@ in kg, m and m/s, world axes; everything else in the message is unused. Where th
 from dataclasses import dataclass
 
 import numpy as np
+from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.joint_state import (
@@ -19,7 +20,7 @@ from msgs_config.messages.joint_state import (
     with_stamp,
 )
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, throw_of
-from msgs_config.messages.wrenches import NO_ROWS, WIDTHS, WORLD
+from msgs_config.messages.wrenches import NO_ROWS, WORLD
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def decode_balls(raw: bytes) -> BallStates:
     Raises:
         MessageError: the bytes are no such message.
     """
-    stamp_ns, _, names, lists = read_message(raw, WIDTHS)
+    stamp_ns, _, names, lists = read_message(raw, MultiDOFJointState)
     poses, twists = lists[0].reshape(-1, 7), lists[1].reshape(-1, 6)
     count = min(len(names), len(poses), len(twists))
     motion = np.hstack((poses[:count], twists[:count]))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.geometry.rotations import IDENTITY_XYZW
@@ -22,9 +23,6 @@ from msgs_config.messages.joint_state import (
 WORLD = "world"
 """The frame of everything that is given in the world."""
 
-WIDTHS = (7, 6, 6)
-"""Numbers an entry of transforms (translation, rotation xyzw), twist (linear, angular) and wrench
-(force, torque) of a MultiDOFJointState."""
 NO_ROWS = np.zeros((0, 6))
 
 Rows: TypeAlias = FloatArray | Sequence[FloatArray] | Sequence[tuple[float, ...]]
@@ -76,7 +74,7 @@ def decode_wrenches(raw: bytes) -> WrenchArrays:
     Raises:
         MessageError: the bytes are no such message.
     """
-    stamp_ns, frame_id, links, lists = read_message(raw, WIDTHS)
+    stamp_ns, frame_id, links, lists = read_message(raw, MultiDOFJointState)
     transforms, _, wrenches = lists
     points = transforms.reshape(-1, 7)[:, :3].copy()
     return WrenchArrays(stamp_ns, links, wrenches.reshape(-1, 6), points, frame_id)

@@ -120,17 +120,6 @@ def test_solving_is_that_of_the_whole_matrix_by_numpy(name: str) -> None:
 
 
 @every_character
-def test_solving_without_anything_added_inverts_the_mass_matrix(name: str) -> None:
-    rng = np.random.default_rng(3)
-    for model, position, _ in random_scenes(name):
-        acceleration = rng.uniform(-10.0, 10.0, len(position))
-
-        found = model.solve(model.mass_matrix() @ acceleration, np.zeros(len(position)), 0.0)
-
-        np.testing.assert_allclose(found, acceleration, rtol=0.0, atol=1e-9)
-
-
-@every_character
 def test_solving_changes_neither_the_mass_matrix_nor_the_bias_nor_its_inputs(name: str) -> None:
     rng = np.random.default_rng(4)
     for model, position, _ in random_scenes(name):
@@ -172,17 +161,7 @@ def test_the_error_is_the_layouts_difference(name: str) -> None:
         expected = difference(whole.layout, start, end)
         np.testing.assert_allclose(error, expected, rtol=0.0, atol=1e-12)
         assert (start.tobytes(), end.tobytes()) == tuple(given.tobytes() for given in before)
-
-
-@every_character
-def test_from_a_position_to_itself_there_is_no_error(name: str) -> None:
-    whole, model, rng = character(name), model_of(name), np.random.default_rng(6)
-    for _ in range(STATES):
-        position, _ = random_state(whole, rng)
-
-        error = model.error_of(position, position)
-
-        np.testing.assert_allclose(error, 0.0, rtol=0.0, atol=1e-15)
+        np.testing.assert_allclose(model.error_of(start, start), 0.0, rtol=0.0, atol=1e-15)
 
 
 def unit_vectors() -> st.SearchStrategy[FloatArray]:
@@ -331,7 +310,9 @@ def test_a_state_that_is_taken_over_leaves_no_trace_of_the_one_before(name: str)
     fresh = DynamicsModel(whole)
 
     used.update(*state)
-    fresh.update(*state)
+    fresh.update(*(array.copy() for array in state))
+    for array in state:  # the arrays are the caller's
+        array[:] = 0.0
 
     for one, other in (
         (used.mass_matrix(), fresh.mass_matrix()),
@@ -340,16 +321,3 @@ def test_a_state_that_is_taken_over_leaves_no_trace_of_the_one_before(name: str)
         *zip(used.link_poses(), fresh.link_poses(), strict=True),
     ):
         assert one.tobytes() == other.tobytes()
-
-
-@every_character
-def test_taking_a_state_over_does_not_keep_the_callers_arrays(name: str) -> None:
-    whole = character(name)
-    position, velocity = random_state(whole, np.random.default_rng(13))
-    model = DynamicsModel(whole)
-    model.update(position, velocity)
-    bias = model.bias_force()
-
-    position[:], velocity[:] = 0.0, 0.0
-
-    assert model.bias_force().tobytes() == bias.tobytes()
