@@ -17,7 +17,7 @@ from msgs_config.errors import LayoutError, MessageError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder, decode, state_in_layout
-from msgs_config.messages.session import ANONYMOUS, session_of
+from msgs_config.messages.session import ANONYMOUS, read_session
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
 from msgs_config.parameters import with_present_names
 from msgs_config.shared_parameters import RATE
@@ -218,7 +218,7 @@ class CharacterTimeline:
     def _take_command(self, raw: bytes, published_ns: int) -> None:
         with suppress(MessageError):  # nor did the simulator take it
             sent = self._commands.decode(raw)
-            if session_of(sent.frame_id) not in (ANONYMOUS, self._session):
+            if read_session(sent.frame_id) not in (ANONYMOUS, self._session):
                 return
             command = CommandArrays(sent.names, sent.effort, published_ns)
             self.commands.setdefault(sent.stamp_ns, []).append(command)

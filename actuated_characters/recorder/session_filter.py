@@ -10,8 +10,8 @@ from std_msgs.msg import String
 from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import decode, frame_id_of
-from msgs_config.messages.session import ForeignSessions, episode_session, session_of
+from msgs_config.messages.joint_state import decode, read_frame_id
+from msgs_config.messages.session import ForeignSessions, episode_session, read_session
 
 _MOST_HELD = 1000  # messages before the first state: few topics speak then
 
@@ -47,15 +47,15 @@ def session_in(message: Heard) -> str | None:
     name = message.recorded.own_name
     try:
         if name in _ALWAYS_NAMED:
-            return session_of(frame_id_of(message.raw))
+            return read_session(read_frame_id(message.raw))
         if name in _SOMETIMES_NAMED:
-            return session_of(frame_id_of(message.raw)) or None
+            return read_session(read_frame_id(message.raw)) or None
         if name == topics.EPISODE.name:
-            return episode_session(frame_id_of(message.raw))
+            return episode_session(read_frame_id(message.raw))
         if name == _CONFIGURATION:
-            return session_of(str(json.loads(decode(message.raw, String).data)["session"]))
+            return read_session(str(json.loads(decode(message.raw, String).data)["session"]))
     except (MessageError, ValueError, KeyError, TypeError, RecursionError):
-        return None if name in _SOMETIMES_NAMED else session_of("")
+        return None if name in _SOMETIMES_NAMED else read_session("")
     return None
 
 

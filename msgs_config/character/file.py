@@ -227,7 +227,7 @@ def _read_clip_format(path: Path, clips: MappingReader) -> ClipFormat:
 
 
 def _read_planning(planner: MappingReader, joints: dict[str, MappingReader]) -> Planning:
-    """What is said for the planner; a gain that it leaves out is that of `joints`."""
+    """The settings of the planner; a gain that it leaves out is that of `joints`."""
     planner.check_keys(["sigma", "gains"])
     sigma, gains = planner.part("sigma"), planner.parts("gains", _GAIN_KEYS)
     return Planning(

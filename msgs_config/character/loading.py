@@ -42,10 +42,10 @@ def load_character(name_or_path: str) -> Character:
     Raises:
         CharacterError: no such character, or its file or URDF cannot be used; says why.
     """
-    return make_character(read_character_file(name_or_path))
+    return build_character(read_character_file(name_or_path))
 
 
-def make_character(file: CharacterFile) -> Character:
+def build_character(file: CharacterFile) -> Character:
     """The character that a file and its URDF describe.
 
     Raises:

@@ -15,7 +15,7 @@ from msgs_config.character.meshes import collision_meshes
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import LayoutError, MessageError
 from msgs_config.messages.probe import DynamicsSample, read_probe
-from msgs_config.messages.session import ANONYMOUS, SESSION, session_of
+from msgs_config.messages.session import ANONYMOUS, SESSION, read_session
 from msgs_config.parameters import Value, Values, with_present_names
 from msgs_config.versions import installed_versions, read_versions
 
@@ -109,7 +109,7 @@ def parse(text: str) -> RunConfiguration:
             parameters=with_present_names(dict(content["parameters"])),
             probe=None if probe is None else read_probe(probe, layout.size),
             versions=read_versions(content.get("versions")),
-            session=session_of(str(content.get("session", ""))),
+            session=read_session(str(content.get("session", ""))),
         )
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError, LayoutError) as error:
         raise MessageError("not a simulator's configuration") from error

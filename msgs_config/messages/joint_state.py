@@ -60,7 +60,7 @@ def with_stamp(raw: bytes, stamp_ns: int) -> bytes:
     return raw[:_STAMP] + struct.pack("<iI", *split_stamp(stamp_ns)) + raw[_NAMES_START:]
 
 
-def frame_id_of(raw: bytes) -> str:
+def read_frame_id(raw: bytes) -> str:
     """The `frame_id` of a serialised message that begins with a header, or is one.
 
     Raises:

@@ -19,7 +19,7 @@ from msgs_config.messages.joint_state import (
     read_message,
     with_stamp,
 )
-from msgs_config.messages.throw import NUMBERS, ProjectileThrow, throw_of
+from msgs_config.messages.throw import NUMBERS, ProjectileThrow, parse_throw
 from msgs_config.messages.wrenches import NO_ROWS, WORLD
 
 
@@ -50,10 +50,10 @@ class ThrowCodec:
 
         Raises:
             MessageError: the bytes are no such message.
-            CommandError: it is no throw that can be; see `throw_of`.
+            CommandError: it is no throw that can be; see `parse_throw`.
         """
         arrays = self._decoder.decode(raw)
-        return arrays.stamp_ns, throw_of(arrays.names, arrays.position.tolist())
+        return arrays.stamp_ns, parse_throw(arrays.names, arrays.position.tolist())
 
 
 def ball_names(count: int) -> tuple[str, ...]:

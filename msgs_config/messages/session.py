@@ -59,7 +59,7 @@ def is_session(text: str) -> bool:
     return _MARK in text and _FORM.fullmatch(text) is not None
 
 
-def session_of(frame_id: str) -> str:
+def read_session(frame_id: str) -> str:
     """The session that a `frame_id` names, else `ANONYMOUS`."""
     return frame_id if is_session(frame_id) else ANONYMOUS
 
@@ -71,7 +71,7 @@ def episode_text(number: int, session: str) -> str:
 
 def episode_session(frame_id: str) -> str:
     """The session that the `frame_id` of a message on `episode` names, else `ANONYMOUS`."""
-    return session_of(frame_id.partition(" ")[2])
+    return read_session(frame_id.partition(" ")[2])
 
 
 def named(session: str | None) -> str:

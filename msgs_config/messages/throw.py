@@ -52,7 +52,7 @@ class ProjectileThrow:
         return np.array((self.mass, self.radius, *self.position, *self.velocity))
 
 
-def throw_of(names: Sequence[str], values: Sequence[float]) -> ProjectileThrow:
+def parse_throw(names: Sequence[str], values: Sequence[float]) -> ProjectileThrow:
     """The throw that numbers with names describe; without a radius it has that of `DENSITY`.
 
     Raises:

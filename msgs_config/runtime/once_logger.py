@@ -33,7 +33,7 @@ class OnceLogger:
         logged.add(key)
         self._node.get_logger().warning(sentence)
 
-    def has_said(self, kind: str) -> bool:
+    def has_logged(self, kind: str) -> bool:
         """Whether a sentence of a kind was logged."""
         return kind in self._kinds
 

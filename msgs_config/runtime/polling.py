@@ -21,7 +21,7 @@ _SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
 _SHORT_REST = 0.002  # s; waking up from the executor takes up to that
 _SLEEP_ERROR = 0.0002  # s by which a sleep may be late
 _MOST_TURNS = 50  # of the executor in a row, which has one callback a turn
-_PATIENCE = 0.003  # s of taking turns with other processes before the loop blocks
+_BUSY_PERIOD = 0.003  # s of taking turns with other processes before the loop blocks
 
 
 class Received(NamedTuple):
@@ -103,7 +103,7 @@ class PollingExecutor:
 
     def received(self) -> None:
         """Say that a message came: the next one is worth waiting for without blocking."""
-        self._busy_until = time.monotonic() + _PATIENCE
+        self._busy_until = time.monotonic() + _BUSY_PERIOD
 
     def rest(self) -> None:
         """Let others work; at most about 20 ms."""

@@ -360,7 +360,7 @@ class Stance:
             model.bias_force(),
             self._posture.stiffness,
             self._posture.damping,
-            model.error_of(state.position, self.pose),
+            model.compute_error(state.position, self.pose),
             state.velocity,
             np.zeros(layout.size),
             self._period,

@@ -156,12 +156,12 @@ def test_the_error_is_the_layouts_difference(name: str) -> None:
         (start, _), (end, _) = random_state(whole, rng), random_state(whole, rng)
         before = start.copy(), end.copy()
 
-        error = model.error_of(start, end)
+        error = model.compute_error(start, end)
 
         expected = difference(whole.layout, start, end)
         np.testing.assert_allclose(error, expected, rtol=0.0, atol=1e-12)
         assert (start.tobytes(), end.tobytes()) == tuple(given.tobytes() for given in before)
-        np.testing.assert_allclose(model.error_of(start, start), 0.0, rtol=0.0, atol=1e-15)
+        np.testing.assert_allclose(model.compute_error(start, start), 0.0, rtol=0.0, atol=1e-15)
 
 
 def unit_vectors() -> st.SearchStrategy[FloatArray]:
@@ -191,7 +191,7 @@ def test_rotations_of_any_angle_have_the_error_that_leads_from_one_to_the_other(
     start, end = rest.copy(), rest.copy()
     start[TURN], end[TURN] = start_turn, end_turn
 
-    error = model_of("humanoid").error_of(start, end)
+    error = model_of("humanoid").compute_error(start, end)
 
     reached = rotations.matrix(rotations.exp(start_turn)) @ rotations.matrix(
         rotations.exp(error[TURN])
@@ -210,7 +210,7 @@ def test_asking_for_an_error_leaves_the_state_alone() -> None:
     for model, position, _ in random_scenes("humanoid"):
         before = model.mass_matrix(), model.bias_force(), *model.link_poses()
 
-        model.error_of(rng.uniform(-1.0, 1.0, len(position)), position)
+        model.compute_error(rng.uniform(-1.0, 1.0, len(position)), position)
 
         after = model.mass_matrix(), model.bias_force(), *model.link_poses()
         assert all(a.tobytes() == b.tobytes() for a, b in zip(after, before, strict=True))
