@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-from actuated_characters.bags.writer import BagWriter
 from actuated_characters.runs.plan import Plan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.messages import configuration, topics
@@ -19,6 +17,8 @@ from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.bags import Said, said_configuration, said_references, said_states
+from tests.support.bags import add_timed as add_timed
+from tests.support.bags import write_timed as write_timed
 
 CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE)
 START_NS = 1_700_000_000_000_000_000  # of the log times
@@ -122,19 +122,3 @@ def eventful_run(
 def said_controller(plan: Plan, values: Values, since_ns: int | None = None) -> Said:
     text = configuration.describe(plan.character, values, since_ns)
     return CONTROLLER, serialize_message(String(data=text))
-
-
-def write_timed(path: Path, messages: Sequence[tuple[Said, int]], namespace: str = "") -> Path:
-    """Write a bag of messages with their wall times, in the order given; the directory."""
-    with BagWriter(path) as bag:
-        add_timed(bag, messages, namespace)
-    return path
-
-
-def add_timed(bag: BagWriter, messages: Sequence[tuple[Said, int]], namespace: str = "") -> None:
-    """Write messages with their wall times into a bag that is open."""
-    names = {f"/{topic.under(namespace).name}": topic for (topic, _), _ in messages}
-    for name, topic in names.items():
-        bag.add_topic(name, topic.message_type, topic.qos)
-    for (topic, raw), log_time_ns in messages:
-        bag.write(f"/{topic.under(namespace).name}", raw, log_time_ns)
