@@ -14,7 +14,7 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, ShapeType
 from msgs_config.character.robot_description import robot_description
-from tests.support.urdf import joint, link, robot, write_character
+from tests.support import urdf
 
 DESCRIBED = ["franka_panda", "kuka", "laikago", "lift", "pendulum"]
 TYPES = {
@@ -122,18 +122,19 @@ def test_a_path_with_blanks_is_escaped(tmp_path: Path) -> None:
     assert Path(unquote(urlsplit(name).path)) == folder / "cube.obj"
 
 
-LINKS = link("a") + link("b")
+LINKS = urdf.link("a") + urdf.link("b")
 CAPSULE = '<collision><geometry><capsule radius="1" length="1"/></geometry></collision>'
 NO_URDF = {
-    "a ball joint": LINKS + joint("j", "a", "b", "spherical"),
-    "a capsule": link("a", CAPSULE),
-    "a limit without effort": LINKS + joint("j", "a", "b", limit='<limit lower="-1" upper="1"/>'),
+    "a ball joint": LINKS + urdf.joint("j", "a", "b", "spherical"),
+    "a capsule": urdf.link("a", CAPSULE),
+    "a limit without effort": LINKS
+    + urdf.joint("j", "a", "b", limit='<limit lower="-1" upper="1"/>'),
 }
 
 
 @pytest.mark.parametrize("case", NO_URDF)
 def test_what_urdf_does_not_know_has_no_description(tmp_path: Path, case: str) -> None:
-    path = write_character(tmp_path, robot(NO_URDF[case]))
+    path = urdf.write_character(tmp_path, urdf.robot(NO_URDF[case]))
 
     assert robot_description(load_character(str(path))) is None
 
@@ -142,7 +143,9 @@ def test_what_urdf_does_not_know_has_no_description(tmp_path: Path, case: str) -
 def test_a_character_of_another_size_than_its_urdf_has_no_description(
     tmp_path: Path, yaml: str
 ) -> None:
-    character = load_character(str(write_character(tmp_path, robot(link("block")), yaml)))
+    character = load_character(
+        str(urdf.write_character(tmp_path, urdf.robot(urdf.link("block")), yaml))
+    )
 
     assert (robot_description(character) is None) == bool(yaml)
 
