@@ -239,7 +239,7 @@ def test_inverse_dynamics_is_mass_times_acceleration_plus_bias(name: str) -> Non
 def test_the_engine_accelerates_by_an_effort_as_inverse_dynamics_asked_for(name: str) -> None:
     whole = without_self_collision(name)
     model, rng = DynamicsModel(whole), np.random.default_rng(9)
-    with LoneWorld(whole, WorldSettings(step_s=INSTANT)) as world:
+    with LoneWorld(whole, WorldSettings(step_s=INSTANT, ground=False)) as world:
         for _ in range(STATES):
             position, velocity = free_random_state(world.body, whole, rng)
             model.update(position, velocity)
@@ -275,7 +275,7 @@ def test_gravity_is_the_bias_at_rest_and_leaves_the_state_alone(name: str) -> No
 def test_gravity_holds_the_engine_still(name: str) -> None:
     whole = without_self_collision(name)
     model, rng = DynamicsModel(whole), np.random.default_rng(10)
-    with LoneWorld(whole, WorldSettings(step_s=INSTANT)) as world:
+    with LoneWorld(whole, WorldSettings(step_s=INSTANT, ground=False)) as world:
         position, velocity = free_random_state(world.body, whole, rng)
         model.update(position, velocity)  # it moves, and that is not to count
         world.body.set_state(position, np.zeros_like(velocity))
