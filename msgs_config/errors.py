@@ -6,7 +6,7 @@ _SHOWN = 200  # characters of a value
 
 
 class ActuatedCharactersError(Exception):
-    """Base of every error that is the user's to mend; its text is one clear line."""
+    """Base of every error that a user can mend; its text is one clear line."""
 
 
 class ConfigurationError(ActuatedCharactersError):
@@ -50,7 +50,7 @@ class RecordingError(ActuatedCharactersError):
 
 
 class ReplayError(ActuatedCharactersError):
-    """What was recorded did not come again; says where it differs first."""
+    """A replay differs from its recording; says where first."""
 
 
 class RunError(ActuatedCharactersError):

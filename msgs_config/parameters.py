@@ -72,7 +72,7 @@ class Parameter:
 
 
 RENAMED = {"balance": "balance.enabled"}
-"""What parameters were called before, in parameter files, options and bags."""
+"""Present names of parameters by their old ones, in parameter files, options and bags."""
 
 
 class Values(dict[str, Value]):

@@ -50,7 +50,7 @@ class DynamicsModel:
         mujoco.mj_comVel(self._model, data)
 
     def compute_error(self, position: FloatArray, desired: FloatArray) -> FloatArray:
-        """What leads from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.
+        """Error (n,) from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.
 
         It is the velocity, and so a rotation's part is in the child frame, that leads there in 1 s.
         """

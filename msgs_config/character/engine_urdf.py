@@ -1,4 +1,4 @@
-"""What the engine is given to read in the place of a URDF."""
+"""The text of a URDF as the engine reads it."""
 
 from pathlib import Path
 from xml.etree import ElementTree

@@ -1,4 +1,4 @@
-"""What a character is: links, joints, masses, shapes and frames, and how it is to be driven.
+"""Description of a character: links, joints, masses, shapes, frames, gains and defaults.
 
 Both sides build theirs from this one description: the simulator its body, the controller its
 model of the dynamics. All frames are URDF link frames; lengths in m, masses in kg.
@@ -47,7 +47,7 @@ class Pose:
 
 
 class ShapeType(Enum):
-    """What a shape is, and what its `size` says; axes of symmetry are z."""
+    """Kind of a shape, and the meaning of its `size`; axes of symmetry are z."""
 
     BOX = "box"  # edges x, y, z
     SPHERE = "sphere"  # radius
@@ -94,7 +94,7 @@ class SoftLimit:
 
 @dataclass(frozen=True)
 class Joint:
-    """What joins a link to its parent; for a base link, to the world."""
+    """Joint of a link to its parent; of a base link, to the world."""
 
     name: str
     type: JointType
@@ -132,7 +132,7 @@ class Gains:
 
 @dataclass(frozen=True)
 class Planning:
-    """What differs where joint torques are planned."""
+    """Settings that differ where joint torques are planned."""
 
     sigma: dict[str, float | Vector] = field(default_factory=dict)
     """By joint: how far its reference may be moved, rad or m; the measure of offsets."""
@@ -152,7 +152,7 @@ class ClipFormat:
     signs: dict[str, float] = field(default_factory=dict)
     """By joint: 1 or -1, of its angle in a clip."""
     offsets: dict[str, float] = field(default_factory=dict)
-    """By joint, rad or m: what is added to it then."""
+    """By joint, rad or m: added to its angle after the sign."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ class Character:
     clips: ClipFormat
     feet: tuple[str, ...] = ()  # the links that it stands on
     planning: Planning = Planning()
-    warnings: tuple[str, ...] = ()  # what its author may have overlooked
+    warnings: tuple[str, ...] = ()  # of likely mistakes in its files
     placement: Placement = Placement()
 
     @cached_property

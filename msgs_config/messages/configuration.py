@@ -1,4 +1,4 @@
-"""What `~/configuration` says: all that a run depends on, as JSON, so that a bag can repeat it."""
+"""The JSON of `~/configuration`: all that a run depends on, so that a bag can repeat it."""
 
 import json
 import math
@@ -71,20 +71,20 @@ def describe(
 
 
 def _finite(value: Value) -> Value | None:
-    """What JSON can say: no limit is null, not infinity."""
+    """The value as JSON can express it: no limit is null, not infinity."""
     return None if isinstance(value, float) and math.isinf(value) else value
 
 
 @dataclass(frozen=True)
 class RunConfiguration:
-    """What a listener needs to read a simulator's topics."""
+    """The content that a listener needs to read a simulator's topics."""
 
     character: str
     layout: JointLayout
     effort_limits: FloatArray  # (b,) N m or N
     mass: float  # kg
     parameters: dict[str, Any]
-    probe: DynamicsSample | None = None  # absent where another simulator than ours speaks
+    probe: DynamicsSample | None = None  # absent from other simulators
     versions: dict[str, str] = field(default_factory=dict)  # of what it runs with
     session: str = ANONYMOUS
 
@@ -119,7 +119,7 @@ def parse(text: str) -> RunConfiguration:
 class UrdfCopy:
     """A URDF as it was read, and where it lay, which is where its meshes are looked for."""
 
-    path: Path | None  # None where an older simulator spoke, which did not say it
+    path: Path | None  # None in configurations of older simulators
     text: str = field(repr=False)
     meshes: dict[str, str]  # SHA-256 by the name that the URDF gives, see `collision_meshes`
 
@@ -128,7 +128,7 @@ class UrdfCopy:
 class WorldCopy:
     """The files that a simulator has read, and the character's place in its world."""
 
-    character_path: Path | None  # None where an older simulator spoke
+    character_path: Path | None  # None in configurations of older simulators
     character_text: str = field(repr=False)  # of its YAML file; empty for a URDF alone
     urdf: UrdfCopy
     terrain: UrdfCopy | None
@@ -137,7 +137,7 @@ class WorldCopy:
 
 
 def parse_world(text: str) -> WorldCopy:
-    """Read what a simulator's `~/configuration` says of its files.
+    """Read the files of a simulator from its `~/configuration`.
 
     Raises:
         MessageError: the text is not one.

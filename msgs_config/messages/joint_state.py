@@ -102,7 +102,7 @@ def decode(raw: bytes, message_type: type) -> Any:
         read_message(raw, JointState)
     try:
         return deserialize_message(raw, message_type)
-    except Exception as error:  # rclpy has no type of its own for what cannot be decoded
+    except Exception as error:  # rclpy has no exception type for bytes that it cannot decode
         raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
 
 

@@ -101,13 +101,13 @@ class SessionBinding:
         self._looked_at: float | None = None
 
     def look(self, now: float) -> None:
-        """Say, at every turn, that the receiver looks for messages; `now` in s."""
+        """Note, at every turn, that the receiver looks for messages; `now` in s."""
         if self._looked_at is not None and self._silence is not None:
             self._silence += min(max(now - self._looked_at, 0.0), _LONGEST_LOOK)
         self._looked_at = now
 
     def hear(self, session: str) -> bool:
-        """Note that a session has said something; whether it is the bound one."""
+        """Note a message of a session; returns whether it is the bound one."""
         if session != self.bound:
             return False
         self._silence = None
@@ -157,7 +157,7 @@ class ForeignSessions:
         self._named = set[str]()
 
     def reject(self, topic: str, session: str, own: str | None) -> str | None:
-        """Count a message on a topic; the line to log, if there is a new one."""
+        """Count a message on a topic; returns the line to log, if there is a new one."""
         self.counts[topic] += 1
         if session in self._named or len(self._named) > _MOST_NAMED:
             return None

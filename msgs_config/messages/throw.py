@@ -14,7 +14,7 @@ MASS, RADIUS = "mass", "radius"
 POSITION = ("x", "y", "z")
 VELOCITY = ("vx", "vy", "vz")
 NUMBERS = (MASS, RADIUS, *POSITION, *VELOCITY)
-"""What a throw consists of, in kg, m and m/s, world axes."""
+"""The numbers of a throw, in kg, m and m/s, world axes."""
 
 DENSITY = 500.0  # kg/m^3, of a ball whose radius is not given: a light wood
 _BOUNDS = {MASS: (1e-3, 1e4), RADIUS: (5e-3, 5.0)}

@@ -20,10 +20,10 @@ from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 Outgoing: TypeAlias = tuple[Publisher, bytes]
-"""A serialised message and what it is to be published on."""
+"""A serialised message and its publisher."""
 
 LISTENING_DEPTH = 50_000
-"""What a reader keeps for a process that is busy otherwise, with a disk for instance, for long.
+"""Depth of a reader whose process may be busy otherwise for long, with a disk for instance.
 
 It costs nothing until it is needed, unlike a publisher's."""
 
@@ -45,7 +45,7 @@ STREAM_QOS = _keep_last(5000)
 """With a small history a recorder that pauses for a moment loses messages."""
 LATCHED_QOS = _keep_last(1, DurabilityPolicy.TRANSIENT_LOCAL)
 CHANGES_QOS = _keep_last(100, DurabilityPolicy.TRANSIENT_LOCAL)
-"""For what changes at once again: a listener of depth 1 has the last one, a recorder all."""
+"""For values that may change twice at once: a listener of depth 1 has the last, a recorder all."""
 DISPLAY_QOS = _keep_last(1000)
 """A viewer's own depth may be 1; a recorder's is not."""
 
@@ -67,7 +67,7 @@ class Topic:
         return replace(self, name=f"{namespace}/{self.name}") if namespace else self
 
     def for_listener(self, depth: int = LISTENING_DEPTH) -> "Topic":
-        """The topic with a queue for a listener that must not miss what several publishers say."""
+        """The topic with a queue deep enough for a listener that polls rarely."""
         return replace(self, qos=_keep_last(depth, self.qos.durability, self.qos.reliability))
 
 

@@ -20,7 +20,7 @@ class OnceLogger:
     def log_once(self, sentence: str, kind: str = "") -> None:
         """Log a sentence, unless it, or another one of its kind, was logged before.
 
-        A kind is the caller's own word, of which there are few: those are always logged.
+        Kinds are few, and chosen by the caller: their sentences are always logged.
         """
         if len(sentence) > _LONGEST:
             sentence = sentence[:_LONGEST] + " ..."

@@ -38,7 +38,7 @@ class DirectSubscription:
     def __init__(
         self, node: Node, topic: Topic, events: SubscriptionEventCallbacks | None = None
     ) -> None:
-        """Subscribe; with `events` also to what the middleware says of the subscription."""
+        """Subscribe; with `events` also to the middleware's events of the subscription."""
         # as many as the middleware keeps, and like it the newest; a flood must not fill the memory
         self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
         self.dropped = 0  # messages, as more came than were taken
@@ -102,7 +102,7 @@ class PollingExecutor:
         self._next_service = 0.0
 
     def received(self) -> None:
-        """Say that a message came: the next one is worth waiting for without blocking."""
+        """Note that a message came: the next one is worth waiting for without blocking."""
         self._busy_until = time.monotonic() + _BUSY_PERIOD
 
     def rest(self) -> None:
