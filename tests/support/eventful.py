@@ -11,7 +11,7 @@ from actuated_characters.runs.plan import Plan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches, select
+from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 from msgs_config.parameters import Values
 from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
@@ -19,6 +19,7 @@ from sim_node.physics.wrenches import ExternalWrench
 from tests.support.bags import Said, said_configuration, said_references, said_states
 from tests.support.bags import add_timed as add_timed
 from tests.support.bags import write_timed as write_timed
+from tests.support.physics import read_wrenches
 
 CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE)
 START_NS = 1_700_000_000_000_000_000  # of the log times
@@ -103,18 +104,10 @@ def eventful_run(
                 simulation.step([np.where(actor.commanded, effort, 0.0)], [acting])
             run.states.append(actor.state)
             run.log_times_ns.append(now)
-            stamp = actor.state.stamp_ns
-            run.pushes.append(
-                WrenchArrays.of_rows(
-                    stamp,
-                    [names[push.link] for push in actor.pushes],
-                    [push.wrench for push in actor.pushes],
-                    [push.point for push in actor.pushes],
-                )
-            )
-            assert actor.contacts is not None
-            wrenches, touching = actor.contacts.wrenches, actor.contacts.touching
-            run.contacts.append(select(stamp, names, wrenches, touching))
+            pushes, contacts = read_wrenches(actor)
+            assert contacts is not None
+            run.pushes.append(pushes)
+            run.contacts.append(contacts)
     run.said_by_controller.append(said_controller(plan, plan.controller))
     return run
 
