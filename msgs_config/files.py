@@ -106,18 +106,10 @@ def parse_yaml(
 
 
 _TAG = "tag:yaml.org,2002:"
-_PLAIN_VALUES = {  # what a value without quotes is; anything else is a text
-    "null": (r"~|null|Null|NULL|", [*"~nN", ""]),
-    "bool": (
-        r"true|True|TRUE|false|False|FALSE|yes|Yes|YES|no|No|NO|on|On|ON|off|Off|OFF",
-        [*"tTfFyYnNoO"],
-    ),
-    "int": (r"[-+]?[0-9]+", [*"-+0123456789"]),
-    "float": (
-        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
-        r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
-        [*"-+0123456789."],
-    ),
+_NUMBERS = {  # of YAML 1.2 and JSON
+    "int": r"[-+]?[0-9]+",
+    "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
 }
 
 
@@ -128,7 +120,10 @@ class _PlainLoader(yaml.SafeLoader):
     are 0.1, ten and a text, as in YAML 1.2; dates are texts as well.
     """
 
-    yaml_implicit_resolvers: dict[str, list[Any]] = {}  # noqa: RUF012 (PyYAML's own name)
+    yaml_implicit_resolvers = {  # noqa: RUF012 (PyYAML's own name)
+        first: [each for each in resolvers if each[0] in (_TAG + "bool", _TAG + "null")]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         # a mapping that is merged (`<<`) is copied: ten merges of ten, a few times over, are
@@ -136,8 +131,9 @@ class _PlainLoader(yaml.SafeLoader):
         pass
 
 
-for _kind, (_pattern, _first) in _PLAIN_VALUES.items():
-    _PlainLoader.add_implicit_resolver(_TAG + _kind, re.compile(rf"(?:{_pattern})\Z"), _first)
+for _kind, _pattern in _NUMBERS.items():
+    _regexp = re.compile(rf"(?:{_pattern})\Z")
+    _PlainLoader.add_implicit_resolver(_TAG + _kind, _regexp, [*"-+.0123456789"])
 _PlainLoader.add_constructor(f"{_TAG}int", lambda _, node: int(node.value))
 
 

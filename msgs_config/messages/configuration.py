@@ -19,6 +19,9 @@ from msgs_config.messages.session import ANONYMOUS, SESSION, read_session
 from msgs_config.parameters import Value, Values, with_present_names
 from msgs_config.versions import installed_versions, read_versions
 
+_CHARACTER = ("urdf", "urdf_path", "meshes")  # keys of a URDF's text, path and meshes
+_TERRAIN = ("terrain_urdf", "terrain_path", "terrain_meshes")
+
 
 def describe(
     character: Character,
@@ -45,9 +48,7 @@ def describe(
         "character": character.name,
         "character_file": character.file_text,
         "character_path": str(character.file),
-        "urdf": character.loading.urdf_text,
-        "urdf_path": str(character.loading.urdf_path),
-        "meshes": collision_meshes(character.loading),
+        **_describe_urdf(_CHARACTER, character.loading),
         "session": session,
         "name": name,
         "characters": list(characters),
@@ -56,9 +57,7 @@ def describe(
         ],
         "effort_limits": [_finite(limit) for limit in character.effort_limits().tolist()],
         "mass": character.mass,
-        "terrain_urdf": None if terrain is None else terrain.urdf_text,
-        "terrain_path": None if terrain is None else str(terrain.urdf_path),
-        "terrain_meshes": {} if terrain is None else collision_meshes(terrain),
+        **_describe_urdf(_TERRAIN, terrain),
         "probe": None if probe is None else probe.content(),
         "actuation": None if actuation is None else dict(actuation),
         "parameters_after_stamp_ns": since_ns,
@@ -68,6 +67,14 @@ def describe(
         "versions": installed_versions(),
     }
     return json.dumps(content, allow_nan=False)
+
+
+def _describe_urdf(keys: tuple[str, str, str], urdf: UrdfOptions | None) -> dict[str, Any]:
+    """The text of a URDF, its path and the hashes of its meshes, under these keys."""
+    text, path, meshes = keys
+    if urdf is None:
+        return {text: None, path: None, meshes: {}}
+    return {text: urdf.urdf_text, path: str(urdf.urdf_path), meshes: collision_meshes(urdf)}
 
 
 def _finite(value: Value) -> Value | None:
@@ -144,14 +151,11 @@ def parse_world(text: str) -> WorldCopy:
     """
     try:
         content = json.loads(text)
-        terrain = content.get("terrain_urdf")
         return WorldCopy(
             character_path=_path(content.get("character_path")),
             character_text=str(content["character_file"]),
-            urdf=_urdf_copy(content, "urdf", "urdf_path", "meshes"),
-            terrain=None
-            if terrain is None
-            else _urdf_copy(content, "terrain_urdf", "terrain_path", "terrain_meshes"),
+            urdf=_read_urdf(content, _CHARACTER),
+            terrain=None if content.get(_TERRAIN[0]) is None else _read_urdf(content, _TERRAIN),
             name=str(content.get("name", "")),
             characters=tuple(str(name) for name in content.get("characters", ())),
         )
@@ -159,7 +163,8 @@ def parse_world(text: str) -> WorldCopy:
         raise MessageError("not a simulator's configuration") from error
 
 
-def _urdf_copy(content: dict[str, Any], text: str, path: str, meshes: str) -> UrdfCopy:
+def _read_urdf(content: dict[str, Any], keys: tuple[str, str, str]) -> UrdfCopy:
+    text, path, meshes = keys
     hashes = {str(name): str(digest) for name, digest in content.get(meshes, {}).items()}
     return UrdfCopy(_path(content.get(path)), str(content[text]), hashes)
 
