@@ -145,12 +145,12 @@ def _read_count(raw: bytes, offset: int, order: str) -> tuple[int, int]:
 
 
 def _read_text(raw: bytes, offset: int, order: str) -> tuple[str, int]:
-    """A text, and the offset behind it."""
+    """A text, and the offset behind it; as ROS reads it, it ends before the first NUL."""
     length, offset = _read_count(raw, offset, order)
     end = offset + length
-    if length and raw.find(b"\0", offset, end) != end - 1:
-        raise ValueError("a text that does not end where it should")
-    return str(raw[offset : max(end - 1, offset)], "utf-8"), end
+    if end > len(raw):
+        raise ValueError("a text that is longer than the message")
+    return raw[offset:end].partition(b"\0")[0].decode(errors="replace"), end
 
 
 def _read_lists(raw: bytes, offset: int, order: str, widths: Sequence[int]) -> list[FloatArray]:
