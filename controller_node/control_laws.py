@@ -159,7 +159,7 @@ class TrackingInput:
 
     def error(self, model: DynamicsModel, desired: ReferenceState) -> FloatArray:
         """The error (n,) of the configuration against a desired state, with the offset."""
-        error = model.error_of(self.position, desired.configuration.position)
+        error = model.compute_error(self.position, desired.configuration.position)
         return error if self.offset is None else error + self.offset
 
 

@@ -2,9 +2,11 @@
 
 from difflib import get_close_matches
 
+_SHOWN = 200  # characters of a value
+
 
 class ActuatedCharactersError(Exception):
-    """Base of every error that is the user's to mend; its text is one clear line."""
+    """Base of every error that a user can mend; its text is one clear line."""
 
 
 class ConfigurationError(ActuatedCharactersError):
@@ -48,7 +50,7 @@ class RecordingError(ActuatedCharactersError):
 
 
 class ReplayError(ActuatedCharactersError):
-    """What was recorded did not come again; says where it differs first."""
+    """A replay differs from its recording; says where first."""
 
 
 class RunError(ActuatedCharactersError):
@@ -61,6 +63,7 @@ class SimulationError(ActuatedCharactersError):
 
 def one_of(what: str, value: object, choices: list[str]) -> str:
     """The sentence for a name that is not among the valid ones."""
-    close = get_close_matches(str(value), choices, n=1)
+    name = str(value)[:_SHOWN]
+    close = get_close_matches(name, choices, n=1)
     hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"unknown {what} {str(value)!r}; {hint}there are: {', '.join(choices)}"
+    return f"unknown {what} {name!r}; {hint}there are: {', '.join(choices)}"

@@ -16,9 +16,8 @@ from msgs_config.errors import ActuatedCharactersError
 
 MAX_FILE_BYTES = 16 * 1024 * 1024
 MAX_YAML_CHARACTERS = 128 * 1024  # PyYAML is slow: a second for as much
-MAX_YAML_VALUE = 1000  # characters of a key or value
-MAX_NESTING = 64
-MAX_XML_ELEMENTS = 100_000
+MAX_XML_CHARACTERS = 2 * 1024 * 1024
+MAX_XML_NESTING = 64
 _PACKAGE = "package://"
 
 
@@ -81,9 +80,7 @@ def parse_yaml(
     place: str,
     text: str,
     error: type[ActuatedCharactersError],
-    *,
     most: int = MAX_YAML_CHARACTERS,
-    most_of_value: int = MAX_YAML_VALUE,
 ) -> Any:
     """The value that a YAML text stands for; numbers are decimal, as in YAML 1.2 and JSON.
 
@@ -92,7 +89,6 @@ def parse_yaml(
         text: The YAML text.
         error: The class of the error.
         most: Characters of the text that are read at most.
-        most_of_value: Characters of a key or value.
 
     Raises:
         error: the text is no YAML, is too large, or nests too deep.
@@ -100,9 +96,9 @@ def parse_yaml(
     if len(text) > most:
         raise error(f"{place}: larger than {most >> 10} KiB")
     try:
-        loader = _PlainLoader(text)
-        loader.most_of_value = most_of_value
-        return loader.get_single_data()
+        return _PlainLoader(text).get_single_data()
+    except RecursionError as cause:
+        raise error(f"{place}: not valid YAML: nested too deep") from cause
     except (yaml.YAMLError, ValueError) as cause:  # ValueError: a number of too many digits
         where = getattr(cause, "problem_mark", None)
         line = f", line {where.line + 1}" if where is not None else ""
@@ -112,46 +108,24 @@ def parse_yaml(
 
 
 _TAG = "tag:yaml.org,2002:"
-_PLAIN_VALUES = {  # what a value without quotes is; anything else is a text
-    "null": (r"~|null|Null|NULL|", [*"~nN", ""]),
-    "bool": (
-        r"true|True|TRUE|false|False|FALSE|yes|Yes|YES|no|No|NO|on|On|ON|off|Off|OFF",
-        [*"tTfFyYnNoO"],
-    ),
-    "int": (r"[-+]?[0-9]+", [*"-+0123456789"]),
-    "float": (
-        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
-        r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
-        [*"-+0123456789."],
-    ),
+_NUMBERS = {  # of YAML 1.2 and JSON
+    "int": r"[-+]?[0-9]+",
+    "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
 }
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Plain data alone, and nothing by which a small text becomes deep or large.
+    """Plain data alone.
 
     PyYAML follows YAML 1.1, where `1e-1` is a text, `010` is eight and `1:30` ninety. Here they
     are 0.1, ten and a text, as in YAML 1.2; dates are texts as well.
     """
 
-    yaml_implicit_resolvers: dict[str, list[Any]] = {}  # noqa: RUF012 (PyYAML's own name)
-    most_of_value = MAX_YAML_VALUE
-    _depth = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self._depth == MAX_NESTING:
-            raise yaml.MarkedYAMLError(
-                problem=f"deeper than {MAX_NESTING} levels", problem_mark=self.get_mark()
-            )
-        self._depth += 1
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        if isinstance(node, yaml.ScalarNode) and len(node.value) > self.most_of_value:
-            raise yaml.MarkedYAMLError(
-                problem=f"a value of more than {self.most_of_value} characters",
-                problem_mark=node.start_mark,
-            )
-        return node
+    yaml_implicit_resolvers = {  # noqa: RUF012 (PyYAML's own name)
+        first: [each for each in resolvers if each[0] in (_TAG + "bool", _TAG + "null")]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         # a mapping that is merged (`<<`) is copied: ten merges of ten, a few times over, are
@@ -159,8 +133,9 @@ class _PlainLoader(yaml.SafeLoader):
         pass
 
 
-for _kind, (_pattern, _first) in _PLAIN_VALUES.items():
-    _PlainLoader.add_implicit_resolver(_TAG + _kind, re.compile(rf"(?:{_pattern})\Z"), _first)
+for _kind, _pattern in _NUMBERS.items():
+    _regexp = re.compile(rf"(?:{_pattern})\Z")
+    _PlainLoader.add_implicit_resolver(_TAG + _kind, _regexp, [*"-+.0123456789"])
 _PlainLoader.add_constructor(f"{_TAG}int", lambda _, node: int(node.value))
 
 
@@ -170,41 +145,31 @@ def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> El
     Raises:
         error: the text is no XML, declares a document type, or is too deep or too large.
     """
+    if len(text) > MAX_XML_CHARACTERS:
+        raise error(f"{path}: larger than {MAX_XML_CHARACTERS >> 20} MiB")
     try:
-        return deepcopy(_parse_xml(text))
+        root = deepcopy(_parse_xml(text))
     except (ElementTree.ParseError, ValueError) as cause:  # ValueError: an unknown encoding
         raise error(f"{path}: not valid XML: {str(cause)[:200]}") from cause
+    level = [root]
+    for _ in range(MAX_XML_NESTING):
+        level = [child for element in level for child in element]
+    if level:  # the engine's parser calls itself for each level
+        raise error(f"{path}: not valid XML: deeper than {MAX_XML_NESTING} elements")
+    return root
 
 
-@lru_cache(maxsize=4)  # a node's start reads its character's URDF nine times
+@lru_cache(maxsize=4)  # a node's start reads its character's URDF several times
 def _parse_xml(text: str) -> ElementTree.Element:
-    parser = ElementTree.XMLParser(target=_PlainTreeBuilder())
+    parser = ElementTree.XMLParser(target=_TreeBuilder())
     parser.feed(text.strip("\0 \t\r\n"))
     root: ElementTree.Element = parser.close()
     return root
 
 
-class _PlainTreeBuilder(ElementTree.TreeBuilder):
-    """Elements alone, and nothing by which a small text becomes deep or large."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._depth = 0
-        self._count = 0
+class _TreeBuilder(ElementTree.TreeBuilder):
+    """Elements without a document type, by whose entities a small text becomes a large one."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         # it comes before the entities that it declares
         raise ElementTree.ParseError("a document type (DOCTYPE) is not allowed")
-
-    def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:
-        self._depth += 1
-        self._count += 1
-        if self._depth > MAX_NESTING:
-            raise ElementTree.ParseError(f"deeper than {MAX_NESTING} elements")
-        if self._count > MAX_XML_ELEMENTS:
-            raise ElementTree.ParseError(f"more than {MAX_XML_ELEMENTS} elements")
-        return super().start(tag, attrs)
-
-    def end(self, tag: str) -> ElementTree.Element:
-        self._depth -= 1
-        return super().end(tag)

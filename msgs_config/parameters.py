@@ -7,13 +7,14 @@ specifications by the same function, so that a value is right or wrong in the sa
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from msgs_config.errors import ConfigurationError, one_of
 
 Scalar: TypeAlias = bool | int | float | str
 Value: TypeAlias = Scalar | list[str] | list[float]
 
+_Kind = TypeVar("_Kind")
 _LARGEST = 1e12
 _LARGEST_FLOAT = sys.float_info.max
 
@@ -71,7 +72,7 @@ class Parameter:
 
 
 RENAMED = {"balance": "balance.enabled"}
-"""What parameters were called before, in parameter files, options and bags."""
+"""Present names of parameters by their old ones, in parameter files, options and bags."""
 
 
 class Values(dict[str, Value]):
@@ -81,39 +82,32 @@ class Values(dict[str, Value]):
 
     def flag(self, name: str) -> bool:
         """The value of a parameter that is true or false."""
-        value = self[name]
-        assert isinstance(value, bool)
-        return value
+        return self._typed(name, bool)
 
     def integer(self, name: str) -> int:
         """The value of a whole-number parameter."""
-        value = self[name]
-        assert isinstance(value, int)
-        return value
+        return self._typed(name, int)
 
     def number(self, name: str) -> float:
         """The value of a floating-point parameter."""
-        value = self[name]
-        assert isinstance(value, float)
-        return value
+        return self._typed(name, float)
 
     def text(self, name: str) -> str:
         """The value of a text parameter."""
-        value = self[name]
-        assert isinstance(value, str)
-        return value
+        return self._typed(name, str)
 
     def numbers(self, name: str) -> tuple[float, ...]:
         """The value of a parameter that lists numbers."""
-        value = self[name]
-        assert isinstance(value, list)
-        return tuple(float(item) for item in value)
+        return tuple(map(float, self._typed(name, list)))
 
     def texts(self, name: str) -> tuple[str, ...]:
         """The value of a parameter that lists texts."""
+        return tuple(map(str, self._typed(name, list)))
+
+    def _typed(self, name: str, kind: type[_Kind]) -> _Kind:
         value = self[name]
-        assert isinstance(value, list)
-        return tuple(str(item) for item in value)
+        assert isinstance(value, kind)
+        return value
 
 
 _TYPE_NAMES: dict[type, str] = {

@@ -1,4 +1,4 @@
-"""Versions of what the last bits of a run depend on: this package, engines, Python, C library."""
+"""Versions on which the last bits of a run depend: this package, engines, Python, C library."""
 
 import platform
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ _UNKNOWN = "unknown"
 
 
 def installed_versions() -> dict[str, str]:
-    """The versions in this process, by name; `unknown` where nothing says it."""
+    """The versions in this process, by name; `unknown` where there is none."""
     versions = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
@@ -21,7 +21,7 @@ def installed_versions() -> dict[str, str]:
 
 
 def read_versions(content: object) -> dict[str, str]:
-    """The versions that a `~/configuration` says; none of it, or of something else, is no error."""
+    """The versions in a `~/configuration`; empty if there are none."""
     if not isinstance(content, dict):
         return {}
     return {str(name): str(version) for name, version in content.items()}
@@ -30,7 +30,7 @@ def read_versions(content: object) -> dict[str, str]:
 def describe_changes(recorded: Mapping[str, str], present: Mapping[str, str]) -> str:
     """A part of a sentence that names each version that is another one now; empty if none is.
 
-    What is unknown on one side cannot be compared.
+    Versions that one side does not know are not compared.
     """
     changes = [
         f"{name} {before} (now {present[name]})"

@@ -263,7 +263,7 @@ class SimNode(Node):
     def _tell_conflicts(self) -> None:
         """Say who competes for a joint in real time, once for each, when their names are known."""
         for joint, port in self._conflicts.items():
-            if not self._once_logger.has_said(joint):
+            if not self._once_logger.has_logged(joint):
                 senders = publisher_names(self, port.torques, wait_for_names=False)
                 if UNKNOWN_NODE not in senders:
                     sentence = describe_conflict(joint, port.torques, senders)

@@ -13,7 +13,6 @@ METADATA = "metadata.yaml"
 FILE, MESSAGE = "file", "message"  # that rosbag2 compressed; MCAP's chunks tell themselves
 _LATEST_VERSION = 9  # of Jazzy
 _MOST = 1 << 22  # characters; of a hundred topics it has some 100,000
-_MOST_OF_VALUE = 1 << 16  # characters; rosbag2 wrote all of a topic's publishers into one text
 
 
 class BagMetadata(NamedTuple):
@@ -59,9 +58,7 @@ def load_metadata(bag: Path) -> Any:
     with (bag / METADATA).open(encoding="utf-8") as file:
         text = file.read(_MOST + 1)
     place = f"{METADATA} is damaged"
-    content = files.parse_yaml(
-        place, text, RecordingError, most=_MOST, most_of_value=_MOST_OF_VALUE
-    )
+    content = files.parse_yaml(place, text, RecordingError, most=_MOST)
     return content["rosbag2_bagfile_information"]
 
 

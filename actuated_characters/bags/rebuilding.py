@@ -10,7 +10,7 @@ from msgs_config.character.file import (
     read_character_file,
     read_character_texts,
 )
-from msgs_config.character.loading import make_character
+from msgs_config.character.loading import build_character
 from msgs_config.character.meshes import check_collision_meshes
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import ActuatedCharactersError, RecordingError
@@ -80,7 +80,7 @@ def _character(known: RunConfiguration, copy: WorldCopy) -> Character:
         path, urdf_path = _paths_of_today(known, copy)
     file = read_character_texts(path, copy.character_text, urdf_path, copy.urdf.text)
     check_collision_meshes(file.loading, copy.urdf.meshes)
-    return make_character(file)
+    return build_character(file)
 
 
 def _paths_of_today(known: RunConfiguration, copy: WorldCopy) -> tuple[Path, Path]:

@@ -18,7 +18,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder, decode, state_in_layout
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
-from msgs_config.messages.session import ANONYMOUS, session_of
+from msgs_config.messages.session import ANONYMOUS, read_session
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
 from msgs_config.parameters import with_present_names
@@ -266,7 +266,7 @@ class CharacterTimeline:
         assert self.rebuilt is not None
         with suppress(MessageError):  # the simulator did not take it either
             sent = self._commands.decode(raw)
-            if session_of(sent.frame_id) in (ANONYMOUS, self.rebuilt.known.session):
+            if read_session(sent.frame_id) in (ANONYMOUS, self.rebuilt.known.session):
                 command = CommandArrays(sent.names, sent.effort, published_ns)
                 self.commands.setdefault(sent.stamp_ns, []).append(command)
 

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from actuated_characters.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, MetricsCollector
-from actuated_characters.recorder.session_filter import Heard, SessionFilter, read_session
+from actuated_characters.recorder.session_filter import Heard, SessionFilter, find_session
 from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import (
     NamedTopics,
@@ -207,7 +207,7 @@ class RecorderNode(Node):
                 collector.take(recorded.own_name, raw, published_ns)
             except ActuatedCharactersError as error:
                 sentence = f"cannot measure '{recorded.name}': {error}"
-                if self._filter.bound and read_session(message) is None:  # it may be from any node
+                if self._filter.bound and find_session(message) is None:  # it may be from any node
                     self._once_logger.log_once(sentence)
                 else:
                     self._fail(sentence)

@@ -10,12 +10,12 @@ from std_msgs.msg import String
 from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import decode, frame_id_of
+from msgs_config.messages.joint_state import decode, read_frame_id
 from msgs_config.messages.session import (
     ANONYMOUS,
     ForeignSessions,
     episode_session,
-    session_of,
+    read_session,
 )
 
 _MOST_HELD = 1000  # messages before the first state; few topics have any then
@@ -47,17 +47,17 @@ class Heard(NamedTuple):
     published_ns: int
 
 
-def read_session(message: Heard) -> str | None:
+def find_session(message: Heard) -> str | None:
     """Return the session that a message is of; None if it may be of any."""
     name = message.recorded.own_name
     try:
         if name in _ALWAYS_NAMED or name in _SOMETIMES_NAMED:
-            session = session_of(frame_id_of(message.raw))
+            session = read_session(read_frame_id(message.raw))
             return session or (None if name in _SOMETIMES_NAMED else session)
         if name == topics.EPISODE.name:
-            return episode_session(frame_id_of(message.raw))
+            return episode_session(read_frame_id(message.raw))
         if name == _CONFIGURATION:
-            return session_of(str(json.loads(decode(message.raw, String).data)["session"]))
+            return read_session(str(json.loads(decode(message.raw, String).data)["session"]))
     except (MessageError, ValueError, KeyError, TypeError, RecursionError):
         return None if name in _SOMETIMES_NAMED else ANONYMOUS
     return None
@@ -82,7 +82,7 @@ class SessionFilter:
 
     def take(self, message: Heard) -> list[Heard]:
         """The messages to record now that this one has come, in their order."""
-        session = read_session(message)
+        session = find_session(message)
         if session is None:
             return [message]
         if self.bound is None and message.recorded.own_name == topics.JOINT_STATES.name:

@@ -8,7 +8,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import frame_id_of
+from msgs_config.messages.joint_state import read_frame_id
 from msgs_config.messages.wrenches import decode_wrenches
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
@@ -65,7 +65,7 @@ class ContactSubscription:
 
     def _keep(self, raw: bytes) -> None:
         try:
-            if not self._simulators.is_own(topics.CONTACTS.name, frame_id_of(raw)):
+            if not self._simulators.is_own(topics.CONTACTS.name, read_frame_id(raw)):
                 return
             message = decode_wrenches(raw)
         except MessageError as error:

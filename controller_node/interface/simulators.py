@@ -19,13 +19,13 @@ from msgs_config.errors import (
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.configuration import RunConfiguration
-from msgs_config.messages.joint_state import decode, frame_id_of
+from msgs_config.messages.joint_state import decode, read_frame_id
 from msgs_config.messages.session import (
     ForeignSessions,
     SessionBinding,
     episode_session,
     named,
-    session_of,
+    read_session,
 )
 from msgs_config.parameters import Values
 from msgs_config.runtime.once_logger import OnceLogger
@@ -118,7 +118,7 @@ class Simulators:
 
     def bind(self, frame_id: str) -> bool:
         """Take a usable state with this `frame_id`; whether that binds to a new simulator."""
-        session = session_of(frame_id)
+        session = read_session(frame_id)
         is_new = self._binding.take(session)
         if is_new:
             self._lacks_episode_since, self.runs_on = None, False
@@ -127,7 +127,7 @@ class Simulators:
 
     def is_own(self, topic: str, frame_id: str) -> bool:
         """Whether a message is of the bound simulator; else it is counted as foreign."""
-        session = session_of(frame_id)
+        session = read_session(frame_id)
         if self._binding.hear(session):
             return True
         self._reject(topic, session)
@@ -154,7 +154,7 @@ class Simulators:
 
     def _admits(self, raw: bytes) -> bool:
         try:
-            session = session_of(frame_id_of(raw))
+            session = read_session(read_frame_id(raw))
         except MessageError:
             return True  # the decoder says what is wrong with it
         if not self._binding.admits(session):

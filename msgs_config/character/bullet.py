@@ -1,7 +1,7 @@
-"""PyBullet without its chatter: the import, a private engine, and a URDF loaded into it.
+"""PyBullet without its output: the import, a private engine, and a URDF loaded into it.
 
-PyBullet prints on import and while it reads a URDF, from C, past Python's streams. What it says
-is kept and shown only with the error that it explains.
+PyBullet prints on import and while it reads a URDF, from C, past Python's streams. The output is
+kept and shown only with the error that it explains.
 """
 
 import os
@@ -12,14 +12,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from msgs_config.character.engine_urdf import engine_urdf
+from msgs_config.character.engine_urdf import write_engine_urdf
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 
 
 @contextmanager
 def captured_output() -> Iterator[IO[bytes]]:
-    """Divert what the process writes to its standard output and error into a file."""
+    """Divert the process' standard output and error into a file."""
     sys.stdout.flush()
     sys.stderr.flush()
     saved = os.dup(1), os.dup(2)
@@ -52,7 +52,7 @@ def load_urdf(client: int, loading: UrdfOptions) -> int:
     Raises:
         CharacterError: the engine refuses the file, or one of its meshes does not exist.
     """
-    text = engine_urdf(loading)
+    text = write_engine_urdf(loading)
     # not URDF_MAINTAIN_LINK_ORDER: it crashes where a file lists a link before its parent
     flags = 0
     if loading.self_collision:
@@ -77,6 +77,6 @@ def load_urdf(client: int, loading: UrdfOptions) -> int:
             )
         except pybullet.error as error:
             output.seek(0)
-            said = output.read().decode(errors="replace").strip().splitlines()
-            reason = f": {said[-1]}" if said else ""
+            lines = output.read().decode(errors="replace").strip().splitlines()
+            reason = f": {lines[-1]}" if lines else ""
             raise CharacterError(f"{loading.urdf_path}: not a usable URDF{reason}") from error

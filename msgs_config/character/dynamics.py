@@ -49,8 +49,8 @@ class DynamicsModel:
         mujoco.mj_crb(self._model, data)
         mujoco.mj_comVel(self._model, data)
 
-    def error_of(self, position: FloatArray, desired: FloatArray) -> FloatArray:
-        """What leads from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.
+    def compute_error(self, position: FloatArray, desired: FloatArray) -> FloatArray:
+        """Error (n,) from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.
 
         It is the velocity, and so a rotation's part is in the child frame, that leads there in 1 s.
         """

@@ -1,9 +1,8 @@
-"""What the engine is given to read in the place of a URDF."""
+"""The text of a URDF as the engine reads it."""
 
 from pathlib import Path
 from xml.etree import ElementTree
 
-from msgs_config import files
 from msgs_config.character.mesh_check import check_mesh
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import UrdfOptions
@@ -14,7 +13,7 @@ MAX_LINE_BYTES = 8000
 """The engine reads lines of up to 8191 bytes, and breaks a longer one in two."""
 
 
-def engine_urdf(loading: UrdfOptions) -> str:
+def write_engine_urdf(loading: UrdfOptions) -> str:
     """A URDF's text for the engine: what moves and collides, in short lines, its meshes absolute.
 
     The engine would look for a mesh in the working directory first, take a tab between two
@@ -23,7 +22,7 @@ def engine_urdf(loading: UrdfOptions) -> str:
     Raises:
         CharacterError: a mesh does not exist or cannot be used, or an element is too long.
     """
-    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
+    robot = resolve_meshes(loading)
     for link in robot.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
@@ -31,7 +30,6 @@ def engine_urdf(loading: UrdfOptions) -> str:
         for attribute in NUMBERS.get(element.tag, {}):
             if attribute in element.attrib:
                 element.set(attribute, " ".join(element.attrib[attribute].split()))
-    resolve_meshes(robot, loading.urdf_path)
     for path in {mesh.get("filename", "") for mesh in robot.iterfind("link//mesh")}:
         try:
             check_mesh(Path(path))

@@ -1,48 +1,27 @@
 """The YAML file of a character, checked key by key."""
 
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from msgs_config import files
-from msgs_config.character.joint_bounds import with_bounds
+from msgs_config.character.joint_bounds import write_bounds
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
 from msgs_config.character.urdf_check import check_urdf, has_world_base
 from msgs_config.errors import CharacterError, one_of
+from msgs_config.mappings import LARGEST, MappingReader
 
 CHARACTERS_DIRECTORY = Path(__file__).parent / "data"
 
-_LARGEST = sys.float_info.max
-_SHOWN = 200  # characters
 _LEAST_SIGMA = 1e-6  # rad or m
 _NO_GAINS = Gains()
-_KEYS = [
-    "urdf",
-    "scale",
-    "up_axis",
-    "fixed_base",
-    "inertia",
-    "self_collision",
-    "joint_damping",
-    "rest_pose",
-    "joints",
-    "root_assistance",
-    "clips",
-    "feet",
-    "planner",
-]
-_JOINT_KEYS = [
-    "stiffness",
-    "damping",
-    "integral",
-    "effort_limit",
-    "lower",
-    "upper",
-    "passive_damping",
-    "soft_limit",
-]
+_GAIN_KEYS = ("stiffness", "damping", "integral")
+_JOINT_KEYS = (*_GAIN_KEYS, "effort_limit", "lower", "upper", "passive_damping", "soft_limit")
+_CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets")
+_URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision")
+_POSE_KEYS = ("joint_damping", "rest_pose", "joints", "root_assistance")
+_KEYS = (*_URDF_KEYS, *_POSE_KEYS, "clips", "feet", "planner")
 
 
 @dataclass(frozen=True)
@@ -116,56 +95,57 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
     content: dict[str, Any] = {"urdf": path.name}
     if text or path.suffix != ".urdf":
         content = files.parse_yaml_mapping(path, text, CharacterError)
-    reader = _Reader(path, content)
+    reader = MappingReader(path, content, CharacterError)
     reader.check_keys(_KEYS)
-    joints = reader.parts("joints")
-    for joint in joints.values():
-        joint.check_keys(_JOINT_KEYS)
-    assistance = reader.part("root_assistance")
-    assistance.check_keys(["force", "torque"])
+    joints = reader.parts("joints", _JOINT_KEYS)
+    reader.part("root_assistance").check_keys(["force", "torque"])
+    assistance = reader.parts("root_assistance", _GAIN_KEYS)
     rest_pose = reader.part("rest_pose")
     return CharacterFile(
         name=path.stem,
         path=path,
         text=text,
-        loading=_loading(reader, joints, urdf),
+        loading=_read_urdf(path, reader, joints, urdf),
         up_axis=reader.choice("up_axis", ["z", "y"]),
         rest_pose={name: rest_pose.number(name) for name in rest_pose.content},
-        gains={name: joint.gains() for name, joint in joints.items()},
-        effort_limits=_numbers(joints, "effort_limit"),
+        gains={name: _read_gains(joint) for name, joint in joints.items()},
+        effort_limits=_read_numbers(joints, "effort_limit"),
         urdf_damping=reader.choice("joint_damping", ["file", "none"]) == "file",
-        passive_damping=_numbers(joints, "passive_damping"),
+        passive_damping=_read_numbers(joints, "passive_damping"),
         soft_limits={
-            name: _soft_limit(joint.part("soft_limit"))
+            name: _read_soft_limit(joint.part("soft_limit"))
             for name, joint in joints.items()
             if "soft_limit" in joint.content
         },
-        assistance={name: part.gains() for name, part in reader.parts("root_assistance").items()},
-        clips=_clip_format(reader.part("clips")),
-        feet=tuple(reader.names("feet", "links", default=[])),
-        planning=_planning(reader.part("planner"), joints),
+        assistance={name: _read_gains(part) for name, part in assistance.items()},
+        clips=_read_clip_format(path, reader.part("clips")),
+        feet=reader.names("feet", "links", default=[]),
+        planning=_read_planning(reader.part("planner"), joints),
     )
 
 
-def _loading(
-    reader: "_Reader", joints: dict[str, "_Reader"], known: tuple[Path, str] | None
+def _read_urdf(
+    path: Path,
+    reader: MappingReader,
+    joints: dict[str, MappingReader],
+    known: tuple[Path, str] | None,
 ) -> UrdfOptions:
     """How the URDF is to be read; `known` are its path and its text, bounds and all."""
     if known is None:
-        urdf = reader.path_of("urdf")
+        urdf = _resolve(path, reader, "urdf")
         text = files.read_text(urdf, CharacterError)
     else:
         urdf, text = known
     robot = check_urdf(urdf, text)
     scale = reader.number("scale", default=1.0, minimum=1e-6)
     bounds = {
-        name: (joint.number_or_none("lower"), joint.number_or_none("upper"))
+        name: (_read_bound(joint, "lower"), _read_bound(joint, "upper"))
         for name, joint in joints.items()
-        if {"lower", "upper"} & set(joint.content)
+        if "lower" in joint.content or "upper" in joint.content
     }
     return UrdfOptions(
         urdf_path=urdf,
-        urdf_text=text if known or not bounds else with_bounds(robot, bounds, scale, reader.file),
+        urdf_text=text if known or not bounds else write_bounds(robot, bounds, scale, path),
         scale=scale,
         fixed_base=reader.flag("fixed_base", default=has_world_base(robot)),
         inertia_from_file=reader.choice("inertia", ["file", "shapes"]) == "file",
@@ -173,7 +153,23 @@ def _loading(
     )
 
 
-def _numbers(joints: dict[str, "_Reader"], key: str) -> dict[str, float]:
+def _read_bound(joint: MappingReader, key: str) -> float | None:
+    """The bound of a joint, rad or m; None if the file leaves the URDF's."""
+    return joint.number(key) if key in joint.content else None
+
+
+def _resolve(path: Path, reader: MappingReader, key: str) -> Path:
+    """The path under a key, which may be relative to the folder of the file that names it."""
+    text = reader.text(key)
+    if "\0" in text:
+        raise reader.wrong(key, text, "a path")
+    try:
+        return files.resolve(text, path.parent, CharacterError)
+    except CharacterError as error:
+        raise CharacterError(f"{path}: {key}: {error}") from error
+
+
+def _read_numbers(joints: dict[str, MappingReader], key: str) -> dict[str, float]:
     """The number of each joint that has this key, by the joint's name."""
     return {
         name: joint.number(key, minimum=0.0)
@@ -182,9 +178,22 @@ def _numbers(joints: dict[str, "_Reader"], key: str) -> dict[str, float]:
     }
 
 
-def _soft_limit(limit: "_Reader") -> SoftLimit:
+def _read_gains(reader: MappingReader, default: Gains = _NO_GAINS) -> Gains:
+    return Gains(
+        stiffness=reader.number("stiffness", default.stiffness, minimum=0.0),
+        damping=reader.number("damping", default.damping, minimum=0.0),
+        integral=reader.number("integral", default.integral, minimum=0.0),
+    )
+
+
+def _read_angles(reader: MappingReader, key: str, default: list[float] | None = None) -> Vector:
+    x, y, z = reader.numbers(key, 3, (-math.pi, math.pi), default)
+    return (x, y, z)
+
+
+def _read_soft_limit(limit: MappingReader) -> SoftLimit:
     limit.check_keys(["lower", "upper", "stiffness", "damping"])
-    lower, upper = limit.angles("lower"), limit.angles("upper")
+    lower, upper = _read_angles(limit, "lower"), _read_angles(limit, "upper")
     if any(low > high for low, high in zip(lower, upper, strict=True)):
         raise limit.wrong("lower", list(lower), "nowhere above 'upper'")
     return SoftLimit(
@@ -195,14 +204,11 @@ def _soft_limit(limit: "_Reader") -> SoftLimit:
     )
 
 
-def _clip_format(clips: "_Reader") -> ClipFormat:
+def _read_clip_format(path: Path, clips: MappingReader) -> ClipFormat:
     if not clips.content:
         return ClipFormat()
-    clips.check_keys(
-        ["files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets"]
-    )
-    joints = clips.names("joints", "joint names", default=None)
-    pattern = clips.path_of("files")
+    clips.check_keys(_CLIP_KEYS)
+    pattern = _resolve(path, clips, "files")
     if pattern.name.count("*") != 1:
         raise clips.wrong("files", pattern.name, "a path with one '*'")
     signs, offsets = clips.part("signs"), clips.part("offsets")
@@ -211,146 +217,31 @@ def _clip_format(clips: "_Reader") -> ClipFormat:
             raise signs.wrong(name, sign, "1 or -1")
     return ClipFormat(
         str(pattern),
-        tuple(joints),
+        clips.names("joints", "joint names"),
         clips.choice("up_axis", ["z", "y"]),
         clips.choice("quaternion", ["wxyz", "xyzw"]),
-        clips.angles("base_rotation", default=[0.0, 0.0, 0.0]),
+        _read_angles(clips, "base_rotation", default=[0.0, 0.0, 0.0]),
         {name: signs.number(name) for name in signs.content},
         {name: offsets.number(name) for name in offsets.content},
     )
 
 
-def _planning(planner: "_Reader", joints: dict[str, "_Reader"]) -> Planning:
-    """What is said for the planner; a gain that it leaves out is that of `joints`."""
+def _read_planning(planner: MappingReader, joints: dict[str, MappingReader]) -> Planning:
+    """The settings of the planner; a gain that it leaves out is that of `joints`."""
     planner.check_keys(["sigma", "gains"])
-    sigma, gains = planner.part("sigma"), planner.parts("gains")
-    for part in gains.values():
-        part.check_keys(["stiffness", "damping", "integral"])
+    sigma, gains = planner.part("sigma"), planner.parts("gains", _GAIN_KEYS)
     return Planning(
-        {name: sigma.sigma(name) for name in sigma.content},
+        {name: _read_sigma(sigma, name) for name in sigma.content},
         {
-            name: part.gains(joints[name].gains() if name in joints else Gains())
+            name: _read_gains(part, _read_gains(joints[name]) if name in joints else _NO_GAINS)
             for name, part in gains.items()
         },
     )
 
 
-class _Reader:
-    """Takes typed values out of a mapping, with errors that name file, key and value."""
-
-    def __init__(self, file: Path, content: dict[str, Any], prefix: str = "") -> None:
-        self.content = content
-        self.file = file
-        self._prefix = prefix  # the keys that lead to this mapping, such as `joints.chest.`
-
-    def wrong(self, key: str, value: object, right: str) -> CharacterError:
-        return CharacterError(
-            f"{self.file}: {self._prefix}{key} is {_shown(value)}; it must be {right}"
-        )
-
-    def check_keys(self, known: list[str]) -> None:
-        for key in self.content:
-            if key not in known:
-                sentence = one_of("key", f"{self._prefix}{key}", known)
-                raise CharacterError(f"{self.file}: {sentence}")
-
-    def part(self, key: str) -> "_Reader":
-        """The mapping under a key; one that is absent is empty."""
-        value = self.content.get(key)
-        value = {} if value is None else value
-        if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
-            raise self.wrong(key, value, "a mapping")
-        return _Reader(self.file, value, f"{self._prefix}{key}.")
-
-    def parts(self, key: str) -> dict[str, "_Reader"]:
-        """The mappings in the mapping under a key."""
-        part = self.part(key)
-        return {name: part.part(name) for name in part.content}
-
-    def text(self, key: str) -> str:
-        value = self.content.get(key)
-        if not isinstance(value, str) or not value:
-            raise self.wrong(key, value, "a text")
-        return value
-
-    def path_of(self, key: str) -> Path:
-        text = self.text(key)
-        if "\0" in text:
-            raise self.wrong(key, text, "a path")
-        try:
-            return files.resolve(text, self.file.parent, CharacterError)
-        except CharacterError as error:
-            raise CharacterError(f"{self.file}: {self._prefix}{key}: {error}") from error
-
-    def choice(self, key: str, choices: list[str]) -> str:
-        value = self.content.get(key, choices[0])
-        if value not in choices:
-            raise self.wrong(key, value, " or ".join(f"'{choice}'" for choice in choices))
-        return str(value)
-
-    def flag(self, key: str, default: bool = False) -> bool:
-        value = self.content.get(key, default)
-        if not isinstance(value, bool):
-            raise self.wrong(key, value, "true or false")
-        return value
-
-    def number(self, key: str, default: float | None = None, minimum: float = -_LARGEST) -> float:
-        value: Any = self.content.get(key, default)
-        # compared, not converted: a whole number may be larger than every float
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if is_number and minimum <= value <= _LARGEST:
-            return float(value)
-        bound = "" if minimum == -_LARGEST else f" of at least {minimum:g}"
-        raise self.wrong(key, value, f"a finite number{bound}")
-
-    def number_or_none(self, key: str) -> float | None:
-        """The number of a key that may be absent."""
-        return self.number(key) if key in self.content else None
-
-    def angles(self, key: str, default: list[float] | None = None) -> Vector:
-        """Three angles in rad from -pi to pi; without a default they must be there."""
-        value = self.content.get(key, default)
-        right = "a list of three numbers from -pi to pi"
-        if not isinstance(value, list) or len(value) != 3:
-            raise self.wrong(key, value, right)
-        for item in value:
-            is_number = isinstance(item, (int, float)) and not isinstance(item, bool)
-            if not (is_number and abs(item) <= math.pi):  # NaN is not
-                raise self.wrong(key, value, right)
-        x, y, z = (float(item) for item in value)
-        return (x, y, z)
-
-    def names(self, key: str, what: str, default: list[str] | None) -> list[str]:
-        """A list of names; without a default it must be there."""
-        value = self.content.get(key, default)
-        if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-            raise self.wrong(key, value, f"a list of {what}")
-        return value
-
-    def sigma(self, key: str) -> float | Vector:
-        """A positive number, or three of them."""
-        value = self.content.get(key)
-        if not isinstance(value, list):
-            return self.number(key, minimum=_LEAST_SIGMA)
-        if len(value) != 3:
-            raise self.wrong(key, value, "a number or a list of three")
-        parts = {f"{key}[{index}]": item for index, item in enumerate(value)}
-        numbers = _Reader(self.file, parts, self._prefix)
-        x, y, z = (numbers.number(part, minimum=_LEAST_SIGMA) for part in parts)
-        return (x, y, z)
-
-    def gains(self, default: Gains = _NO_GAINS) -> Gains:
-        return Gains(
-            stiffness=self.number("stiffness", default=default.stiffness, minimum=0.0),
-            damping=self.number("damping", default=default.damping, minimum=0.0),
-            integral=self.number("integral", default=default.integral, minimum=0.0),
-        )
-
-
-def _shown(value: object) -> str:
-    """A value as an error shows it: a few lines of YAML can stand for millions of entries."""
-    if isinstance(value, (list, dict)):
-        return f"a {type(value).__name__}"
-    if isinstance(value, int) and abs(value) > _LARGEST:
-        return "a number of too many digits"
-    return repr(value)[:_SHOWN]
+def _read_sigma(sigma: MappingReader, name: str) -> float | Vector:
+    """A positive number, or three of them."""
+    if not isinstance(sigma.content[name], list):
+        return sigma.number(name, minimum=_LEAST_SIGMA)
+    x, y, z = sigma.numbers(name, 3, (_LEAST_SIGMA, LARGEST))
+    return (x, y, z)

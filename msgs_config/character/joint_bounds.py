@@ -12,10 +12,10 @@ Bounds = tuple[float | None, float | None]
 _KINDS = ("revolute", "continuous", "prismatic")
 
 
-def with_bounds(
+def write_bounds(
     robot: ElementTree.Element, bounds: dict[str, Bounds], scale: float, file: Path
 ) -> str:
-    """The text of a URDF with other bounds, so that whoever reads it obeys them.
+    """The text of a URDF with other bounds, so that each of its readers obeys them.
 
     `bounds` are by the joint's name, a slider's with the URDF's `scale` applied. A continuous joint
     becomes a revolute one. Names that are no joint's are left out. `file` is where they are from.

@@ -26,7 +26,7 @@ class JointType(Enum):
 
     @property
     def suffixes(self) -> tuple[str, ...]:
-        """What the joint's entries put behind its name, one string an entry."""
+        """Suffix of each of the joint's entries, which follows the joint's name."""
         return _SUFFIXES[self]
 
 
@@ -174,7 +174,7 @@ class JointLayout:
         return GeneralizedPosition(position, rotations.exp(position[..., self.rotation_entries]))
 
     def difference(self, start: "GeneralizedPosition", end: "GeneralizedPosition") -> FloatArray:
-        """What leads from `start` to `end`, (..., n): rad and m, a rotation in start's child frame.
+        """Difference (..., n) from `start` to `end`: rad and m, a rotation in start's child frame.
 
         A rotation's part is `rotvec(q_start^-1 q_end)`, never a difference of components.
         """

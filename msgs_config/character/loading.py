@@ -5,18 +5,16 @@ the controller's model of the dynamics are built from the same ones.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from msgs_config import files
-from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
 from msgs_config.character.layout import ROOT, JointLayout, JointType
-from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import (
     ROOT_TORQUE,
     Character,
@@ -24,11 +22,8 @@ from msgs_config.character.model import (
     Joint,
     Link,
     Pose,
-    Quaternion,
-    SoftLimit,
-    Vector,
 )
-from msgs_config.character.shapes import read_collision_shapes, read_shapes
+from msgs_config.character.shapes import read_shapes
 from msgs_config.character.urdf_check import links_without_inertial
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.geometry import rotations
@@ -47,41 +42,32 @@ def load_character(name_or_path: str) -> Character:
     Raises:
         CharacterError: no such character, or its file or URDF cannot be used; says why.
     """
-    return make_character(read_character_file(name_or_path))
+    return build_character(read_character_file(name_or_path))
 
 
-def make_character(file: CharacterFile) -> Character:
+def build_character(file: CharacterFile) -> Character:
     """The character that a file and its URDF describe.
 
     Raises:
         CharacterError: the two do not fit each other, or a mesh cannot be used; says why.
     """
     urdf = file.loading.urdf_path
-    robot = files.parse_xml(urdf, file.loading.urdf_text, CharacterError)
-    resolve_meshes(robot, urdf)
-    seen = read_shapes(robot, urdf, file.loading.scale)
-    touched = read_collision_shapes(robot, urdf, file.loading.scale)
+    shapes = read_shapes(file.loading)
     client = connect()
     try:
-        body = load_urdf(client, file.loading)
-        links = _read_links(client, body, file)
+        links = _read_links(client, load_urdf(client, file.loading), file)
     finally:
         pybullet.disconnect(client)
-    _check_finite(urdf, links)
-    links = [
-        replace(link, shapes=seen[link.name], collision_shapes=touched[link.name])
-        for link in _depth_first(links)
-    ]
-    for link in links[1:]:
-        if link.joint.name in (ROOT, ROOT_TORQUE) and link.joint.type is not JointType.FIXED:
-            raise CharacterError(
-                f"{urdf}: a joint is named '{link.joint.name}', which is the floating base's"
-            )
+    _check_links(urdf, links)
+    links = _sort_depth_first(links)
+    for index, link in enumerate(links):
+        seen, collided = shapes[link.name]
+        links[index] = replace(link, shapes=seen, collision_shapes=collided)
     try:
         layout = JointLayout((link.joint.name, link.joint.type) for link in links)
     except LayoutError as error:
         raise CharacterError(f"{urdf}: {error}") from error
-    _check_joint_names(file, layout)
+    _check_names(file, layout)
     _check_rest_pose(file, links)
     return Character(
         name=file.name,
@@ -89,12 +75,12 @@ def make_character(file: CharacterFile) -> Character:
         file_text=file.text,
         loading=file.loading,
         links=tuple(links),
-        gains=_gains(file, layout),
-        rest_position=_rest_position(file, layout),
+        gains=_merge_gains(file, layout),
+        rest_position=_place_rest_pose(file, layout),
         clips=file.clips,
         feet=file.feet,
         planning=file.planning,
-        warnings=_warnings(file, layout, links, links_without_inertial(robot)),
+        warnings=_collect_warnings(file, layout, links),
     )
 
 
@@ -102,24 +88,19 @@ def _read_links(client: int, body: int, file: CharacterFile) -> list[Link]:
     """The links in the engine's order, each after its parent, the base first."""
     base_type = JointType.FIXED if file.loading.fixed_base else JointType.FLOATING
     base_name = pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()
-    base_joint = Joint(ROOT, base_type, pose_in_parent=_fixed_base_pose(file))
-    links = [_link(client, body, -1, base_name, -1, base_joint)]
+    base_joint = Joint(ROOT, base_type, pose_in_parent=_pose_fixed_base(file))
+    links = [_read_link(client, body, -1, base_name, -1, base_joint)]
     for index in range(pybullet.getNumJoints(body, physicsClientId=client)):
         info = pybullet.getJointInfo(body, index, physicsClientId=client)
-        name, parent = info[1].decode(), info[16] + 1
-        if info[2] not in _JOINT_TYPES:
-            raise CharacterError(
-                f"{file.loading.urdf_path}: joint '{name}' is of a type that is not supported; "
-                "it must be revolute, continuous, prismatic, spherical or fixed"
-            )
-        link = _link(client, body, index, info[12].decode(), parent, Joint(name, JointType.FIXED))
-        joint = _joint(info, links[parent].inertial_pose, link.inertial_pose)
-        links.append(replace(link, joint=_with_file(joint, file)))
+        parent, name = info[16] + 1, info[12].decode()
+        link = _read_link(client, body, index, name, parent, base_joint)
+        joint = _read_joint(info, links[parent].inertial_pose, link.inertial_pose)
+        links.append(replace(link, joint=_apply_file(joint, file)))
     return links
 
 
-def _with_file(joint: Joint, file: CharacterFile) -> Joint:
-    """The URDF's joint, with what the character's file says instead of it, or besides."""
+def _apply_file(joint: Joint, file: CharacterFile) -> Joint:
+    """The URDF's joint with the character's own effort limit, damping and soft limit."""
     name = joint.name
     damping = joint.damping if file.urdf_damping else 0.0
     if not 0.0 <= damping < math.inf:
@@ -140,13 +121,13 @@ def _with_file(joint: Joint, file: CharacterFile) -> Joint:
     )
 
 
-def _link(client: int, body: int, index: int, name: str, parent: int, joint: Joint) -> Link:
+def _read_link(client: int, body: int, index: int, name: str, parent: int, joint: Joint) -> Link:
     dynamics = pybullet.getDynamicsInfo(body, index, physicsClientId=client)
     pose = Pose(position=dynamics[3], orientation_xyzw=dynamics[4])
     return Link(name, parent, joint, dynamics[0], dynamics[2], pose)
 
 
-def _joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Pose) -> Joint:
+def _read_joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Pose) -> Joint:
     """A joint from `getJointInfo`, whose frames are the links' inertial ones.
 
     Its position is given in the parent's inertial frame, its axis in the child's, and its
@@ -159,14 +140,15 @@ def _joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Pose) -
     orientation = rotations.multiply(
         rotations.multiply(parent_turn, rotations.conjugate(turn)), rotations.conjugate(child_turn)
     )
+    x, y, z = rotations.rotate(child_turn, axis).tolist()
     joint_type = _JOINT_TYPES[info[2]]
     is_scalar = joint_type in (JointType.REVOLUTE, JointType.PRISMATIC)
     limited = is_scalar and info[8] <= info[9]
     return Joint(
         name=info[1].decode(),
         type=joint_type,
-        axis_in_child=_triple(rotations.rotate(child_turn, axis)),
-        pose_in_parent=Pose(_triple(position), _quadruple(orientation)),
+        axis_in_child=(x, y, z),
+        pose_in_parent=Pose.of_arrays(position, orientation),
         lower=float(info[8]) if limited else -math.inf,
         upper=float(info[9]) if limited else math.inf,
         effort_limit=float(info[10]) if info[10] > 0.0 else math.inf,
@@ -174,8 +156,8 @@ def _joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Pose) -
     )
 
 
-def _check_finite(urdf: Path, links: list[Link]) -> None:
-    """The engine computes inertia and frames; numbers that are too large overflow there."""
+def _check_links(urdf: Path, links: list[Link]) -> None:
+    """Check numbers, which overflow where the engine computes with them, and joints' names."""
     for link in links:
         poses = (link.inertial_pose, link.joint.pose_in_parent)
         numbers = [number for pose in poses for number in (*pose.position, *pose.orientation_xyzw)]
@@ -183,9 +165,14 @@ def _check_finite(urdf: Path, links: list[Link]) -> None:
             raise CharacterError(
                 f"{urdf}: link '{link.name}' has a mass, an inertia or a frame that is too large"
             )
+    for joint in (link.joint for link in links[1:]):
+        if joint.name in (ROOT, ROOT_TORQUE) and joint.type is not JointType.FIXED:
+            raise CharacterError(
+                f"{urdf}: a joint is named '{joint.name}', which is the floating base's"
+            )
 
 
-def _depth_first(links: list[Link]) -> list[Link]:
+def _sort_depth_first(links: list[Link]) -> list[Link]:
     """The links with every child right after its parent's branch so far, parents renumbered."""
     children: list[list[int]] = [[] for _ in links]
     for index, link in enumerate(links[1:], start=1):
@@ -199,60 +186,52 @@ def _depth_first(links: list[Link]) -> list[Link]:
     return [replace(links[old], parent=place[links[old].parent]) for old in order]
 
 
-def _check_joint_names(file: CharacterFile, layout: JointLayout) -> None:
-    planning = file.planning
-    for key, names in (
-        ("joints", file.gains),
-        ("clips.joints", file.clips.joints),
-        ("planner.sigma", planning.sigma),
-        ("planner.gains", planning.gains),
-    ):
+def _check_names(file: CharacterFile, layout: JointLayout) -> None:
+    """Check that the file names joints and degrees of freedom that there are."""
+
+    def check(key: str, names: Iterable[str], what: str, known: list[str]) -> None:
         for name in names:
-            if name not in layout.actuated_joint_names:
-                sentence = one_of("joint", name, layout.actuated_joint_names)
-                raise CharacterError(f"{file.path}: {key}: {sentence}")
+            if name not in known:
+                raise CharacterError(f"{file.path}: {key}: {one_of(what, name, known)}")
+
+    joints, clips = layout.actuated_joint_names, file.clips
+    check("joints", file.gains, "joint", joints)
+    check("clips.joints", clips.joints, "joint", joints)
+    check("planner.sigma", file.planning.sigma, "joint", joints)
+    check("planner.gains", file.planning.gains, "joint", joints)
     of_one_angle = [
-        name for name in file.clips.joints if layout.joint(name).type is not JointType.SPHERICAL
+        name for name in clips.joints if layout.joint(name).type is not JointType.SPHERICAL
     ]
-    for key, changed in (("signs", file.clips.signs), ("offsets", file.clips.offsets)):
-        for name in changed:
-            if name not in of_one_angle:
-                sentence = one_of("joint of one angle", name, of_one_angle)
-                raise CharacterError(f"{file.path}: clips.{key}: {sentence}")
+    check("clips.signs", clips.signs, "joint of one angle", of_one_angle)
+    check("clips.offsets", clips.offsets, "joint of one angle", of_one_angle)
+    check("rest_pose", file.rest_pose, "degree of freedom", list(layout.dof_names))
     if file.assistance and not layout.has_floating_base:
         raise CharacterError(f"{file.path}: root_assistance is for a floating base, this is fixed")
 
 
 def _check_rest_pose(file: CharacterFile, links: list[Link]) -> None:
+    """Check that the rest pose is within hard and soft limits; of the latter also where it is 0."""
     for joint in (link.joint for link in links):
-        value = file.rest_pose.get(joint.name)
-        if value is not None and not joint.lower <= value <= joint.upper:
-            raise CharacterError(
-                f"{file.path}: rest_pose.{joint.name} is {value:g}; "
-                f"its limits are {joint.lower:g} to {joint.upper:g}"
-            )
+        limits = [(joint.name, joint.lower, joint.upper)]
         if joint.soft_limit is not None:
-            _check_ball_joint(file, joint.name, joint.soft_limit)
+            names = [joint.name + suffix for suffix in joint.type.suffixes]
+            limits = list(zip(names, joint.soft_limit.lower, joint.soft_limit.upper, strict=True))
+        for name, lower, upper in limits:
+            value = file.rest_pose.get(name, None if joint.soft_limit is None else 0.0)
+            if value is not None and not lower <= value <= upper:
+                kind = "limits" if joint.soft_limit is None else "soft limits"
+                raise CharacterError(
+                    f"{file.path}: rest_pose.{name} is {value:g}; "
+                    f"its {kind} are {lower:g} to {upper:g}"
+                )
 
 
-def _check_ball_joint(file: CharacterFile, name: str, limit: SoftLimit) -> None:
-    """The rest pose is one that the joint's soft limit leaves alone."""
-    for suffix, lower, upper in zip(
-        JointType.SPHERICAL.suffixes, limit.lower, limit.upper, strict=True
-    ):
-        value = file.rest_pose.get(name + suffix, 0.0)
-        if not lower <= value <= upper:
-            raise CharacterError(
-                f"{file.path}: rest_pose.{name}{suffix} is {value:g}; "
-                f"its soft limits are {lower:g} to {upper:g}"
-            )
-
-
-def _warnings(
-    file: CharacterFile, layout: JointLayout, links: list[Link], without_mass: set[str]
+def _collect_warnings(
+    file: CharacterFile, layout: JointLayout, links: list[Link]
 ) -> tuple[str, ...]:
     limp = [name for name in layout.actuated_joint_names if name not in file.gains]
     first = 1 if file.loading.fixed_base else 0
+    without_mass = links_without_inertial(file.loading.robot)
     unknown = sorted(without_mass & {link.name for link in links[first:]})
     warnings = []
     if limp:
@@ -264,7 +243,7 @@ def _warnings(
     return tuple(warnings)
 
 
-def _gains(file: CharacterFile, layout: JointLayout) -> dict[str, Gains]:
+def _merge_gains(file: CharacterFile, layout: JointLayout) -> dict[str, Gains]:
     gains = {name: file.gains.get(name, Gains()) for name in layout.actuated_joint_names}
     if layout.has_floating_base:
         gains[ROOT] = file.assistance.get("force", Gains())
@@ -272,32 +251,19 @@ def _gains(file: CharacterFile, layout: JointLayout) -> dict[str, Gains]:
     return gains
 
 
-def _fixed_base_pose(file: CharacterFile) -> Pose:
+def _pose_fixed_base(file: CharacterFile) -> Pose:
     """Where a fixed base stands in the world; a floating one has its pose in the state."""
     if file.loading.fixed_base and file.up_axis == "y":
-        return Pose(orientation_xyzw=_quadruple(rotations.ABOUT_X_QUARTER_TURN_XYZW))
+        return Pose.of_arrays(np.zeros(3), rotations.ABOUT_X_QUARTER_TURN_XYZW)
     return Pose()
 
 
-def _rest_position(file: CharacterFile, layout: JointLayout) -> tuple[float, ...]:
+def _place_rest_pose(file: CharacterFile, layout: JointLayout) -> tuple[float, ...]:
     """The rest pose (n,), message form; a y-up model is turned to stand in the z-up world."""
     position = np.zeros(layout.size)
     if layout.has_floating_base and file.up_axis == "y":
         turned = rotations.log(rotations.ABOUT_X_QUARTER_TURN_XYZW)
         position[layout.joint(ROOT).vectors[1]] = turned
     for name, value in file.rest_pose.items():
-        if name not in layout.dof_names:
-            sentence = one_of("degree of freedom", name, list(layout.dof_names))
-            raise CharacterError(f"{file.path}: rest_pose: {sentence}")
         position[layout.dof_names.index(name)] = value
     return tuple(position.tolist())
-
-
-def _triple(values: FloatArray) -> Vector:
-    x, y, z = values.tolist()
-    return (x, y, z)
-
-
-def _quadruple(values: FloatArray) -> Quaternion:
-    x, y, z, w = values.tolist()
-    return (x, y, z, w)

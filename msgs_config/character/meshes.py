@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -15,18 +16,20 @@ from msgs_config.errors import CharacterError
 MAX_MESH_BYTES = 64 * 1024 * 1024
 
 
-def resolve_meshes(robot: ElementTree.Element, urdf: Path) -> None:
-    """Replace the file names of all meshes of a URDF's links by absolute paths.
+def resolve_meshes(loading: UrdfOptions) -> ElementTree.Element:
+    """A copy of a URDF's root, in which the meshes of its links have absolute paths.
 
     Raises:
         CharacterError: a mesh does not exist or is too large; names the file, link and path.
     """
+    robot, urdf = deepcopy(loading.robot), loading.urdf_path
     for link in robot.findall("link"):
         for mesh in link.iter("mesh"):
             try:
                 mesh.set("filename", str(_find(mesh.get("filename", ""), urdf)))
             except CharacterError as error:
                 raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
+    return robot
 
 
 def collision_meshes(loading: UrdfOptions) -> dict[str, str]:
@@ -35,8 +38,7 @@ def collision_meshes(loading: UrdfOptions) -> dict[str, str]:
     Raises:
         CharacterError: a mesh does not exist or cannot be read.
     """
-    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
-    names = {mesh.get("filename", "") for mesh in robot.iterfind("link/collision//mesh")}
+    names = {mesh.get("filename", "") for mesh in loading.robot.iterfind("link/collision//mesh")}
     return {name: _hash_of(_find(name, loading.urdf_path)) for name in sorted(names)}
 
 

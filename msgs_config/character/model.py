@@ -1,4 +1,4 @@
-"""What a character is: links, joints, masses, shapes and frames, and how it is to be driven.
+"""Description of a character: links, joints, masses, shapes, frames, gains and defaults.
 
 Both sides build theirs from this one description: the simulator its body, the controller its
 model of the dynamics. All frames are URDF link frames; lengths in m, masses in kg.
@@ -9,11 +9,14 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
+from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 
@@ -24,6 +27,9 @@ Vector = tuple[float, float, float]
 Quadruple = tuple[float, float, float, float]
 Quaternion = Quadruple
 
+GREY = (0.7, 0.7, 0.7, 1.0)
+"""The colour rgba of a shape that has none."""
+
 
 @dataclass(frozen=True)
 class Pose:
@@ -32,9 +38,16 @@ class Pose:
     position: Vector = (0.0, 0.0, 0.0)
     orientation_xyzw: Quaternion = IDENTITY_XYZW
 
+    @classmethod
+    def of_arrays(cls, position: FloatArray, orientation_xyzw: FloatArray) -> "Pose":
+        """From a position (3,) in m and an orientation (4,)."""
+        x, y, z = position.tolist()
+        qx, qy, qz, qw = orientation_xyzw.tolist()
+        return cls((x, y, z), (qx, qy, qz, qw))
+
 
 class ShapeType(Enum):
-    """What a shape is, and what its `size` says; axes of symmetry are z."""
+    """Kind of a shape, and the meaning of its `size`; axes of symmetry are z."""
 
     BOX = "box"  # edges x, y, z
     SPHERE = "sphere"  # radius
@@ -50,7 +63,7 @@ class Shape:
     type: ShapeType
     size: tuple[float, ...]  # m; for a mesh factors
     pose: Pose = Pose()
-    color_rgba: Quadruple = (0.7, 0.7, 0.7, 1.0)
+    color_rgba: Quadruple = GREY
     mesh: str = ""
 
     def without_capsule(self) -> tuple["Shape", ...]:
@@ -81,7 +94,7 @@ class SoftLimit:
 
 @dataclass(frozen=True)
 class Joint:
-    """What joins a link to its parent; for a base link, to the world."""
+    """Joint of a link to its parent; of a base link, to the world."""
 
     name: str
     type: JointType
@@ -119,7 +132,7 @@ class Gains:
 
 @dataclass(frozen=True)
 class Planning:
-    """What differs where joint torques are planned."""
+    """Settings that differ where joint torques are planned."""
 
     sigma: dict[str, float | Vector] = field(default_factory=dict)
     """By joint: how far its reference may be moved, rad or m; the measure of offsets."""
@@ -139,7 +152,7 @@ class ClipFormat:
     signs: dict[str, float] = field(default_factory=dict)
     """By joint: 1 or -1, of its angle in a clip."""
     offsets: dict[str, float] = field(default_factory=dict)
-    """By joint, rad or m: what is added to it then."""
+    """By joint, rad or m: added to its angle after the sign."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +165,11 @@ class UrdfOptions:
     fixed_base: bool = False
     inertia_from_file: bool = False
     self_collision: bool = False
+
+    @cached_property
+    def robot(self) -> ElementTree.Element:
+        """The root of the URDF's text, parsed once; to be copied before it is changed."""
+        return files.parse_xml(self.urdf_path, self.urdf_text, CharacterError)
 
 
 @dataclass(frozen=True)
@@ -190,7 +208,7 @@ class Character:
     clips: ClipFormat
     feet: tuple[str, ...] = ()  # the links that it stands on
     planning: Planning = Planning()
-    warnings: tuple[str, ...] = ()  # what its author may have overlooked
+    warnings: tuple[str, ...] = ()  # of likely mistakes in its files
     placement: Placement = Placement()
 
     @cached_property
@@ -210,9 +228,7 @@ class Character:
         base = self.links[0]
         pose = base.joint.pose_in_parent
         origin, turn = placement.moved(np.array(pose.position), np.array(pose.orientation_xyzw))
-        x, y, z = origin.tolist()
-        qx, qy, qz, qw = turn.tolist()
-        joint = replace(base.joint, pose_in_parent=Pose((x, y, z), (qx, qy, qz, qw)))
+        joint = replace(base.joint, pose_in_parent=Pose.of_arrays(origin, turn))
         links = (replace(base, joint=joint), *self.links[1:])
         return replace(self, placement=placement, links=links)
 
@@ -229,12 +245,8 @@ class Character:
     @property
     def vector_names(self) -> list[str]:
         """Name of each physical vector of the layout: the joint's, `root_r` for root torque."""
-        names: list[str] = []
-        for joint in self.moving_joints:
-            names.append(joint.name)
-            if joint.type is JointType.FLOATING:
-                names.append(ROOT_TORQUE)
-        return names
+        names = [joint.name for joint in self.moving_joints]
+        return [ROOT, ROOT_TORQUE, *names[1:]] if self.layout.has_floating_base else names
 
     def effort_limits(self) -> FloatArray:
         """Limit (b,) of the norm of each physical vector of the layout, N m or N."""

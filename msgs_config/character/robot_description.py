@@ -3,10 +3,8 @@
 from pathlib import Path
 from xml.etree import ElementTree
 
-from msgs_config import files
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import Character
-from msgs_config.errors import CharacterError
 
 _JOINT_TYPES = {"revolute", "continuous", "prismatic", "fixed"}
 _SHAPES = {"box", "sphere", "cylinder", "mesh"}
@@ -17,11 +15,9 @@ def robot_description(character: Character) -> str | None:
 
     Ball joints, capsules and a scale are the engine's own and no part of URDF.
     """
-    urdf = character.loading.urdf_path
-    robot = files.parse_xml(urdf, character.loading.urdf_text, CharacterError)
-    if character.loading.scale != 1.0 or not _is_legal(robot):
+    if character.loading.scale != 1.0 or not _is_legal(character.loading.robot):
         return None
-    resolve_meshes(robot, urdf)
+    robot = resolve_meshes(character.loading)
     for mesh in robot.iterfind("link//mesh"):
         mesh.set("filename", Path(mesh.get("filename", "")).as_uri())
     return ElementTree.tostring(robot, encoding="unicode")

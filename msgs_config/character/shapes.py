@@ -1,13 +1,16 @@
 """The shapes of each link, those that are seen and those that collide, read from its URDF."""
 
-from pathlib import Path
+from typing import TypeAlias
 from xml.etree import ElementTree
 
 import numpy as np
 
-from msgs_config.character.model import Pose, Quadruple, Shape, ShapeType
+from msgs_config.character.meshes import resolve_meshes
+from msgs_config.character.model import GREY, Pose, Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
+
+Shapes: TypeAlias = tuple[Shape, ...]
 
 _SIZES = {  # the attributes that make up `Shape.size`, and what stands for one that may be absent
     ShapeType.BOX: {"size": ""},
@@ -19,51 +22,28 @@ _SIZES = {  # the attributes that make up `Shape.size`, and what stands for one 
 _NAMES = ", ".join(type.value for type in ShapeType)
 
 
-def read_shapes(
-    robot: ElementTree.Element, urdf: Path, scale: float
-) -> dict[str, tuple[Shape, ...]]:
-    """The seen shapes of each link by its name: its visual ones, or its collision shapes if none.
+def read_shapes(loading: UrdfOptions) -> dict[str, tuple[Shapes, Shapes]]:
+    """The shapes of each link that are seen, and those that collide, by the link's name.
 
-    `robot` is a URDF that was checked, its meshes' paths made absolute; `scale` multiplies all
-    lengths.
+    Where there are no visual shapes, those that collide are seen.
 
     Raises:
-        CharacterError: a shape is malformed; names the file and the link.
+        CharacterError: a shape is malformed, or a mesh does not exist; names the file and the link.
     """
+    robot = resolve_meshes(loading)
     colors = _named_colors(robot)
-    return {
-        link.get("name", ""): _shapes(
-            link, link.findall("visual") or link.findall("collision"), colors, urdf, scale
-        )
-        for link in robot.findall("link")
-    }
-
-
-def read_collision_shapes(
-    robot: ElementTree.Element, urdf: Path, scale: float
-) -> dict[str, tuple[Shape, ...]]:
-    """The shapes of each link by its name with which it touches others; as `read_shapes` otherwise.
-
-    Raises:
-        CharacterError: a shape is malformed; names the file and the link.
-    """
-    return {
-        link.get("name", ""): _shapes(link, link.findall("collision"), {}, urdf, scale)
-        for link in robot.findall("link")
-    }
-
-
-def _shapes(
-    link: ElementTree.Element,
-    parts: list[ElementTree.Element],
-    colors: dict[str, Quadruple],
-    urdf: Path,
-    scale: float,
-) -> tuple[Shape, ...]:
-    try:
-        return tuple(_shape(part, colors, scale) for part in parts)
-    except CharacterError as error:
-        raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
+    shapes = {}
+    for link in robot.findall("link"):
+        try:
+            seen, collided = (
+                tuple(_shape(part, colors, loading.scale) for part in link.findall(tag))
+                for tag in ("visual", "collision")
+            )
+        except CharacterError as error:
+            place = f"{loading.urdf_path}: link {link.get('name')!r}"
+            raise CharacterError(f"{place}: {error}") from error
+        shapes[link.get("name", "")] = (seen or collided, collided)
+    return shapes
 
 
 def _named_colors(robot: ElementTree.Element) -> dict[str, Quadruple]:
@@ -93,34 +73,32 @@ def _shape(part: ElementTree.Element, colors: dict[str, Quadruple], scale: float
         count = 1 if attribute in ("radius", "length") else 3
         text = element.get(attribute, default)
         size += _numbers(text, count, f"{attribute} of <{element.tag}>")
-    shape = Shape(
+    return Shape(
         type=shape_type,
         size=tuple(scale * length for length in size),
         pose=_pose(part.find("origin"), scale),
+        color_rgba=_color_of(part, colors),
         mesh=element.get("filename", "") if shape_type is ShapeType.MESH else "",
     )
-    color = _color_of(part, colors)
-    return shape if color is None else Shape(shape.type, shape.size, shape.pose, color, shape.mesh)
 
 
-def _color_of(part: ElementTree.Element, colors: dict[str, Quadruple]) -> Quadruple | None:
-    """The colour of a visual or collision element, if it has any."""
+def _color_of(part: ElementTree.Element, colors: dict[str, Quadruple]) -> Quadruple:
+    """The colour of a visual or collision element; grey if it has none."""
     material = part.find("material")
     if material is None:
-        return None
+        return GREY
     color = material.find("color")
-    return colors.get(material.get("name", "")) if color is None else _color(color)
+    return colors.get(material.get("name", ""), GREY) if color is None else _color(color)
 
 
 def _pose(origin: ElementTree.Element | None, scale: float) -> Pose:
     if origin is None:
         return Pose()
-    x, y, z = _numbers(origin.get("xyz", "0 0 0"), 3, "xyz of <origin>")
+    position = scale * np.array(_numbers(origin.get("xyz", "0 0 0"), 3, "xyz of <origin>"))
     roll, pitch, yaw = _numbers(origin.get("rpy", "0 0 0"), 3, "rpy of <origin>")
     about_x, about_y, about_z = rotations.exp(np.diag([roll, pitch, yaw]))
     turn = rotations.multiply(rotations.multiply(about_z, about_y), about_x)
-    qx, qy, qz, qw = turn.tolist()
-    return Pose((scale * x, scale * y, scale * z), (qx, qy, qz, qw))
+    return Pose.of_arrays(position, turn)
 
 
 def _numbers(text: str, count: int, what: str) -> list[float]:

@@ -73,8 +73,8 @@ def check_urdf(path: Path, text: str) -> ElementTree.Element:
         _check_joint(path, joint)
     for name in sorted({name for pair in ends for name in pair} - set(names)):
         raise CharacterError(f"{path}: a joint names the link {name!r}, which does not exist")
-    _check_tree(path, names, ends)
     _check_size(path, joints)
+    _check_tree(path, names, ends)
     for element in [*links, *joints, *robot.findall("material")]:
         _check_numbers(path, element)
     return robot
@@ -160,17 +160,14 @@ def _check_unique(path: Path, what: str, names: Iterable[str]) -> None:
 
 
 def _check_tree(path: Path, links: list[str], ends: list[tuple[str, str]]) -> None:
-    children: dict[str, list[str]] = {}
-    for parent, child in ends:
-        children.setdefault(parent, []).append(child)
-    bases = sorted(set(links) - {child for _, child in ends})
+    """Check that one base link leads to all others; no link has two parents."""
+    parents = {child: parent for parent, child in ends}
+    bases = sorted(set(links) - set(parents))
     if len(bases) != 1:
         raise CharacterError(f"{path}: there must be one base link; there are {bases}")
-    reached, pending = set[str](), bases
-    while pending:
-        link = pending.pop()
-        reached.add(link)
-        pending += children.get(link, [])
     for link in links:
-        if link not in reached:
+        above = link
+        for _ in links:
+            above = parents.get(above, above)
+        if above != bases[0]:
             raise CharacterError(f"{path}: link {link!r} hangs in a circle of joints")

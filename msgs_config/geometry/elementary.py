@@ -1,6 +1,6 @@
 """Elementary functions of arrays, each value by the C library.
 
-numpy has vector kernels of its own for these functions and chooses among them by what the processor
+numpy has other vector kernels for these functions and chooses among them by what the processor
 can do (with AVX-512 it takes others than without), and their last bits differ. A result must not
 depend on the processor, so whatever lies between a message and the next state takes its elementary
 functions from here. `+ - * /` and `sqrt` are exact by IEEE 754, whichever kernel works them out.

@@ -1,4 +1,4 @@
-"""What `~/configuration` says: all that a run depends on, as JSON, so that a bag can repeat it."""
+"""The JSON of `~/configuration`: all that a run depends on, so that a bag can repeat it."""
 
 import json
 import math
@@ -15,9 +15,12 @@ from msgs_config.character.meshes import collision_meshes
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import LayoutError, MessageError
 from msgs_config.messages.probe import DynamicsSample, read_probe
-from msgs_config.messages.session import ANONYMOUS, SESSION, session_of
+from msgs_config.messages.session import ANONYMOUS, SESSION, read_session
 from msgs_config.parameters import Value, Values, with_present_names
 from msgs_config.versions import installed_versions, read_versions
+
+_CHARACTER = ("urdf", "urdf_path", "meshes")  # keys of a URDF's text, path and meshes
+_TERRAIN = ("terrain_urdf", "terrain_path", "terrain_meshes")
 
 
 def describe(
@@ -45,9 +48,7 @@ def describe(
         "character": character.name,
         "character_file": character.file_text,
         "character_path": str(character.file),
-        "urdf": character.loading.urdf_text,
-        "urdf_path": str(character.loading.urdf_path),
-        "meshes": collision_meshes(character.loading),
+        **_describe_urdf(_CHARACTER, character.loading),
         "session": session,
         "name": name,
         "characters": list(characters),
@@ -56,9 +57,7 @@ def describe(
         ],
         "effort_limits": [_finite(limit) for limit in character.effort_limits().tolist()],
         "mass": character.mass,
-        "terrain_urdf": None if terrain is None else terrain.urdf_text,
-        "terrain_path": None if terrain is None else str(terrain.urdf_path),
-        "terrain_meshes": {} if terrain is None else collision_meshes(terrain),
+        **_describe_urdf(_TERRAIN, terrain),
         "probe": None if probe is None else probe.content(),
         "actuation": None if actuation is None else dict(actuation),
         "parameters_after_stamp_ns": since_ns,
@@ -70,21 +69,29 @@ def describe(
     return json.dumps(content, allow_nan=False)
 
 
+def _describe_urdf(keys: tuple[str, str, str], urdf: UrdfOptions | None) -> dict[str, Any]:
+    """The text of a URDF, its path and the hashes of its meshes, under these keys."""
+    text, path, meshes = keys
+    if urdf is None:
+        return {text: None, path: None, meshes: {}}
+    return {text: urdf.urdf_text, path: str(urdf.urdf_path), meshes: collision_meshes(urdf)}
+
+
 def _finite(value: Value) -> Value | None:
-    """What JSON can say: no limit is null, not infinity."""
+    """The value as JSON can express it: no limit is null, not infinity."""
     return None if isinstance(value, float) and math.isinf(value) else value
 
 
 @dataclass(frozen=True)
 class RunConfiguration:
-    """What a listener needs to read a simulator's topics."""
+    """The content that a listener needs to read a simulator's topics."""
 
     character: str
     layout: JointLayout
     effort_limits: FloatArray  # (b,) N m or N
     mass: float  # kg
     parameters: dict[str, Any]
-    probe: DynamicsSample | None = None  # absent where another simulator than ours speaks
+    probe: DynamicsSample | None = None  # absent from other simulators
     versions: dict[str, str] = field(default_factory=dict)  # of what it runs with
     session: str = ANONYMOUS
 
@@ -109,7 +116,7 @@ def parse(text: str) -> RunConfiguration:
             parameters=with_present_names(dict(content["parameters"])),
             probe=None if probe is None else read_probe(probe, layout.size),
             versions=read_versions(content.get("versions")),
-            session=session_of(str(content.get("session", ""))),
+            session=read_session(str(content.get("session", ""))),
         )
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError, LayoutError) as error:
         raise MessageError("not a simulator's configuration") from error
@@ -119,7 +126,7 @@ def parse(text: str) -> RunConfiguration:
 class UrdfCopy:
     """A URDF as it was read, and where it lay, which is where its meshes are looked for."""
 
-    path: Path | None  # None where an older simulator spoke, which did not say it
+    path: Path | None  # None in configurations of older simulators
     text: str = field(repr=False)
     meshes: dict[str, str]  # SHA-256 by the name that the URDF gives, see `collision_meshes`
 
@@ -128,7 +135,7 @@ class UrdfCopy:
 class WorldCopy:
     """The files that a simulator has read, and the character's place in its world."""
 
-    character_path: Path | None  # None where an older simulator spoke
+    character_path: Path | None  # None in configurations of older simulators
     character_text: str = field(repr=False)  # of its YAML file; empty for a URDF alone
     urdf: UrdfCopy
     terrain: UrdfCopy | None
@@ -137,21 +144,18 @@ class WorldCopy:
 
 
 def parse_world(text: str) -> WorldCopy:
-    """Read what a simulator's `~/configuration` says of its files.
+    """Read the files of a simulator from its `~/configuration`.
 
     Raises:
         MessageError: the text is not one.
     """
     try:
         content = json.loads(text)
-        terrain = content.get("terrain_urdf")
         return WorldCopy(
             character_path=_path(content.get("character_path")),
             character_text=str(content["character_file"]),
-            urdf=_urdf_copy(content, "urdf", "urdf_path", "meshes"),
-            terrain=None
-            if terrain is None
-            else _urdf_copy(content, "terrain_urdf", "terrain_path", "terrain_meshes"),
+            urdf=_read_urdf(content, _CHARACTER),
+            terrain=None if content.get(_TERRAIN[0]) is None else _read_urdf(content, _TERRAIN),
             name=str(content.get("name", "")),
             characters=tuple(str(name) for name in content.get("characters", ())),
         )
@@ -159,7 +163,8 @@ def parse_world(text: str) -> WorldCopy:
         raise MessageError("not a simulator's configuration") from error
 
 
-def _urdf_copy(content: dict[str, Any], text: str, path: str, meshes: str) -> UrdfCopy:
+def _read_urdf(content: dict[str, Any], keys: tuple[str, str, str]) -> UrdfCopy:
+    text, path, meshes = keys
     hashes = {str(name): str(digest) for name, digest in content.get(meshes, {}).items()}
     return UrdfCopy(_path(content.get(path)), str(content[text]), hashes)
 

@@ -2,16 +2,17 @@
 
 Filling and reading dozens of name strings is most of the cost of such a message. Names are
 constant, so the bytes up to and with them are kept, and only the stamp and the doubles are
-written or read. Whatever does not look like what was kept goes through rclpy's own decoder.
+written or read. `sensor_msgs/MultiDOFJointState` has the same form: a header, names and lists of
+doubles.
 
 The form is plain CDR, little endian (OMG DDSI-RTPS 2.3, section 10): every item is aligned to
 its size, counted from the end of the four bytes of encapsulation header.
 """
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rclpy.serialization import deserialize_message
@@ -28,7 +29,12 @@ _STAMP = 4  # after the encapsulation header
 _NAMES_START = 12  # after the encapsulation header and the stamp
 _FRAME_START = 16  # after the length of the frame's name
 _MAX_KEPT_SENDERS = 16
-_ENTRY_BYTES = {JointState: (8, 8, 8), MultiDOFJointState: (56, 48, 48)}
+_WIDTHS = {  # doubles in an entry of each list
+    JointState: (1, 1, 1),  # position, velocity, effort
+    # transforms (translation, rotation xyzw), twist (linear, angular), wrench (force, torque)
+    MultiDOFJointState: (7, 6, 6),
+}
+_BYTE_ORDERS = {b"\0\0": ">", b"\0\1": "<"}  # by the encapsulation header's first two bytes
 _EMPTY = np.zeros(0)
 
 
@@ -54,7 +60,7 @@ def with_stamp(raw: bytes, stamp_ns: int) -> bytes:
     return raw[:_STAMP] + struct.pack("<iI", *split_stamp(stamp_ns)) + raw[_NAMES_START:]
 
 
-def frame_id_of(raw: bytes) -> str:
+def read_frame_id(raw: bytes) -> str:
     """The `frame_id` of a serialised message that begins with a header, or is one.
 
     Raises:
@@ -69,24 +75,21 @@ def frame_id_of(raw: bytes) -> str:
     return raw[_FRAME_START : _FRAME_START + length].rstrip(b"\0").decode(errors="replace")
 
 
-def padding(length: int, alignment: int) -> int:
+def _padding(length: int, alignment: int) -> int:
     """How many bytes a serialised item of this alignment is preceded by, after `length` bytes."""
     return -length % alignment
 
 
-def cdr_names(names: Sequence[str], frame_id: str = "") -> bytes:
+def _cdr_names(names: Sequence[str], frame_id: str) -> bytes:
     """The bytes from after the stamp to the end of the names."""
-    content = bytearray(_cdr_text(frame_id))
-    content += struct.pack("<I", len(names))
-    for name in names:
-        content += _cdr_text(name)
-    return bytes(content)
+    count = struct.pack("<I", len(names))
+    return _cdr_text(frame_id) + count + b"".join(map(_cdr_text, names))
 
 
 def _cdr_text(text: str) -> bytes:
-    """A text with its length, padded for whatever comes after it, which is never a double."""
+    """A text with its length, padded for the next item, which is never a double."""
     content = text.encode() + b"\0"
-    return struct.pack("<I", len(content)) + content + bytes(padding(len(content), 4))
+    return struct.pack("<I", len(content)) + content + bytes(_padding(len(content), 4))
 
 
 def decode(raw: bytes, message_type: type) -> Any:
@@ -95,46 +98,99 @@ def decode(raw: bytes, message_type: type) -> Any:
     Raises:
         MessageError: the bytes are no such message.
     """
+    if message_type is JointState:  # the middleware would print a line if a list is too long
+        read_message(raw, JointState)
     try:
-        _check_lengths(raw, _ENTRY_BYTES.get(message_type, ()))
         return deserialize_message(raw, message_type)
-    except Exception as error:  # rclpy has no type of its own for what cannot be decoded
+    except Exception as error:  # rclpy has no exception type for bytes that it cannot decode
         raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
 
 
-def _check_lengths(raw: bytes, entry_bytes: Sequence[int]) -> None:
-    """Raise struct.error or ValueError if lists are longer than the message is.
+class NamedLists(NamedTuple):
+    """A message of a header, names, and lists of structures of doubles."""
 
-    The middleware finds that, too, but prints a line of its own at each such message. The lists
-    are names, after the header, and then some of doubles, of so many bytes an entry.
+    stamp_ns: int
+    frame_id: str
+    names: tuple[str, ...]
+    lists: list[FloatArray]  # (m * width,) each
+
+
+def read_message(raw: bytes, message_type: type) -> NamedLists:
+    """The content of a serialised JointState or MultiDOFJointState.
+
+    Raises:
+        MessageError: the bytes are no such message.
     """
-    if not entry_bytes:
-        return
-    order = "<" if raw[1] & 1 else ">"
+    try:
+        order = _BYTE_ORDERS[raw[:2]]
+        seconds, nanoseconds = struct.unpack_from(f"{order}iI", raw, _STAMP)
+        frame_id, offset = _read_text(raw, _NAMES_START, order)
+        count, offset = _read_count(raw, offset, order)
+        names = []
+        for _ in range(count):
+            name, offset = _read_text(raw, offset, order)
+            names.append(name)
+        lists = _read_lists(raw, offset, order, _WIDTHS[message_type])
+    except (KeyError, struct.error, ValueError) as error:
+        raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
+    stamp_ns = seconds * NANOSECONDS_PER_SECOND + nanoseconds
+    return NamedLists(stamp_ns, frame_id, tuple(names), lists)
 
-    def count_at(offset: int) -> tuple[int, int]:
-        offset += padding(offset, 4)  # the encapsulation header has four bytes as well
-        (count,) = struct.unpack_from(f"{order}I", raw, offset)
-        return count, offset + 4
 
-    length, offset = count_at(_NAMES_START)
-    names, offset = count_at(offset + length)
-    for _ in range(names):
-        length, offset = count_at(offset)
-        offset += length
-    for size in entry_bytes:
-        count, offset = count_at(offset)
+def _read_count(raw: bytes, offset: int, order: str) -> tuple[int, int]:
+    """A length, and the offset behind it."""
+    offset += _padding(offset, 4)  # the encapsulation header has four bytes as well
+    (count,) = struct.unpack_from(f"{order}I", raw, offset)
+    return count, offset + 4
+
+
+def _read_text(raw: bytes, offset: int, order: str) -> tuple[str, int]:
+    """A text, and the offset behind it; as ROS reads it, it ends before the first NUL."""
+    length, offset = _read_count(raw, offset, order)
+    end = offset + length
+    if end > len(raw):
+        raise ValueError("a text that is longer than the message")
+    return raw[offset:end].partition(b"\0")[0].decode(errors="replace"), end
+
+
+def _read_lists(raw: bytes, offset: int, order: str, widths: Sequence[int]) -> list[FloatArray]:
+    """Lists of structures of so many doubles each, every list flat: (m * width,)."""
+    lists = []
+    for width in widths:
+        count, offset = _read_count(raw, offset, order)
+        values = _EMPTY
         if count:
-            offset += padding(offset - 4, 8) + size * count
-    if offset > len(raw):
-        raise ValueError("a list is longer than the message")
+            offset += _padding(offset - 4, 8)
+            values = np.frombuffer(raw, f"{order}f8", count * width, offset).astype(float)
+        lists.append(values)
+        offset += values.nbytes
+    return lists
+
+
+def encode_head(names: Sequence[str], frame_id: str = "") -> bytes:
+    """A serialised message up to the end of its names, with a stamp of zero."""
+    return CDR_LITTLE_ENDIAN + bytes(8) + _cdr_names(names, frame_id)
+
+
+def encode_arrays(head: bytes, lists: Iterable[FloatArray]) -> bytes:
+    """A serialised message of a head and of lists of doubles (m,) or of rows of them (m, k).
+
+    Not by rclpy, whose writer leaves in the gaps before the doubles what the memory held before:
+    the same message would not be the same bytes twice.
+    """
+    content = bytearray(head)
+    for values in lists:
+        content += struct.pack("<I", len(values))
+        if len(values):
+            content += bytes(_padding(len(content) - 4, 8)) + values.tobytes()
+    return bytes(content)
 
 
 class JointStateEncoder:
     """Serialises JointState messages that all have the same names and `frame_id`."""
 
     def __init__(self, names: Sequence[str], frame_id: str = "") -> None:
-        self._head = CDR_LITTLE_ENDIAN + bytes(8) + cdr_names(names, frame_id)
+        self._head = encode_head(names, frame_id)
 
     def encode(
         self,
@@ -144,13 +200,7 @@ class JointStateEncoder:
         effort: FloatArray = _EMPTY,
     ) -> bytes:
         """The serialised message; each array is (n,) or empty."""
-        content = bytearray(self._head)
-        struct.pack_into("<iI", content, 4, *split_stamp(stamp_ns))
-        for values in (position, velocity, effort):
-            content += struct.pack("<I", len(values))
-            if len(values):
-                content += bytes(padding(len(content) - 4, 8)) + values.tobytes()
-        return bytes(content)
+        return encode_arrays(with_stamp(self._head, stamp_ns), (position, velocity, effort))
 
 
 class DoublesEncoder:
@@ -162,13 +212,11 @@ class DoublesEncoder:
     def __init__(self, *texts: str) -> None:
         """The texts in the message's order, its `frame_id` first."""
         head = CDR_LITTLE_ENDIAN + bytes(8) + b"".join(_cdr_text(text) for text in texts)
-        self._head = head + bytes(padding(len(head) - 4, 8))
+        self._head = head + bytes(_padding(len(head) - 4, 8))
 
     def encode(self, stamp_ns: int, values: FloatArray) -> bytes:
         """The serialised message with all its doubles (m,), in the message's order."""
-        content = bytearray(self._head)
-        struct.pack_into("<iI", content, 4, *split_stamp(stamp_ns))
-        return bytes(content + values.tobytes())
+        return with_stamp(self._head, stamp_ns) + values.tobytes()
 
 
 def encode_clock(stamp_ns: int) -> bytes:
@@ -190,44 +238,25 @@ class JointStateDecoder:
         """
         for head, texts in self._kept.items():
             if raw.startswith(head, _NAMES_START) and raw.startswith(CDR_LITTLE_ENDIAN):
-                return _read_doubles(raw, _NAMES_START + len(head), *texts)
-        return self._decode_slowly(raw)
-
-    def _decode_slowly(self, raw: bytes) -> JointArrays:
-        message = decode(raw, JointState)
-        names, frame_id = tuple(message.name), str(message.header.frame_id)
-        head = cdr_names(names, frame_id)
+                return _read_arrays(raw, _NAMES_START + len(head), *texts)
+        stamp_ns, frame_id, names, lists = read_message(raw, JointState)
+        head = _cdr_names(names, frame_id)
         if raw.startswith(head, _NAMES_START):
             if len(self._kept) == _MAX_KEPT_SENDERS:  # each start of a simulator is a new sender
                 del self._kept[next(iter(self._kept))]
             self._kept[head] = names, frame_id
-        stamp = message.header.stamp
-        return JointArrays(
-            stamp_ns=stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec,
-            names=names,
-            position=np.array(message.position, dtype=float),
-            velocity=np.array(message.velocity, dtype=float),
-            effort=np.array(message.effort, dtype=float),
-            frame_id=frame_id,
-        )
+        position, velocity, effort = lists
+        return JointArrays(stamp_ns, names, position, velocity, effort, frame_id)
 
 
-def _read_doubles(raw: bytes, offset: int, names: tuple[str, ...], frame_id: str) -> JointArrays:
-    """The rest of a message whose names end at `offset`."""
-    seconds, nanoseconds = struct.unpack_from("<iI", raw, 4)
-    arrays = []
+def _read_arrays(raw: bytes, offset: int, names: tuple[str, ...], frame_id: str) -> JointArrays:
+    """The content of a little-endian message whose names are known and end at `offset`."""
     try:
-        for _ in range(3):
-            (count,) = struct.unpack_from("<I", raw, offset)
-            offset += 4
-            if count:
-                offset += padding(offset - 4, 8)
-            arrays.append(np.frombuffer(raw, "<f8", count, offset).copy() if count else _EMPTY)
-            offset += 8 * count
+        position, velocity, effort = _read_lists(raw, offset, "<", _WIDTHS[JointState])
     except (struct.error, ValueError) as error:
         raise MessageError(f"a JointState cut off after {len(raw)} bytes") from error
+    seconds, nanoseconds = struct.unpack_from("<iI", raw, _STAMP)
     stamp_ns = seconds * NANOSECONDS_PER_SECOND + nanoseconds
-    position, velocity, effort = arrays
     return JointArrays(stamp_ns, names, position, velocity, effort, frame_id)
 
 

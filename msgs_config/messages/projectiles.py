@@ -8,16 +8,19 @@ in kg, m and m/s, world axes; everything else in the message is unused. Where th
 from dataclasses import dataclass
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, Vector3
 from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, decode
-from msgs_config.messages.throw import NUMBERS, ProjectileThrow, throw_of
-from msgs_config.messages.wrenches import WORLD, encode_multi_dof
-
-_POSE, _TWIST = slice(0, 7), slice(7, 13)
+from msgs_config.messages.joint_state import (
+    JointStateDecoder,
+    JointStateEncoder,
+    encode_arrays,
+    encode_head,
+    read_message,
+    with_stamp,
+)
+from msgs_config.messages.throw import NUMBERS, ProjectileThrow, parse_throw
+from msgs_config.messages.wrenches import NO_ROWS, WORLD
 
 
 @dataclass(frozen=True)
@@ -47,10 +50,10 @@ class ThrowCodec:
 
         Raises:
             MessageError: the bytes are no such message.
-            CommandError: it is no throw that can be; see `throw_of`.
+            CommandError: it is no throw that can be; see `parse_throw`.
         """
         arrays = self._decoder.decode(raw)
-        return arrays.stamp_ns, throw_of(arrays.names, arrays.position.tolist())
+        return arrays.stamp_ns, parse_throw(arrays.names, arrays.position.tolist())
 
 
 def ball_names(count: int) -> tuple[str, ...]:
@@ -60,8 +63,8 @@ def ball_names(count: int) -> tuple[str, ...]:
 
 def encode_balls(balls: BallStates, frame_id: str = WORLD) -> bytes:
     """The serialised message."""
-    rows = (balls.motion[:, _POSE], balls.motion[:, _TWIST], ())
-    return encode_multi_dof(balls.stamp_ns, balls.names, *rows, frame_id=frame_id)
+    head = with_stamp(encode_head(balls.names, frame_id), balls.stamp_ns)
+    return encode_arrays(head, (balls.motion[:, :7], balls.motion[:, 7:], NO_ROWS))
 
 
 def decode_balls(raw: bytes) -> BallStates:
@@ -70,16 +73,8 @@ def decode_balls(raw: bytes) -> BallStates:
     Raises:
         MessageError: the bytes are no such message.
     """
-    message = decode(raw, MultiDOFJointState)
-    stamp = message.header.stamp
-    rows = []
-    for pose, twist in zip(message.transforms, message.twist, strict=False):
-        at, turn, w = _xyz(pose.translation), _xyz(pose.rotation), pose.rotation.w
-        rows.append((*at, *turn, w, *_xyz(twist.linear), *_xyz(twist.angular)))
-    stamp_ns = stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
-    motion = np.array(rows, dtype=float).reshape(-1, 13)
-    return BallStates(stamp_ns, tuple(message.joint_names)[: len(rows)], motion)
-
-
-def _xyz(vector: Vector3 | Quaternion) -> tuple[float, float, float]:
-    return vector.x, vector.y, vector.z
+    stamp_ns, _, names, lists = read_message(raw, MultiDOFJointState)
+    poses, twists = lists[0].reshape(-1, 7), lists[1].reshape(-1, 6)
+    count = min(len(names), len(poses), len(twists))
+    motion = np.hstack((poses[:count], twists[:count]))
+    return BallStates(stamp_ns, names[:count], motion)

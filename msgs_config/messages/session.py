@@ -59,7 +59,7 @@ def is_session(text: str) -> bool:
     return _MARK in text and _FORM.fullmatch(text) is not None
 
 
-def session_of(frame_id: str) -> str:
+def read_session(frame_id: str) -> str:
     """The session that a `frame_id` names, else `ANONYMOUS`."""
     return frame_id if is_session(frame_id) else ANONYMOUS
 
@@ -71,7 +71,7 @@ def episode_text(number: int, session: str) -> str:
 
 def episode_session(frame_id: str) -> str:
     """The session that the `frame_id` of a message on `episode` names, else `ANONYMOUS`."""
-    return session_of(frame_id.partition(" ")[2])
+    return read_session(frame_id.partition(" ")[2])
 
 
 def named(session: str | None) -> str:
@@ -101,13 +101,13 @@ class SessionBinding:
         self._looked_at: float | None = None
 
     def look(self, now: float) -> None:
-        """Say, at every turn, that the receiver looks for messages; `now` in s."""
+        """Note, at every turn, that the receiver looks for messages; `now` in s."""
         if self._looked_at is not None and self._silence is not None:
             self._silence += min(max(now - self._looked_at, 0.0), _LONGEST_LOOK)
         self._looked_at = now
 
     def hear(self, session: str) -> bool:
-        """Note that a session has said something; whether it is the bound one."""
+        """Note a message of a session; returns whether it is the bound one."""
         if session != self.bound:
             return False
         self._silence = None
@@ -157,7 +157,7 @@ class ForeignSessions:
         self._named = set[str]()
 
     def reject(self, topic: str, session: str, own: str | None) -> str | None:
-        """Count a message on a topic; the line to log, if there is a new one."""
+        """Count a message on a topic; returns the line to log, if there is a new one."""
         self.counts[topic] += 1
         if session in self._named or len(self._named) > _MOST_NAMED:
             return None

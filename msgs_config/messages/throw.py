@@ -14,7 +14,7 @@ MASS, RADIUS = "mass", "radius"
 POSITION = ("x", "y", "z")
 VELOCITY = ("vx", "vy", "vz")
 NUMBERS = (MASS, RADIUS, *POSITION, *VELOCITY)
-"""What a throw consists of, in kg, m and m/s, world axes."""
+"""The numbers of a throw, in kg, m and m/s, world axes."""
 
 DENSITY = 500.0  # kg/m^3, of a ball whose radius is not given: a light wood
 _BOUNDS = {MASS: (1e-3, 1e4), RADIUS: (5e-3, 5.0)}
@@ -52,7 +52,7 @@ class ProjectileThrow:
         return np.array((self.mass, self.radius, *self.position, *self.velocity))
 
 
-def throw_of(names: Sequence[str], values: Sequence[float]) -> ProjectileThrow:
+def parse_throw(names: Sequence[str], values: Sequence[float]) -> ProjectileThrow:
     """The throw that numbers with names describe; without a radius it has that of `DENSITY`.
 
     Raises:

@@ -20,43 +20,34 @@ from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 Outgoing: TypeAlias = tuple[Publisher, bytes]
-"""A serialised message and what it is to be published on."""
+"""A serialised message and its publisher."""
 
-_DEEP_HISTORY = 5000
-"""With a small history a recorder that pauses for a moment loses messages."""
-
-STREAM_QOS = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=_DEEP_HISTORY,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
 LISTENING_DEPTH = 50_000
-"""What a reader keeps for a process that is busy otherwise, with a disk for instance, for long.
+"""Depth of a reader whose process may be busy otherwise for long, with a disk for instance.
 
 It costs nothing until it is needed, unlike a publisher's."""
 
-LATCHED_QOS = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
-CHANGES_QOS = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=100,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
-"""For what changes at once again: a listener of depth 1 has the last one, a recorder all."""
+
+def _keep_last(
+    depth: int,
+    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE,
+    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE,
+) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=reliability,
+        durability=durability,
+    )
 
 
-DISPLAY_QOS = QoSProfile(  # a viewer's own depth may be 1; a recorder's is not
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1000,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
+STREAM_QOS = _keep_last(5000)
+"""With a small history a recorder that pauses for a moment loses messages."""
+LATCHED_QOS = _keep_last(1, DurabilityPolicy.TRANSIENT_LOCAL)
+CHANGES_QOS = _keep_last(100, DurabilityPolicy.TRANSIENT_LOCAL)
+"""For values that may change twice at once: a listener of depth 1 has the last, a recorder all."""
+DISPLAY_QOS = _keep_last(1000)
+"""A viewer's own depth may be 1; a recorder's is not."""
 
 
 @dataclass(frozen=True)
@@ -76,14 +67,8 @@ class Topic:
         return replace(self, name=f"{namespace}/{self.name}") if namespace else self
 
     def for_listener(self, depth: int = LISTENING_DEPTH) -> "Topic":
-        """The topic with a queue for a listener that must not miss what several publishers say."""
-        qos = QoSProfile(
-            history=HistoryPolicy.KEEP_LAST,
-            depth=depth,
-            reliability=self.qos.reliability,
-            durability=self.qos.durability,
-        )
-        return replace(self, qos=qos)
+        """The topic with a queue deep enough for a listener that polls rarely."""
+        return replace(self, qos=_keep_last(depth, self.qos.durability, self.qos.reliability))
 
 
 def create_publisher(node: Node, topic: Topic) -> Publisher:
@@ -100,8 +85,8 @@ def create_publisher(node: Node, topic: Topic) -> Publisher:
 def publish_together(messages: Iterable[Outgoing]) -> None:
     """Publish serialised messages in a row.
 
-    The first wakes up who sleeps, which takes longer than all else; of messages with work between
-    them each would find its subscribers asleep again.
+    The first wakes its subscribers up, which takes longer than all else; of messages with work
+    between them each would find its subscribers asleep again.
     """
     for publisher, raw in list(messages):  # all are made before the first is published
         publisher.publish(raw)

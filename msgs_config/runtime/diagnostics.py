@@ -19,7 +19,7 @@ class DiagnosticsPublisher:
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody listens; if not, there is no need to gather anything."""
+        """Whether there is a subscriber; without one, there is no need to gather anything."""
         return bool(self._publisher.get_subscription_count())
 
     def publish(

@@ -31,7 +31,7 @@ def exit_after(seconds: int, code: int) -> None:
 
     Fast DDS 2.14 can wait forever when a node leaves in the very moment in which another one
     comes or goes (its issue 6513), in compiled code that lets no Python run. So it is the C
-    library that calls its own `_exit`, in a thread of its own.
+    library that calls its own `_exit`, in another thread.
     """
     event = _Event(
         value=code,

@@ -20,7 +20,7 @@ class OnceLogger:
     def log_once(self, sentence: str, kind: str = "") -> None:
         """Log a sentence, unless it, or another one of its kind, was logged before.
 
-        A kind is the caller's own word, of which there are few: those are always logged.
+        Kinds are few, and chosen by the caller: their sentences are always logged.
         """
         if len(sentence) > _LONGEST:
             sentence = sentence[:_LONGEST] + " ..."
@@ -33,7 +33,7 @@ class OnceLogger:
         logged.add(key)
         self._node.get_logger().warning(sentence)
 
-    def has_said(self, kind: str) -> bool:
+    def has_logged(self, kind: str) -> bool:
         """Whether a sentence of a kind was logged."""
         return kind in self._kinds
 

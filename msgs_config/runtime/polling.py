@@ -21,7 +21,7 @@ _SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
 _SHORT_REST = 0.002  # s; waking up from the executor takes up to that
 _SLEEP_ERROR = 0.0002  # s by which a sleep may be late
 _MOST_TURNS = 50  # of the executor in a row, which has one callback a turn
-_PATIENCE = 0.003  # s of taking turns with other processes before the loop blocks
+_BUSY_PERIOD = 0.003  # s of taking turns with other processes before the loop blocks
 
 
 class Received(NamedTuple):
@@ -38,7 +38,7 @@ class DirectSubscription:
     def __init__(
         self, node: Node, topic: Topic, events: SubscriptionEventCallbacks | None = None
     ) -> None:
-        """Subscribe; with `events` also to what the middleware says of the subscription."""
+        """Subscribe; with `events` also to the middleware's events of the subscription."""
         # as many as the middleware keeps, and like it the newest; a flood must not fill the memory
         self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
         self.dropped = 0  # messages, as more came than were taken
@@ -102,8 +102,8 @@ class PollingExecutor:
         self._next_service = 0.0
 
     def received(self) -> None:
-        """Say that a message came: the next one is worth waiting for without blocking."""
-        self._busy_until = time.monotonic() + _PATIENCE
+        """Note that a message came: the next one is worth waiting for without blocking."""
+        self._busy_until = time.monotonic() + _BUSY_PERIOD
 
     def rest(self) -> None:
         """Let others work; at most about 20 ms."""

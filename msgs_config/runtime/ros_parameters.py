@@ -16,9 +16,9 @@ from msgs_config.parameters import Parameter, Values, resolve
 
 
 def given_parameters(node: Node) -> dict[str, object]:
-    """What the command line and parameter files set for this node.
+    """The values that command line and parameter files set for this node.
 
-    rclpy has no public list of them, and silently ignores names that nobody declares; a user's
+    rclpy has no public list of them, and silently ignores names that are not declared; a user's
     misspelt parameter must not pass unseen.
     """
     overrides = node._parameter_overrides

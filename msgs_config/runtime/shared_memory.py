@@ -2,8 +2,8 @@
 
 Fast DDS gives each participant a segment, `fastrtps_` and 16 hexadecimal digits, of half a MiB. Its
 process holds an exclusive lock on a file of that name and `_el` as long as it lives, whichever way
-it ends; a process that is killed leaves both. The digits are random, so that nobody ever takes up
-a name again. Files of ports (`fastrtps_port7413`) are left alone: the next process of the same
+it ends; a process that is killed leaves both. The digits are random, so that no name is ever used
+again. Files of ports (`fastrtps_port7413`) are left alone: the next process of the same
 domain takes up their names, and could do so at this very moment.
 """
 
@@ -37,7 +37,7 @@ def remove_orphans(directory: Path = DIRECTORY) -> list[str]:
 
 
 def _remove(segment: Path, lock: Path) -> bool:
-    """Remove a segment and its lock's file, if both are this user's and nobody's lock is on it."""
+    """Remove a segment and its lock's file, if both are this user's and the lock is free."""
     present = [file for file in (segment, lock) if os.path.lexists(file)]
     if not all(map(_may_go, present)):
         return False

@@ -8,8 +8,8 @@ from rclpy.node import Node
 
 from msgs_config.errors import CommandError, MessageError
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.joint_state import frame_id_of
-from msgs_config.messages.session import ANONYMOUS, ForeignSessions, session_of
+from msgs_config.messages.joint_state import read_frame_id
+from msgs_config.messages.session import ANONYMOUS, ForeignSessions, read_session
 from msgs_config.messages.topics import Topic
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
@@ -36,7 +36,7 @@ class OwnSession:
 
     def rejects(self, topic: Topic, frame_id: str) -> bool:
         """Whether a message with this `frame_id` is for another simulator; it is counted then."""
-        session = session_of(frame_id)
+        session = read_session(frame_id)
         if session in (self._session, ANONYMOUS):
             return False
         line = self._foreign.reject(topic.name, session, self._session)
@@ -99,7 +99,7 @@ class StampedSubscription:
 def _frame_id(raw: bytes) -> str:
     """The `frame_id` of a message; empty where it has none, which its decoder has a line for."""
     try:
-        return frame_id_of(raw)
+        return read_frame_id(raw)
     except MessageError:
         return ""
 

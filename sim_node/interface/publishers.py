@@ -12,7 +12,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder, split_stamp, with_stamp
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Outgoing, Topic
-from msgs_config.messages.wrenches import ContactEncoder, WrenchArrays, encode_wrenches
+from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches, select
 from sim_node.interface.display import Display
 from sim_node.physics.simulated_character import SimulatedCharacter
 
@@ -34,7 +34,6 @@ class Publishers:
         self._display_ticks = display_ticks
         self._encoder = JointStateEncoder(actor.layout.dof_names, session)
         self._links = [link.name for link in actor.character.links]
-        self._contact_encoder = ContactEncoder(self._links, session)
 
         def offer(topic: Topic) -> Publisher:
             return topics.create_publisher(node, topic.under(namespace))
@@ -120,7 +119,8 @@ class Publishers:
         contacts, stamp_ns = self._actor.contacts, self._actor.state.stamp_ns
         if contacts is None:
             return with_stamp(self._no_wrenches, stamp_ns)
-        return self._contact_encoder.encode(stamp_ns, contacts.wrenches, contacts.touching)
+        touching = (self._links, contacts.wrenches, contacts.touching)
+        return encode_wrenches(select(stamp_ns, *touching, self._session))
 
     def _encode_applied(self) -> bytes:
         """What pushed during the tick."""

@@ -339,7 +339,7 @@ class Stance:
             model,
             self._posture.stiffness,
             self._posture.damping,
-            model.error_of(state.position, self.pose),
+            model.compute_error(state.position, self.pose),
             state.velocity,
             np.zeros(layout.size),
             self._period,

@@ -38,7 +38,7 @@ from msgs_config.errors import MessageError  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402
 from msgs_config.messages.joint_state import (  # noqa: E402
     JointStateDecoder,
-    frame_id_of,
+    read_frame_id,
     state_in_layout,
 )
 from msgs_config.messages.session import make_session  # noqa: E402
@@ -133,7 +133,7 @@ class _Noise:
         """
         while (raw := self._states.take()) is not None:
             try:
-                if frame_id_of(raw) != self._session:
+                if read_frame_id(raw) != self._session:
                     continue
                 state = state_in_layout(self._layout, self._decoder.decode(raw))
             except MessageError:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.errors import CharacterError, ConfigurationError
 from msgs_config.files import parse_yaml
 from msgs_config.parameters import Parameter, resolve
+from tests.support.urdf import joint, link, robot
 
 WRITTEN = {
     "1e-1": 0.1,
@@ -31,13 +33,7 @@ WRITTEN = {
 }
 NO_NUMBERS = ["0x10", "0o7", "0b1", "1_000", "1:30", "e1", "1e", "1e1.5", "--1", "nan", "inf"]
 NUMBER = Parameter("x", 0.0, "a number", minimum=-1.8e308, maximum=1.8e308)
-LINK = (
-    '<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" '
-    'iyz="0" izz="1"/></inertial></link>'
-)
-ARM = f"""<robot name="arm">{LINK.format("a")}{LINK.format("b")}
-<joint name="swing" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/></joint>
-</robot>"""
+ARM = robot(link("a"), link("b"), joint("swing", "a", "b", "continuous", '<axis xyz="0 1 0"/>'))
 FORMS = (repr, "{:e}".format, "{:.17E}".format, "{:.3e}".format, json.dumps)
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -97,30 +93,16 @@ def test_what_is_not_finite_is_refused(directory: Path, text: str) -> None:
 
 
 @given(value=FLOATS, form=st.sampled_from(FORMS))
-@settings(deadline=None)
-def test_set_reads_what_programs_write(value: float, form: object) -> None:
-    assert callable(form)
+@settings(deadline=None, max_examples=50)
+def test_what_programs_write_is_read_to_the_bit(
+    directory: Path, value: float, form: Callable[[float], str]
+) -> None:
     text = form(value)
     assert same(by_set(text), float(text))
-
-
-@given(value=FLOATS, form=st.sampled_from(FORMS))
-@settings(deadline=None, max_examples=50)
-def test_character_files_read_what_programs_write(
-    directory: Path, value: float, form: object
-) -> None:
-    assert callable(form)
-    text = form(value)
     if math.isfinite(float(text)):  # the largest ones, rounded up, are not
         assert same(by_character_file(directory, text), float(text))
-
-
-@given(value=st.floats(-1e6, 1e6), form=st.sampled_from(FORMS))
-@settings(deadline=None, max_examples=20)
-def test_keyframes_read_what_programs_write(directory: Path, value: float, form: object) -> None:
-    assert callable(form)
-    text = form(value)
-    assert same(by_keyframes(directory, text), float(text))
+    if abs(float(text)) <= 1e6:
+        assert same(by_keyframes(directory, text), float(text))
 
 
 def same(value: object, wanted: float) -> bool:
@@ -146,7 +128,7 @@ def test_flags_and_whole_numbers_are_as_ever(text: str) -> None:
     assert type(value) is type(PLAIN[text])
 
 
-HOSTILE = ["[" * 1000, "0" * 5000, "!!python/name:os.system", "!!int 0x1f", "a: [", "- " * 100]
+HOSTILE = ["[" * 1000, "0" * 5000, "!!python/name:os.system", "!!int 0x1f", "a: [", "- " * 500]
 
 
 @pytest.mark.parametrize("text", HOSTILE)

@@ -83,15 +83,30 @@ def said_wrenches(topic: Topic, wrenches: Iterable[WrenchArrays]) -> list[Said]:
 
 def write_bag(path: Path, messages: Sequence[Said], namespace: str = "") -> Path:
     """Write a bag of messages in the order given; the directory."""
-    with BagWriter(path) as bag:
-        add_to(bag, messages, namespace)
-    return path
+    return write_timed(path, _numbered(messages), namespace)
 
 
 def add_to(bag: BagWriter, messages: Sequence[Said], namespace: str = "") -> None:
     """Write messages into a bag that is open, all their topics in one namespace."""
-    names = {f"/{topic.under(namespace).name}": topic for topic, _ in messages}
+    add_timed(bag, _numbered(messages), namespace)
+
+
+def _numbered(messages: Sequence[Said]) -> list[tuple[Said, int]]:
+    """Messages a nanosecond apart."""
+    return [(said, 1_000_000 + number) for number, said in enumerate(messages)]
+
+
+def write_timed(path: Path, messages: Sequence[tuple[Said, int]], namespace: str = "") -> Path:
+    """Write a bag of messages with their wall times, in the order given; the directory."""
+    with BagWriter(path) as bag:
+        add_timed(bag, messages, namespace)
+    return path
+
+
+def add_timed(bag: BagWriter, messages: Sequence[tuple[Said, int]], namespace: str = "") -> None:
+    """Write messages with their wall times into a bag that is open."""
+    names = {f"/{topic.under(namespace).name}": topic for (topic, _), _ in messages}
     for name, topic in names.items():
         bag.add_topic(name, topic.message_type, topic.qos)
-    for number, (topic, raw) in enumerate(messages):
-        bag.write(f"/{topic.under(namespace).name}", raw, 1_000_000 + number)
+    for (topic, raw), log_time_ns in messages:
+        bag.write(f"/{topic.under(namespace).name}", raw, log_time_ns)

@@ -2,23 +2,24 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-from actuated_characters.bags.writer import BagWriter
 from actuated_characters.runs.plan import Plan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches, select
+from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 from msgs_config.parameters import Values
 from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.bags import Said, said_configuration, said_references, said_states
+from tests.support.bags import add_timed as add_timed
+from tests.support.bags import write_timed as write_timed
+from tests.support.physics import read_wrenches
 
 CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE)
 START_NS = 1_700_000_000_000_000_000  # of the log times
@@ -103,18 +104,10 @@ def eventful_run(
                 simulation.step([np.where(actor.commanded, effort, 0.0)], [acting])
             run.states.append(actor.state)
             run.log_times_ns.append(now)
-            stamp = actor.state.stamp_ns
-            run.pushes.append(
-                WrenchArrays.of_rows(
-                    stamp,
-                    [names[push.link] for push in actor.pushes],
-                    [push.wrench for push in actor.pushes],
-                    [push.point for push in actor.pushes],
-                )
-            )
-            assert actor.contacts is not None
-            wrenches, touching = actor.contacts.wrenches, actor.contacts.touching
-            run.contacts.append(select(stamp, names, wrenches, touching))
+            pushes, contacts = read_wrenches(actor)
+            assert contacts is not None
+            run.pushes.append(pushes)
+            run.contacts.append(contacts)
     run.said_by_controller.append(said_controller(plan, plan.controller))
     return run
 
@@ -122,19 +115,3 @@ def eventful_run(
 def said_controller(plan: Plan, values: Values, since_ns: int | None = None) -> Said:
     text = configuration.describe(plan.character, values, since_ns)
     return CONTROLLER, serialize_message(String(data=text))
-
-
-def write_timed(path: Path, messages: Sequence[tuple[Said, int]], namespace: str = "") -> Path:
-    """Write a bag of messages with their wall times, in the order given; the directory."""
-    with BagWriter(path) as bag:
-        add_timed(bag, messages, namespace)
-    return path
-
-
-def add_timed(bag: BagWriter, messages: Sequence[tuple[Said, int]], namespace: str = "") -> None:
-    """Write messages with their wall times into a bag that is open."""
-    names = {f"/{topic.under(namespace).name}": topic for (topic, _), _ in messages}
-    for name, topic in names.items():
-        bag.add_topic(name, topic.message_type, topic.qos)
-    for (topic, raw), log_time_ns in messages:
-        bag.write(f"/{topic.under(namespace).name}", raw, log_time_ns)

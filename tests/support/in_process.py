@@ -18,12 +18,13 @@ from msgs_config.messages import configuration
 from msgs_config.messages.projectiles import BallStates, ball_names
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.throw import ProjectileThrow
-from msgs_config.messages.wrenches import WrenchArrays, select
+from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.parameters import make_character_setup, make_settings, push_ticks
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
 from sim_node.physics.wrenches import WrenchQueue
+from tests.support.physics import read_wrenches
 
 
 class InProcessRunner:
@@ -118,19 +119,11 @@ class _Run:
         return schedule
 
     def _add(self, actor: SimulatedCharacter) -> None:
-        state, names = actor.state, [link.name for link in actor.character.links]
-        self._states.append(state)
-        self._pushes.append(
-            WrenchArrays.of_rows(
-                state.stamp_ns,
-                [names[push.link] for push in actor.pushes],
-                [push.wrench for push in actor.pushes],
-                [push.point for push in actor.pushes],
-            )
-        )
-        if actor.contacts is not None:
-            wrenches, touching = actor.contacts.wrenches, actor.contacts.touching
-            self._contacts.append(select(state.stamp_ns, names, wrenches, touching))
+        self._states.append(actor.state)
+        pushes, contacts = read_wrenches(actor)
+        self._pushes.append(pushes)
+        if contacts is not None:
+            self._contacts.append(contacts)
 
     def recording(self) -> Recording:
         """What a bag would hold of it; a state without an answer has no reference."""

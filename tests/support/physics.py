@@ -22,10 +22,11 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.messages.wrenches import WrenchArrays, select
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.physics.body import Body
-from sim_node.physics.simulated_character import CharacterSetup
+from sim_node.physics.simulated_character import CharacterSetup, SimulatedCharacter
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.world import World, WorldSettings
 from sim_node.physics.wrenches import ExternalWrench
@@ -280,10 +281,28 @@ def joint_simulation(given: Mapping[str, object]) -> Simulation:
 
 def controller(name: str, **given: object) -> Controller:
     """A controller with the parameters given, the others at their defaults."""
-    whole = character(name)
+    return make_driver(character(name), given)
+
+
+def make_driver(whole: Character, given: Mapping[str, object]) -> Controller:
+    """A controller of a character with the parameters given, the others at their defaults."""
     parameters = for_controller.PARAMETERS + for_controller.character_parameters(whole)
     values = resolve(parameters, given)
     return for_controller.make_controller(whole, make_motion(whole, values).reference, values)
+
+
+def read_wrenches(actor: SimulatedCharacter) -> tuple[WrenchArrays, WrenchArrays | None]:
+    """The pushes and the contacts of the tick before, as the simulator publishes them."""
+    stamp_ns, names = actor.state.stamp_ns, [link.name for link in actor.character.links]
+    pushes = WrenchArrays.of_rows(
+        stamp_ns,
+        [names[push.link] for push in actor.pushes],
+        [push.wrench for push in actor.pushes],
+        [push.point for push in actor.pushes],
+    )
+    if actor.contacts is None:
+        return pushes, None
+    return pushes, select(stamp_ns, names, actor.contacts.wrenches, actor.contacts.touching)
 
 
 def run_together(

@@ -8,17 +8,14 @@ from tempfile import mkdtemp
 
 import numpy as np
 
-from controller_node import parameters as for_controller
 from controller_node.behaviours.base import ModeReport
 from controller_node.controller import Controller
-from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages.state import StampedReference
-from msgs_config.parameters import resolve
 from sim_node.physics.simulation import Simulation
-from tests.support.physics import character, joint_simulation
+from tests.support.physics import character, joint_simulation, make_driver
 
 BALL_RADIUS = 0.1  # m
 HUMANOID = character("humanoid")
@@ -78,9 +75,7 @@ def ball_file(mass: float) -> str:
 
 def driver(given: Mapping[str, object], whole: Character = HUMANOID) -> Controller:
     """A controller of the humanoid; walks if nothing else is given."""
-    parameters = for_controller.PARAMETERS + for_controller.character_parameters(whole)
-    values = resolve(parameters, {"reference": "clip", **given})
-    return for_controller.make_controller(whole, make_motion(whole, values).reference, values)
+    return make_driver(whole, {"reference": "clip", **given})
 
 
 def run(

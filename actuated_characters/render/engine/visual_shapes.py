@@ -10,13 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.mesh_check import check_mesh
-from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import Character, Quadruple, Shape, ShapeType
-from msgs_config.character.shapes import read_shapes
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 
@@ -40,9 +37,8 @@ def drawn_shapes(character: Character) -> list[tuple[Shape, ...]]:
     """
     seen = [tuple(_solid(link.shapes)) for link in character.links]
     if not all(map(_is_readable, seen)):
-        collided = _collision_shapes(character)
         seen = [
-            shapes if _is_readable(shapes) else collided[link.name]
+            shapes if _is_readable(shapes) else tuple(_solid(link.collision_shapes))
             for link, shapes in zip(character.links, seen, strict=True)
         ]
     if not any(seen):
@@ -130,15 +126,3 @@ def _is_readable(shapes: tuple[Shape, ...]) -> bool:
     except CharacterError:
         return False
     return True
-
-
-def _collision_shapes(character: Character) -> dict[str, tuple[Shape, ...]]:
-    """What each link collides with, by its name; all of it was checked when it was loaded."""
-    loading = character.loading
-    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
-    for link in robot.findall("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-    resolve_meshes(robot, loading.urdf_path)
-    shapes = read_shapes(robot, loading.urdf_path, loading.scale)
-    return {name: tuple(_solid(own)) for name, own in shapes.items()}

@@ -40,8 +40,7 @@ def write_urdf(file: Path, loading: UrdfOptions) -> Path:
     Raises:
         CharacterError: a mesh does not exist any more.
     """
-    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
-    resolve_meshes(robot, loading.urdf_path)
+    robot = resolve_meshes(loading)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(ElementTree.tostring(robot, encoding="utf-8"))
     return file

@@ -28,7 +28,7 @@ from msgs_config.messages.session import (
     SESSION,
     SessionBinding,
     given_session,
-    session_of,
+    read_session,
 )
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
@@ -208,7 +208,7 @@ class _Part:
         if arrays is None:
             return False
         state = state_in_layout(self._layout, arrays)
-        self._binding.take(session_of(arrays.frame_id))
+        self._binding.take(read_session(arrays.frame_id))
         expected = self._clock.stamp_ns(FIRST_TICK + len(self.states))
         if state.stamp_ns == expected:
             self.states.append(state)
@@ -226,7 +226,7 @@ class _Part:
             if raw is None:
                 return None
             arrays = self._decoder.decode(raw)
-            session = session_of(arrays.frame_id)
+            session = read_session(arrays.frame_id)
             if session == self._binding.bound or (
                 not self.states and self._binding.admits(session)
             ):

@@ -28,7 +28,13 @@ from msgs_config.arrays import BoolArray
 from msgs_config.errors import MessageError, RecordingError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, encode_clock
-from msgs_config.messages.session import ANONYMOUS, SESSION, given_session, make_session, session_of
+from msgs_config.messages.session import (
+    ANONYMOUS,
+    SESSION,
+    given_session,
+    make_session,
+    read_session,
+)
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
@@ -202,7 +208,7 @@ class StatePlayer(Node):
             except MessageError as error:
                 self._once_logger.log_once(f"command ignored: {error}")
                 continue
-            is_own = session_of(command.frame_id) in (self._session, ANONYMOUS)
+            is_own = read_session(command.frame_id) in (self._session, ANONYMOUS)
             if is_own and command.stamp_ns == stamp_ns:
                 return CommandArrays(command.names, command.effort, 0)
         return None

@@ -9,7 +9,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
-from actuated_characters.recorder.session_filter import Heard, SessionFilter, read_session
+from actuated_characters.recorder.session_filter import Heard, SessionFilter, find_session
 from actuated_characters.recorder.topics import RecordedTopic
 from actuated_characters.replay.players.session import NewSession
 from msgs_config.messages import topics
@@ -73,14 +73,14 @@ def test_of_any_interleaving_all_of_one_simulator_is_kept_and_nothing_of_others(
 
     states = [m for m in messages if m.recorded.topic is topics.JOINT_STATES]
     if states:
-        bound = read_session(states[0])
-        own = [message for message in messages if read_session(message) in (bound, None)]
+        bound = find_session(states[0])
+        own = [message for message in messages if find_session(message) in (bound, None)]
         assert session_filter.bound == bound
         assert sorted(map(content, passed)) == sorted(map(content, own))
         dropped = sum(session_filter.dropped(f"/{topic.name}") for topic in NAMED)
         assert dropped == len(messages) - len(own)
         assert bool(said) == bool(dropped)
-    assert len({read_session(message) for message in passed} - {None}) <= 1
+    assert len({find_session(message) for message in passed} - {None}) <= 1
 
 
 @settings(deadline=None)
@@ -90,7 +90,7 @@ def test_a_session_that_is_given_is_the_only_one_from_the_first_message_on(
 ) -> None:
     _, passed, _ = kept(OTHER, messages)
 
-    assert passed == [message for message in messages if read_session(message) in (OTHER, None)]
+    assert passed == [message for message in messages if find_session(message) in (OTHER, None)]
 
 
 def test_what_came_before_the_first_state_is_kept_in_front_of_it() -> None:

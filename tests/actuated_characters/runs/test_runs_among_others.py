@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory
 from actuated_characters.bags.reader import read_messages
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import frame_id_of, split_stamp
+from msgs_config.messages.joint_state import read_frame_id, split_stamp
 from msgs_config.messages.session import is_session
 from msgs_config.runtime.polling import DirectSubscription
 from tests.sim_node.interface.test_inbox import mutants
@@ -88,7 +88,7 @@ class Noise(Client):
         """Take all contacts that have come."""
         while (raw := self._heard.take()) is not None:
             with suppress(MessageError):
-                session = frame_id_of(raw)
+                session = read_frame_id(raw)
                 if is_session(session) and session.startswith(SIMULATOR):
                     self.sessions.append(session)
 
@@ -114,7 +114,7 @@ def noise(context: Context) -> Iterator[Noise]:
 def sessions_in(bag: Path) -> set[str]:
     """The sessions of all that names one in a bag."""
     names = ["/joint_states", "/contacts", "/applied_wrench", "/episode"]
-    return {frame_id_of(message.raw).split()[-1] for message in read_messages(bag, names)}
+    return {read_frame_id(message.raw).split()[-1] for message in read_messages(bag, names)}
 
 
 def test_a_run_among_three_simulators_and_noise_has_the_hash_that_it_has_alone(

@@ -3,86 +3,35 @@
 What could take a process down is read in one of its own.
 """
 
-import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from msgs_config.character.loading import load_character
 from msgs_config.character.urdf_check import MAX_JOINTS, MAX_POSITION_ENTRIES
-from msgs_config.errors import CharacterError
+from tests.support.urdf import (
+    inertial,
+    joint,
+    link,
+    load_elsewhere,
+    refusal,
+    robot,
+    write_character,
+)
 
 pytestmark = pytest.mark.slow
 
-PROJECT = Path(__file__).parents[3]
-READ = """
-import json, resource, sys, time
-from msgs_config.character.loading import load_character
-from msgs_config.errors import CharacterError
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-start = time.monotonic()
-try:
-    character = load_character(sys.argv[1])
-except CharacterError as error:
-    outcome = {"refused": str(error)}
-else:
-    outcome = {"size": character.layout.size}
-outcome["seconds"] = time.monotonic() - start
-outcome["mebibytes"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-print(json.dumps(outcome))
-"""
-
-
-def read(path: Path) -> dict[str, Any]:
-    """What another process makes of a character."""
-    done = subprocess.run(
-        [sys.executable, "-c", READ, str(path)],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, f"ended with {done.returncode}: {done.stderr[-500:]}"
-    outcome: dict[str, Any] = json.loads(done.stdout)
-    return outcome
-
-
-def write(directory: Path, urdf: str, yaml: str = "") -> Path:
-    (directory / "robot.urdf").write_text(urdf)
-    (directory / "robot.yaml").write_text("urdf: robot.urdf\n" + yaml)
-    return directory / "robot.yaml"
+LINK = link("a")
 
 
 def assert_refused(outcome: dict[str, Any], path: Path) -> None:
     """In one line that names the file, within seconds and in a few dozen MiB."""
     assert "refused" in outcome, outcome
-    assert_clear(outcome["refused"], path)
+    assert str(path) in outcome["refused"]
+    assert "\n" not in outcome["refused"]
+    assert len(outcome["refused"]) < 1000
     assert outcome["seconds"] < 15.0
     assert outcome["mebibytes"] < 150.0
-
-
-def assert_clear(line: str, path: Path) -> None:
-    assert str(path) in line
-    assert "\n" not in line
-    assert len(line) < 1000
-
-
-def inertial(mass: str = "1", moment: str = "1", origin: str = "") -> str:
-    return (
-        f'<inertial>{origin}<mass value="{mass}"/><inertia ixx="{moment}" ixy="0" ixz="0" '
-        f'iyy="1" iyz="0" izz="1"/></inertial>'
-    )
-
-
-LINK = f'<link name="a">{inertial()}</link>'
-
-
-def robot(*parts: str) -> str:
-    return f'<robot name="robot">{"".join(parts)}</robot>'
 
 
 # YAML
@@ -107,9 +56,9 @@ YAML = {
 
 @pytest.mark.parametrize("case", YAML)
 def test_hostile_yaml_is_refused(tmp_path: Path, case: str) -> None:
-    path = write(tmp_path, robot(LINK), YAML[case])
+    path = write_character(tmp_path, robot(LINK), YAML[case])
 
-    assert_refused(read(path), path)
+    assert_refused(load_elsewhere(path), path)
 
 
 # XML
@@ -136,9 +85,9 @@ XML = {
 
 @pytest.mark.parametrize("case", XML)
 def test_hostile_xml_is_refused(tmp_path: Path, case: str) -> None:
-    path = write(tmp_path, XML[case])
+    path = write_character(tmp_path, XML[case])
 
-    assert_refused(read(path), path.with_suffix(".urdf"))
+    assert_refused(load_elsewhere(path), path.with_suffix(".urdf"))
 
 
 # Numbers
@@ -148,42 +97,35 @@ def test_hostile_xml_is_refused(tmp_path: Path, case: str) -> None:
 @pytest.mark.parametrize(
     "part",
     [
-        '<link name="a">' + inertial(mass="{}") + "</link>",
-        '<link name="a">' + inertial(moment="{}") + "</link>",
-        '<link name="a">' + inertial(origin='<origin xyz="0 0 {}"/>') + "</link>",
+        link("a", inertial(mass="{}")),
+        link("a", inertial(moment="{}")),
+        link("a", inertial(origin='<origin xyz="0 0 {}"/>')),
         '<link name="a"><collision><geometry><sphere radius="{}"/></geometry></collision></link>',
-        LINK + '<link name="b"/><joint name="j" type="revolute"><parent link="a"/>'
-        '<child link="b"/><limit lower="{}" upper="1"/></joint>',
+        LINK + link("b") + joint("j", "a", "b", limit='<limit lower="{}" upper="1"/>'),
     ],
     ids=["mass", "moment of inertia", "origin", "radius", "limit"],
 )
 def test_what_is_no_finite_number_is_refused(tmp_path: Path, part: str, number: str) -> None:
-    path = write(tmp_path, robot(part.format(number)))
+    path = write_character(tmp_path, robot(part.format(number)))
 
-    with pytest.raises(CharacterError) as caught:
-        load_character(str(path))
-
-    assert_clear(str(caught.value), path.with_suffix(".urdf"))
+    assert str(path.with_suffix(".urdf")) in refusal(path)
 
 
 IMPOSSIBLE = {
-    "a negative mass": '<link name="a">' + inertial(mass="-1") + "</link>",
-    "a negative moment of inertia": '<link name="a">' + inertial(moment="-1") + "</link>",
-    "an axis of no length": LINK + '<link name="b"/><joint name="j" type="continuous">'
-    '<parent link="a"/><child link="b"/><axis xyz="0 0 0"/></joint>',
-    "a joint without a name": LINK + '<link name="b"/><joint type="continuous">'
-    '<parent link="a"/><child link="b"/></joint>',
+    "a negative mass": link("a", inertial(mass=-1)),
+    "a negative moment of inertia": link("a", inertial(moment=-1)),
+    "an axis of no length": LINK
+    + link("b")
+    + joint("j", "a", "b", "continuous", '<axis xyz="0 0 0"/>'),
+    "a joint without a name": LINK + link("b") + joint("", "a", "b", "continuous"),
 }
 
 
 @pytest.mark.parametrize("case", IMPOSSIBLE)
 def test_what_cannot_be_is_refused(tmp_path: Path, case: str) -> None:
-    path = write(tmp_path, robot(IMPOSSIBLE[case]))
+    path = write_character(tmp_path, robot(IMPOSSIBLE[case]))
 
-    with pytest.raises(CharacterError) as caught:
-        load_character(str(path))
-
-    assert_clear(str(caught.value), path.with_suffix(".urdf"))
+    assert str(path.with_suffix(".urdf")) in refusal(path)
 
 
 @pytest.mark.parametrize("number", ["0", "1e-300", "1e-30", "1e20", "1e30"])
@@ -193,10 +135,10 @@ def test_extreme_numbers_do_not_take_the_engine_down(
 ) -> None:
     """They may be refused, or make a body that is of no use."""
     shape = f'<collision><geometry><box size="{number} 1 1"/></geometry></collision>'
-    link = f'<link name="a">{inertial(mass=number, moment=number)}{shape}</link>'
-    path = write(tmp_path, robot(link), f"inertia: {inertia}\n")
+    body = link("a", inertial(number, number) + shape)
+    path = write_character(tmp_path, robot(body), f"inertia: {inertia}\n")
 
-    assert {"refused", "size"} & set(read(path))
+    assert {"refused", "size"} & set(load_elsewhere(path))
 
 
 # Size
@@ -204,12 +146,8 @@ def test_extreme_numbers_do_not_take_the_engine_down(
 
 def chain(kind: str, count: int) -> str:
     """A robot of links one after another, on joints of one kind."""
-    links = "".join(f'<link name="l{n}">{inertial()}</link>\n' for n in range(count + 1))
-    joints = "".join(
-        f'<joint name="j{n}" type="{kind}"><parent link="l{n}"/><child link="l{n + 1}"/>'
-        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>\n'
-        for n in range(count)
-    )
+    links = "\n".join(link(f"l{n}") for n in range(count + 1))
+    joints = "\n".join(joint(f"j{n}", f"l{n}", f"l{n + 1}", kind) for n in range(count))
     return robot(links, joints)
 
 
@@ -220,7 +158,7 @@ LARGEST = [("revolute", 121, 127), ("spherical", 30, 96), ("fixed", MAX_JOINTS, 
 def test_a_robot_as_large_as_the_engine_holds_is_taken(
     tmp_path: Path, kind: str, count: int, size: int
 ) -> None:
-    assert read(write(tmp_path, chain(kind, count)))["size"] == size
+    assert load_elsewhere(write_character(tmp_path, chain(kind, count)))["size"] == size
 
 
 @pytest.mark.parametrize(("kind", "count", "size"), LARGEST)
@@ -228,15 +166,15 @@ def test_a_robot_too_large_for_the_engine_is_refused(
     tmp_path: Path, kind: str, count: int, size: int
 ) -> None:
     """The engine itself would load it, and then read its states as empty."""
-    path = write(tmp_path, chain(kind, count + 1))
+    path = write_character(tmp_path, chain(kind, count + 1))
 
-    outcome = read(path)
+    outcome = load_elsewhere(path)
 
     assert_refused(outcome, path.with_suffix(".urdf"))
     assert f"{MAX_JOINTS} and {MAX_POSITION_ENTRIES}" in outcome["refused"]
 
 
 def test_a_robot_of_thousands_of_links_is_refused(tmp_path: Path) -> None:
-    path = write(tmp_path, chain("fixed", 10_000))
+    path = write_character(tmp_path, chain("fixed", 10_000))
 
-    assert_refused(read(path), path.with_suffix(".urdf"))
+    assert_refused(load_elsewhere(path), path.with_suffix(".urdf"))

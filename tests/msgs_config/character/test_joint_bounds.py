@@ -10,6 +10,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
 from tests.support.physics import advance, still_world
+from tests.support.urdf import joint, link, robot, write_character
 
 LIMIT = '<limit lower="-0.5" upper="0.5" effort="5" velocity="9"/>'
 NO_BOUNDS = '<limit effort="5" velocity="9"/>'
@@ -18,19 +19,13 @@ STEP_S = 1.0 / 240.0
 
 def load(directory: Path, kind: str, limit: str, joints: str, scale: float = 1.0) -> Character:
     """A fixed base and one arm of 1 kg on a joint of a kind, along or about z."""
-    inertia = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
-    links = "".join(
-        f'<link name="{name}"><inertial><mass value="1"/>{inertia}</inertial></link>'
-        for name in ("base", "arm")
+    urdf = robot(
+        link("base"),
+        link("arm"),
+        joint("joint", "base", "arm", kind, '<axis xyz="0 0 1"/>', limit),
     )
-    (directory / "arm.urdf").write_text(
-        f'<robot name="arm">{links}<joint name="joint" type="{kind}"><parent link="base"/>'
-        f'<child link="arm"/><axis xyz="0 0 1"/>{limit}</joint></robot>'
-    )
-    (directory / "arm.yaml").write_text(
-        f"urdf: arm.urdf\nfixed_base: true\nscale: {scale}\njoints: {{joint: {{{joints}}}}}\n"
-    )
-    return load_character(str(directory / "arm.yaml"))
+    yaml = f"fixed_base: true\nscale: {scale}\njoints: {{joint: {{{joints}}}}}\n"
+    return load_character(str(write_character(directory, urdf, yaml)))
 
 
 def reach(character: Character, effort: float) -> float:
@@ -55,9 +50,11 @@ CASES = {  # kind, the URDF's limit, the file's, the bounds that count
 def test_the_files_bounds_count(tmp_path: Path, case: str) -> None:
     kind, limit, joints, bounds = CASES[case]
 
-    lower, upper = load(tmp_path, kind, limit, joints).position_bounds()
+    character = load(tmp_path, kind, limit, joints)
 
+    lower, upper = character.position_bounds()
     assert (lower.tolist(), upper.tolist()) == ([bounds[0]], [bounds[1]])
+    assert character.effort_limits().tolist() == [5.0 if limit else math.inf]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -70,9 +67,9 @@ def test_the_simulated_body_keeps_within_the_files_bounds(tmp_path: Path, case: 
 
 
 def test_bounds_are_the_urdfs_if_the_file_has_none(tmp_path: Path) -> None:
-    (joint,) = load(tmp_path, "revolute", LIMIT, "stiffness: 1").moving_joints
+    (hinge,) = load(tmp_path, "revolute", LIMIT, "stiffness: 1").moving_joints
 
-    assert (joint.lower, joint.upper) == (-0.5, 0.5)
+    assert (hinge.lower, hinge.upper) == (-0.5, 0.5)
 
 
 def test_a_sliders_bounds_are_metres_whatever_the_scale(tmp_path: Path) -> None:
@@ -81,10 +78,6 @@ def test_a_sliders_bounds_are_metres_whatever_the_scale(tmp_path: Path) -> None:
 
     assert (slider.lower, slider.upper) == pytest.approx((-2.0, 0.3))
     assert reach(character, 2.0) == pytest.approx(0.3, abs=1e-3)
-
-
-def test_the_limit_of_effort_stays_the_urdfs(tmp_path: Path) -> None:
-    assert load(tmp_path, "revolute", LIMIT, "upper: 0.3").effort_limits().tolist() == [5.0]
 
 
 def test_a_joint_without_bounds_keeps_none(tmp_path: Path) -> None:
@@ -113,14 +106,14 @@ def test_impossible_bounds_are_refused_by_file_and_joint(tmp_path: Path, case: s
 
     line = str(caught.value)
     assert "\n" not in line
-    assert f"{tmp_path / 'arm.yaml'}: joints.joint" in line
+    assert f"{tmp_path / 'robot.yaml'}: joints.joint" in line
     assert words in line
 
 
 def test_a_rest_pose_within_the_urdfs_bounds_alone_is_refused(tmp_path: Path) -> None:
     load(tmp_path, "revolute", LIMIT, "upper: 0.3")
-    with (tmp_path / "arm.yaml").open("a") as file:
+    with (tmp_path / "robot.yaml").open("a") as file:
         file.write("rest_pose: {joint: 0.4}\n")
 
     with pytest.raises(CharacterError, match=r"rest_pose\.joint is 0\.4"):
-        load_character(str(tmp_path / "arm.yaml"))
+        load_character(str(tmp_path / "robot.yaml"))

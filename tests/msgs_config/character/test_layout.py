@@ -107,7 +107,7 @@ def test_the_entries_are_those_of_the_design(figure: JointLayout) -> None:
 
 def test_a_fixed_joint_has_no_place_in_the_layout(figure: JointLayout) -> None:
     assert figure.joint_names == ["root", "slider", "chest", "right_knee"]
-    with pytest.raises(LayoutError, match="skull"):
+    with pytest.raises(LayoutError, match=r"'skull'.*: root, slider, chest, right_knee"):
         figure.joint("skull")
 
 
@@ -157,14 +157,6 @@ def test_a_layout_may_be_empty() -> None:
     assert layout.clipped(nothing, nothing).shape == (0,)
 
 
-def test_an_unknown_joint_is_refused_with_the_joints_that_exist(figure: JointLayout) -> None:
-    with pytest.raises(LayoutError) as caught:
-        figure.joint("tail")
-
-    assert "'tail'" in str(caught.value)
-    assert "root, slider, chest, right_knee" in str(caught.value)
-
-
 # Masks and indices
 
 
@@ -191,55 +183,25 @@ def test_indices_follow_the_order_of_the_names(layout: JointLayout, data: st.Dat
     assert tuple(layout.dof_names[index] for index in indices) == names
 
 
-def test_an_unknown_degree_of_freedom_is_refused_with_those_that_exist(figure: JointLayout) -> None:
-    with pytest.raises(LayoutError) as caught:
-        figure.indices(("slider", "chest"))
-
-    assert "'chest'" in str(caught.value)
-    assert ", ".join(FIGURE_DOFS) in str(caught.value)
-
-
-def test_a_degree_of_freedom_named_twice_is_refused(figure: JointLayout) -> None:
-    with pytest.raises(LayoutError, match="'right_knee' is named twice"):
-        figure.indices(("slider", "right_knee", "right_knee"))
-
-
 @pytest.mark.parametrize(
-    ("names", "joint", "missing"),
+    ("names", "line"),
     [
-        (("chest_x", "slider", "chest_z"), "chest", "chest_y"),
-        (("chest_z",), "chest", "chest_x"),
-        (("root_x", "root_y", "root_z"), "root", "root_rx"),
+        (("slider", "chest"), f"unknown degree of freedom 'chest'; .*{', '.join(FIGURE_DOFS)}"),
+        (("slider", "right_knee", "right_knee"), "'right_knee' is named twice"),
+        (("chest_x", "slider", "chest_z"), "'chest' comes in parts: 'chest_y' is missing"),
+        (("chest_z",), "'chest' comes in parts: 'chest_x' is missing"),
+        (("root_x", "root_y", "root_z"), "'root' comes in parts: 'root_rx' is missing"),
     ],
 )
-def test_a_part_of_a_joint_is_refused_and_what_is_missing_named(
-    figure: JointLayout, names: tuple[str, ...], joint: str, missing: str
+def test_names_that_do_not_fit_are_refused_each_time(
+    figure: JointLayout, names: tuple[str, ...], line: str
 ) -> None:
-    with pytest.raises(LayoutError) as caught:
-        figure.indices(names)
-
-    assert f"'{joint}'" in str(caught.value)
-    assert f"'{missing}'" in str(caught.value)
-
-
-def test_names_that_were_refused_once_are_refused_again(figure: JointLayout) -> None:
-    for _ in range(3):
-        with pytest.raises(LayoutError, match="chest_y"):
-            figure.indices(("chest_x",))
+    for _ in range(2):
+        with pytest.raises(LayoutError, match=line):
+            figure.indices(names)
 
 
 # Differences
-
-
-@PROPERTY
-@given(layouts(), SEEDS)
-def test_a_configuration_has_no_difference_from_itself(layout: JointLayout, seed: int) -> None:
-    position = random_position(layout, np.random.default_rng(seed))
-    configuration = layout.configuration(position)
-
-    difference = layout.difference(configuration, configuration)
-
-    np.testing.assert_allclose(difference, np.zeros(layout.size), atol=1e-15)
 
 
 @PROPERTY
@@ -249,9 +211,12 @@ def test_the_difference_leads_from_the_start_to_the_end(layout: JointLayout, see
     start, end = random_position(layout, rng), random_position(layout, rng)
     is_rotation = np.zeros(layout.size, dtype=bool)
     is_rotation[layout.rotation_entries] = True
+    a, b = layout.configuration(start), layout.configuration(end)
 
-    difference = layout.difference(layout.configuration(start), layout.configuration(end))
+    difference = layout.difference(a, b)
 
+    np.testing.assert_allclose(layout.difference(a, a), np.zeros(layout.size), atol=1e-15)
+    np.testing.assert_allclose(layout.difference(b, a), -difference, atol=1e-13)
     np.testing.assert_allclose((start + difference)[~is_rotation], end[~is_rotation], atol=1e-14)
     for row in layout.rotation_entries:
         turn, from_, to = (
@@ -261,35 +226,16 @@ def test_the_difference_leads_from_the_start_to_the_end(layout: JointLayout, see
         assert np.linalg.norm(difference[row]) <= np.pi * (1.0 + 1e-15)
 
 
-@PROPERTY
-@given(layouts(), SEEDS)
-def test_the_way_back_is_the_way_there_reversed(layout: JointLayout, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    a = layout.configuration(random_position(layout, rng))
-    b = layout.configuration(random_position(layout, rng))
-
-    there, back = layout.difference(a, b), layout.difference(b, a)
-
-    np.testing.assert_allclose(there, -back, atol=1e-13)
-
-
-def test_the_difference_of_rotations_takes_the_short_way_past_half_a_turn(
+def test_rotations_take_the_short_way_past_half_a_turn_and_hinges_count_every_turn(
     figure: JointLayout,
 ) -> None:
     start, end = np.zeros(figure.size), np.zeros(figure.size)
     start[9], end[9] = 3.1, -3.1  # chest_z
-
-    difference = figure.difference(figure.configuration(start), figure.configuration(end))
-
-    assert difference[9] == pytest.approx(2.0 * np.pi - 6.2)
-
-
-def test_the_difference_of_hinges_counts_every_turn(figure: JointLayout) -> None:
-    start, end = np.zeros(figure.size), np.zeros(figure.size)
     end[10] = 7.0  # right_knee
 
     difference = figure.difference(figure.configuration(start), figure.configuration(end))
 
+    assert difference[9] == pytest.approx(2.0 * np.pi - 6.2)
     assert difference[10] == 7.0
 
 
@@ -340,6 +286,7 @@ def test_clipping_shortens_what_is_too_long_and_turns_nothing(
     effort = scale * rng.normal(size=layout.size)
     limits = scale * rng.uniform(0.0, 3.0, size=len(layout.vector_starts))
     limits[rng.random(len(limits)) < 0.2] = np.inf
+    limits[rng.random(len(limits)) < 0.2] = 0.0
     before = effort.copy()
 
     clipped = layout.clipped(effort, limits)
@@ -348,22 +295,13 @@ def test_clipping_shortens_what_is_too_long_and_turns_nothing(
     vectors = [part for joint in layout.joints for part in joint.vectors]
     for part, limit in zip(vectors, limits, strict=True):
         given_norm = float(np.linalg.norm(effort[part]))
-        if given_norm <= limit:
+        if given_norm <= limit:  # to the bit
             np.testing.assert_array_equal(clipped[part], effort[part])
         else:
             expected = effort[part] / given_norm * limit
             np.testing.assert_allclose(clipped[part], expected, rtol=1e-14)
             assert np.linalg.norm(clipped[part]) <= limit * (1.0 + 1e-15)
-
-
-@PROPERTY
-@given(moving_layouts(), SEEDS)
-def test_clipping_what_is_within_the_limits_changes_no_bit(layout: JointLayout, seed: int) -> None:
-    effort = np.random.default_rng(seed).normal(size=layout.size)
-
-    clipped = layout.clipped(effort, layout.norms(effort))
-
-    np.testing.assert_array_equal(clipped, effort)
+    np.testing.assert_array_equal(layout.clipped(effort, layout.norms(effort)), effort)
 
 
 def test_the_force_and_the_torque_of_the_base_have_limits_of_their_own(figure: JointLayout) -> None:
@@ -374,12 +312,6 @@ def test_the_force_and_the_torque_of_the_base_have_limits_of_their_own(figure: J
     clipped = figure.clipped(effort, limits)
 
     np.testing.assert_allclose(clipped[:6], [60.0, 0.0, 80.0, 0.0, 0.0, 50.0], rtol=1e-15)
-
-
-def test_a_limit_of_zero_leaves_nothing(figure: JointLayout) -> None:
-    clipped = figure.clipped(np.ones(figure.size), np.zeros(5))
-
-    np.testing.assert_array_equal(clipped, np.zeros(figure.size))
 
 
 def test_clipping_one_joint_while_another_is_at_rest_raises_no_floating_point_fault(

@@ -1,83 +1,63 @@
-"""A character may be a URDF alone: all keys of the file that it has not are at their defaults."""
+"""A character may be a URDF alone, its keys at their defaults; what seems overlooked is named."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from msgs_config.character.file import shipped_characters
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Gains
-from msgs_config.errors import CharacterError
+from msgs_config.errors import CharacterError, one_of
+from tests.support.urdf import inertial, joint, link, robot, write_character
 
-INERTIAL = (
-    '<inertial><mass value="1"/>'
-    '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
-)
-JOINT = (
-    '<joint name="hinge" type="revolute"><parent link="{}"/><child link="arm"/>'
-    '<limit lower="-1" upper="1" effort="5" velocity="9"/></joint>'
-)
-
-
-def write(directory: Path, base: str, inertial: str) -> Path:
-    path = directory / "arm.urdf"
-    path.write_text(
-        f'<robot name="arm"><link name="{base}">{inertial}</link>'
-        f'<link name="arm">{INERTIAL}</link>{JOINT.format(base)}</robot>'
-    )
-    return path
+HINGE = joint("hinge", "trunk", "arm")
+ARM = robot(link("trunk"), link("arm"), HINGE)
 
 
 def test_it_is_the_character_of_a_file_that_only_names_it(tmp_path: Path) -> None:
-    urdf = write(tmp_path, "trunk", INERTIAL)
-    (tmp_path / "named.yaml").write_text("urdf: arm.urdf\n")
+    named = load_character(str(write_character(tmp_path, ARM)))
+    urdf = tmp_path / "robot.urdf"
 
-    alone, named = load_character(str(urdf)), load_character(str(tmp_path / "named.yaml"))
+    alone = load_character(str(urdf))
 
+    assert (alone.name, alone.file) == ("robot", urdf)
     assert alone.loading == named.loading
     assert alone.links == named.links
     assert alone.gains == named.gains
+    assert alone.gains["hinge"] == Gains()
     assert alone.rest_position == named.rest_position
-
-
-def test_it_is_named_after_its_file_and_its_joints_are_limp(tmp_path: Path) -> None:
-    urdf = write(tmp_path, "trunk", INERTIAL)
-
-    character = load_character(str(urdf))
-
-    assert (character.name, character.file) == ("arm", urdf)
-    assert character.layout.has_floating_base
-    assert character.gains["hinge"] == Gains()
-    assert not np.any(character.rest_position)
-    assert character.warnings == ("joints without gains in arm.urdf are limp: hinge",)
+    assert alone.layout.has_floating_base
+    assert not np.any(alone.rest_position)
+    assert alone.warnings == ("joints without gains in robot.urdf are limp: hinge",)
 
 
 @pytest.mark.parametrize(
-    ("base", "inertial", "floats"),
-    [("world", "", False), ("world", INERTIAL, True), ("base", "", True)],
+    ("base", "inside", "yaml", "floats"),
+    [
+        ("world", "", "", False),
+        ("world", inertial(), "", True),
+        ("base", "", "", True),
+        ("world", "", "fixed_base: false\n", True),
+    ],
 )
-def test_a_base_without_mass_that_is_the_world_is_fixed(
-    tmp_path: Path, base: str, inertial: str, floats: bool
+def test_a_base_without_mass_that_is_the_world_is_fixed_unless_the_file_lets_it_float(
+    tmp_path: Path, base: str, inside: str, yaml: str, floats: bool
 ) -> None:
-    character = load_character(str(write(tmp_path, base, inertial)))
+    urdf = robot(link(base, inside), link("arm"), joint("hinge", base, "arm"))
+
+    character = load_character(str(write_character(tmp_path, urdf, yaml)))
 
     assert character.layout.has_floating_base == floats
-
-
-def test_a_file_may_let_the_world_float_all_the_same(tmp_path: Path) -> None:
-    write(tmp_path, "world", "")
-    (tmp_path / "named.yaml").write_text("urdf: arm.urdf\nfixed_base: false\n")
-
-    assert load_character(str(tmp_path / "named.yaml")).layout.has_floating_base
 
 
 def test_it_may_be_relative_to_the_working_directory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    urdf = write(tmp_path, "trunk", INERTIAL)
+    write_character(tmp_path, ARM)
     monkeypatch.chdir(tmp_path)
 
-    assert load_character("arm.urdf").file == urdf
+    assert load_character("robot.urdf").file == tmp_path / "robot.urdf"
 
 
 def test_it_may_lie_in_a_package() -> None:
@@ -102,12 +82,58 @@ def test_one_that_is_not_there_is_refused(name: str, words: str) -> None:
         load_character(name)
 
 
-def test_a_tab_between_numbers_is_a_blank_to_the_engine_too(tmp_path: Path) -> None:
-    path = tmp_path / "box.urdf"
-    path.write_text(
-        '<robot name="box"><link name="box"><inertial><origin xyz="1&#9;2&#9;3"/>'
-        '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-        "</inertial></link></robot>"
-    )
+# What the author may have overlooked
 
-    assert load_character(str(path)).links[0].inertial_pose.position == (1.0, 2.0, 3.0)
+BARE = robot(
+    link("base", ""),
+    link("upper"),
+    link("lower", ""),
+    joint("shoulder", "base", "upper"),
+    joint("elbow", "upper", "lower"),
+)
+FIXED = "fixed_base: true\n"
+
+
+def test_joints_without_gains_are_named(tmp_path: Path) -> None:
+    yaml = FIXED + "joints: {shoulder: {stiffness: 1}}\n"
+
+    character = load_character(str(write_character(tmp_path, BARE, yaml)))
+
+    assert "joints without gains in robot.yaml are limp: elbow" in character.warnings
+
+
+@pytest.mark.parametrize(("yaml", "named"), [(FIXED, "lower"), ("", "base, lower")])
+def test_links_whose_mass_the_engine_makes_up_are_named(
+    tmp_path: Path, yaml: str, named: str
+) -> None:
+    character = load_character(str(write_character(tmp_path, BARE, yaml)))
+
+    assert f"links without <inertial>, the engine assumes a mass: {named}" in character.warnings
+
+
+@pytest.mark.parametrize("name", shipped_characters())
+def test_nothing_is_overlooked_in_the_characters_that_ship(name: str) -> None:
+    assert load_character(name).warnings == ()
+
+
+@pytest.mark.parametrize("angle", [1.1, -30.0])
+def test_a_rest_pose_beyond_the_limits_is_refused(tmp_path: Path, angle: float) -> None:
+    path = write_character(tmp_path, BARE, FIXED + f"rest_pose: {{elbow: {angle}}}\n")
+
+    with pytest.raises(CharacterError, match=rf"rest_pose\.elbow is {angle:g}; .* -1 to 1"):
+        load_character(str(path))
+
+
+def test_a_hinge_without_a_limit_is_named(tmp_path: Path) -> None:
+    urdf = robot(link("trunk"), link("arm"), joint("shoulder", "trunk", "arm", limit=""))
+
+    with pytest.raises(CharacterError, match="joint 'shoulder' is revolute and has no <limit>"):
+        load_character(str(write_character(tmp_path, urdf)))
+
+
+def test_a_slip_of_the_pen_is_told_the_nearest_name() -> None:
+    names = ["root_assistance", "rate", "clip"]
+
+    line = one_of("parameter", "root_asistance", names)
+    assert "'; did you mean 'root_assistance'? there" in line
+    assert "did you mean" not in one_of("parameter", "xyz", names)

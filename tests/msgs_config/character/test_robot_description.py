@@ -14,6 +14,7 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, ShapeType
 from msgs_config.character.robot_description import robot_description
+from tests.support import urdf
 
 DESCRIBED = ["franka_panda", "kuka", "laikago", "lift", "pendulum"]
 TYPES = {
@@ -121,36 +122,32 @@ def test_a_path_with_blanks_is_escaped(tmp_path: Path) -> None:
     assert Path(unquote(urlsplit(name).path)) == folder / "cube.obj"
 
 
-LINK = '<link name="{}"/>'
-BALL = '<joint name="j" type="spherical"><parent link="a"/><child link="b"/></joint>'
-HINGE = (
-    '<joint name="j" type="revolute"><parent link="a"/><child link="b"/>'
-    '<limit lower="-1" upper="1"/></joint>'
-)
-CAPSULE = (
-    '<link name="a"><collision><geometry><capsule radius="1" length="1"/></geometry></collision>'
-    "</link>"
-)
+LINKS = urdf.link("a") + urdf.link("b")
+CAPSULE = '<collision><geometry><capsule radius="1" length="1"/></geometry></collision>'
 NO_URDF = {
-    "a ball joint": LINK.format("a") + LINK.format("b") + BALL,
-    "a capsule": CAPSULE,
-    "a limit without effort": LINK.format("a") + LINK.format("b") + HINGE,
+    "a ball joint": LINKS + urdf.joint("j", "a", "b", "spherical"),
+    "a capsule": urdf.link("a", CAPSULE),
+    "a limit without effort": LINKS
+    + urdf.joint("j", "a", "b", limit='<limit lower="-1" upper="1"/>'),
 }
 
 
 @pytest.mark.parametrize("case", NO_URDF)
 def test_what_urdf_does_not_know_has_no_description(tmp_path: Path, case: str) -> None:
-    path = tmp_path / "robot.urdf"
-    path.write_text(f'<robot name="robot">{NO_URDF[case]}</robot>')
+    path = urdf.write_character(tmp_path, urdf.robot(NO_URDF[case]))
 
     assert robot_description(load_character(str(path))) is None
 
 
-def test_a_character_of_another_size_than_its_urdf_has_no_description(tmp_path: Path) -> None:
-    (tmp_path / "block.urdf").write_text('<robot name="block"><link name="block"/></robot>')
-    (tmp_path / "block.yaml").write_text("urdf: block.urdf\nscale: 2\n")
+@pytest.mark.parametrize("yaml", ["scale: 2\n", ""])
+def test_a_character_of_another_size_than_its_urdf_has_no_description(
+    tmp_path: Path, yaml: str
+) -> None:
+    character = load_character(
+        str(urdf.write_character(tmp_path, urdf.robot(urdf.link("block")), yaml))
+    )
 
-    assert robot_description(load_character(str(tmp_path / "block.yaml"))) is None
+    assert (robot_description(character) is None) == bool(yaml)
 
 
 def test_the_humanoid_has_no_description() -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -22,6 +22,7 @@ OF_ONE = {
 
 @pytest.mark.parametrize("function", OF_ONE)
 @given(angles=ANGLES)
+@settings(deadline=None)
 def test_each_value_is_that_of_the_c_library_to_the_bit(
     function: Callable[[FloatArray], FloatArray], angles: FloatArray
 ) -> None:
@@ -32,6 +33,7 @@ def test_each_value_is_that_of_the_c_library_to_the_bit(
 
 
 @given(st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), max_size=8))
+@settings(deadline=None)
 def test_angles_of_points_and_cosines_are_those_of_the_c_library(
     points: list[tuple[float, float]],
 ) -> None:

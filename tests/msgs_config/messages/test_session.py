@@ -17,7 +17,7 @@ from msgs_config.messages.session import (
     given_session,
     is_session,
     make_session,
-    session_of,
+    read_session,
 )
 from msgs_config.parameters import Values
 
@@ -41,7 +41,7 @@ def test_a_session_id_is_the_nodes_name_with_digits_and_never_the_same_twice() -
 )
 def test_a_text_that_is_no_id_names_no_session(text: str) -> None:
     assert not is_session(text)
-    assert session_of(text) == ANONYMOUS
+    assert read_session(text) == ANONYMOUS
 
 
 @given(st.integers(1, 10**9), st.sampled_from(SESSIONS))

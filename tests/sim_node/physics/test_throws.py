@@ -13,7 +13,7 @@ from actuated_characters.runs.plan import Plan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import CommandError, ConfigurationError
-from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius, throw_of
+from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius, parse_throw
 from msgs_config.parameters import Values
 from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
@@ -382,11 +382,11 @@ def test_an_episode_has_a_bounded_number_of_balls() -> None:
 def test_numbers_come_in_any_order_and_a_radius_may_be_left_out() -> None:
     names = ("vz", "vy", "vx", "z", "y", "x", "mass")
 
-    throw = throw_of(names, range(1, 8))
+    throw = parse_throw(names, range(1, 8))
 
     assert throw == ProjectileThrow(7.0, natural_radius(7.0), (6.0, 5.0, 4.0), (3.0, 2.0, 1.0))
     assert 500.0 * 4.0 / 3.0 * pi * throw.radius**3 == pytest.approx(7.0)
-    assert throw_of(NUMBERS, throw.numbers().tolist()) == throw
+    assert parse_throw(NUMBERS, throw.numbers().tolist()) == throw
 
 
 GOOD = dict(zip(NUMBERS, (2.0, 0.1, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0), strict=True))
@@ -407,7 +407,7 @@ def test_what_cannot_be_thrown_is_refused_in_a_line(wrong: str) -> None:
     numbers = GOOD | other
 
     with pytest.raises(CommandError) as caught:
-        throw_of(list(numbers), list(numbers.values()))
+        parse_throw(list(numbers), list(numbers.values()))
 
     line = str(caught.value)
     assert "\n" not in line and all(part in line for part in expected)
@@ -417,11 +417,11 @@ def test_a_throw_needs_each_number_once() -> None:
     for name in NUMBERS:
         rest = {key: value for key, value in GOOD.items() if key != name}
         if name == "radius":
-            throw_of(list(rest), list(rest.values()))
+            parse_throw(list(rest), list(rest.values()))
             continue
         with pytest.raises(CommandError, match=f"'{name}' is missing"):
-            throw_of(list(rest), list(rest.values()))
+            parse_throw(list(rest), list(rest.values()))
     with pytest.raises(CommandError, match="'mass' twice"):
-        throw_of([*GOOD, "mass"], [*GOOD.values(), 1.0])
+        parse_throw([*GOOD, "mass"], [*GOOD.values(), 1.0])
     with pytest.raises(CommandError, match="8 names but 2 numbers"):
-        throw_of(list(GOOD), [1.0, 2.0])
+        parse_throw(list(GOOD), [1.0, 2.0])
