@@ -107,7 +107,7 @@ def _job(options: argparse.Namespace) -> "Job":
     from actuated_characters.reconstruction.problem import Problem, duration_of
     from actuated_characters.reconstruction.reconstruction import Job
     from actuated_characters.reconstruction.search import Settings
-    from sim_node.parameters import tick_period
+    from sim_node.node_settings import make_node_settings
 
     workers = worker_count(options.workers)
     _check_output(options)
@@ -128,7 +128,7 @@ def _job(options: argparse.Namespace) -> "Job":
     settings.check()
     plan = problem.plan()  # what is wrong is said before anything begins
     problem.planned_pushes(plan)
-    if tick_period(plan.simulator):
+    if make_node_settings(plan.simulator).tick_period:
         raise ConfigurationError(
             "reconstruct simulates as fast as it can; it takes neither 'mode' realtime nor a "
             "'real_time_factor'"

@@ -196,13 +196,13 @@ def _checked_plan(
 ) -> "Plan":
     """What is to be run; raises ActuatedCharactersError where options contradict each other."""
     from actuated_characters.runs.plan import make_plan
-    from sim_node.parameters import tick_period
+    from sim_node.node_settings import make_node_settings
 
     duration = _DURATION if found_in is None else found_in.duration
     if options.duration is not None:
         duration = options.duration
     plan = make_plan(options.character, duration, _reference(options), simulator, controller)
-    if options.in_process and tick_period(plan.simulator):
+    if options.in_process and make_node_settings(plan.simulator).tick_period:
         raise ConfigurationError(
             "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
             "nor a 'real_time_factor'"

@@ -38,7 +38,7 @@ def ticks_in_process(
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))
     with Simulation([role], make_settings(plan.simulator)) as simulation:
         simulation.watches_contacts = controller.needs_contacts
-        (actor,) = simulation.actors
+        (actor,) = simulation.characters
         episode_ns = actor.state.stamp_ns
         for _ in range(plan.ticks):
             state = actor.state

@@ -134,7 +134,7 @@ def _measure(walk: RunResult) -> TickTime:
     role = make_character_setup(plan.character, plan.simulator)
     physics, control = [], []
     with Simulation([role], make_settings(plan.simulator)) as simulation:
-        (actor,) = simulation.actors
+        (actor,) = simulation.characters
         episode_ns = actor.state.stamp_ns
         for _ in range(plan.ticks):
             began = time.perf_counter()

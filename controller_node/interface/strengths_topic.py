@@ -5,10 +5,11 @@ from sensor_msgs.msg import JointState
 
 from controller_node.controller import Controller
 from controller_node.interface.publishers import Publishers
-from controller_node.interface.stamped_subscription import StampedSubscription
+from controller_node.interface.stamped_message import decode_stamped
 from controller_node.strength import strengths_of
 from msgs_config.messages import topics
 from msgs_config.runtime.once_logger import OnceLogger
+from msgs_config.runtime.stamped_subscription import StampedSubscription
 
 
 class StrengthTopic:
@@ -19,13 +20,13 @@ class StrengthTopic:
     ) -> None:
         self._controller = controller
         self._outputs = outputs
-        self._inbox = StampedSubscription(node, topics.STRENGTH, "strength", self._use, logger)
-        self._episode_ns = 0
+        self._messages = StampedSubscription(node, topics.STRENGTH, "refused ", self._use, logger)
+        self._now_ns = self._episode_ns = 0
 
     @property
     def refused(self) -> int:
         """How many were refused."""
-        return self._inbox.refused
+        return self._messages.rejected
 
     def take(self, state_ns: int, episode_ns: int) -> None:
         """Take what has come before the answer to the state of a stamp, ns.
@@ -33,10 +34,11 @@ class StrengthTopic:
         One without a stamp counts from this state on, one with a stamp from its tick on. One that
         is wrong is refused whole, and what was in force goes on.
         """
-        self._episode_ns = episode_ns
-        self._inbox.take(state_ns)
+        self._now_ns, self._episode_ns = state_ns, episode_ns
+        self._messages.take()
 
-    def _use(self, message: JointState, start_ns: int) -> None:
+    def _use(self, raw: bytes) -> None:
+        message, start_ns = decode_stamped(raw, JointState, "strength", self._now_ns)
         layout, clock = self._controller.layout, self._controller.clock
         start_ns = clock.stamp_ns(clock.first_tick_from(start_ns))
         strengths = strengths_of(layout, tuple(message.name), tuple(message.effort), start_ns)

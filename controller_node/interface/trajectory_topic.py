@@ -5,12 +5,13 @@ from trajectory_msgs.msg import JointTrajectory
 
 from controller_node.controller import Controller
 from controller_node.interface.publishers import Publishers
-from controller_node.interface.stamped_subscription import StampedSubscription, nanoseconds
+from controller_node.interface.stamped_message import decode_stamped, nanoseconds
 from controller_node.references.trajectory import TrajectoryPoints, points_of_lists
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.joint_state import split_stamp
 from msgs_config.runtime.once_logger import OnceLogger
+from msgs_config.runtime.stamped_subscription import StampedSubscription
 
 
 class Trajectories:
@@ -21,15 +22,15 @@ class Trajectories:
     ) -> None:
         self._controller = controller
         self._outputs = outputs
-        self._inbox = StampedSubscription(
-            node, topics.JOINT_TRAJECTORY, "trajectory", self._follow, logger
+        self._messages = StampedSubscription(
+            node, topics.JOINT_TRAJECTORY, "refused ", self._follow, logger
         )
         self._now_ns = self._episode_ns = 0
 
     @property
     def refused(self) -> int:
         """How many were refused."""
-        return self._inbox.refused
+        return self._messages.rejected
 
     def take(self, state_ns: int, episode_ns: int) -> None:
         """Take what has come before the answer to the state of a stamp, ns.
@@ -38,9 +39,10 @@ class Trajectories:
         be followed is refused, and what was tracked goes on.
         """
         self._now_ns, self._episode_ns = state_ns, episode_ns
-        self._inbox.take(state_ns)
+        self._messages.take()
 
-    def _follow(self, message: JointTrajectory, start_ns: int) -> None:
+    def _follow(self, raw: bytes) -> None:
+        message, start_ns = decode_stamped(raw, JointTrajectory, "trajectory", self._now_ns)
         self._controller.set_trajectory(
             _points(message),
             start_ns=start_ns,

@@ -3,11 +3,10 @@
 from pathlib import Path
 from xml.etree import ElementTree
 
-from msgs_config import files
 from msgs_config.character.mesh_check import check_mesh
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import UrdfOptions
-from msgs_config.character.urdf_check import NUMBERS
+from msgs_config.character.urdf_check import NUMBERS, parse_urdf
 from msgs_config.errors import CharacterError
 
 MAX_LINE_BYTES = 8000
@@ -23,7 +22,7 @@ def engine_urdf(loading: UrdfOptions) -> str:
     Raises:
         CharacterError: a mesh does not exist or cannot be used, or an element is too long.
     """
-    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
+    robot = parse_urdf(loading.urdf_path, loading.urdf_text)
     for link in robot.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)

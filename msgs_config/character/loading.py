@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
@@ -29,7 +28,7 @@ from msgs_config.character.model import (
     Vector,
 )
 from msgs_config.character.shapes import read_collision_shapes, read_shapes
-from msgs_config.character.urdf_check import links_without_inertial
+from msgs_config.character.urdf_check import links_without_inertial, parse_urdf
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.geometry import rotations
 
@@ -57,7 +56,7 @@ def make_character(file: CharacterFile) -> Character:
         CharacterError: the two do not fit each other, or a mesh cannot be used; says why.
     """
     urdf = file.loading.urdf_path
-    robot = files.parse_xml(urdf, file.loading.urdf_text, CharacterError)
+    robot = parse_urdf(urdf, file.loading.urdf_text)
     resolve_meshes(robot, urdf)
     seen = read_shapes(robot, urdf, file.loading.scale)
     touched = read_collision_shapes(robot, urdf, file.loading.scale)

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 from msgs_config import files
 from msgs_config.character.model import UrdfOptions
+from msgs_config.character.urdf_check import parse_urdf
 from msgs_config.errors import CharacterError
 
 MAX_MESH_BYTES = 64 * 1024 * 1024
@@ -35,7 +36,7 @@ def collision_meshes(loading: UrdfOptions) -> dict[str, str]:
     Raises:
         CharacterError: a mesh does not exist or cannot be read.
     """
-    robot = files.parse_xml(loading.urdf_path, loading.urdf_text, CharacterError)
+    robot = parse_urdf(loading.urdf_path, loading.urdf_text)
     names = {mesh.get("filename", "") for mesh in robot.iterfind("link/collision//mesh")}
     return {name: _hash_of(_find(name, loading.urdf_path)) for name in sorted(names)}
 

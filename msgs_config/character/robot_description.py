@@ -3,10 +3,9 @@
 from pathlib import Path
 from xml.etree import ElementTree
 
-from msgs_config import files
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import Character
-from msgs_config.errors import CharacterError
+from msgs_config.character.urdf_check import parse_urdf
 
 _JOINT_TYPES = {"revolute", "continuous", "prismatic", "fixed"}
 _SHAPES = {"box", "sphere", "cylinder", "mesh"}
@@ -18,7 +17,7 @@ def robot_description(character: Character) -> str | None:
     Ball joints, capsules and a scale are the engine's own and no part of URDF.
     """
     urdf = character.loading.urdf_path
-    robot = files.parse_xml(urdf, character.loading.urdf_text, CharacterError)
+    robot = parse_urdf(urdf, character.loading.urdf_text)
     if character.loading.scale != 1.0 or not _is_legal(robot):
         return None
     resolve_meshes(robot, urdf)

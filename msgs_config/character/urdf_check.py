@@ -1,7 +1,9 @@
 """A URDF is one tree of links, checked before it is loaded: a broken one can crash the engine."""
 
+import copy
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -60,7 +62,7 @@ def check_urdf(path: Path, text: str) -> ElementTree.Element:
     Raises:
         CharacterError: it is not so; names the file and the link or joint.
     """
-    robot = files.parse_xml(path, text, CharacterError)
+    robot = parse_urdf(path, text)
     links, joints = robot.findall("link"), robot.findall("joint")
     names = [link.get("name", "") for link in links]
     ends = [(_end(joint, "parent"), _end(joint, "child")) for joint in joints]
@@ -78,6 +80,20 @@ def check_urdf(path: Path, text: str) -> ElementTree.Element:
     for element in [*links, *joints, *robot.findall("material")]:
         _check_numbers(path, element)
     return robot
+
+
+def parse_urdf(path: Path, text: str) -> ElementTree.Element:
+    """The root of a URDF's text, which is parsed once; each call returns a copy.
+
+    Raises:
+        CharacterError: it is no XML that can be read; names the file.
+    """
+    return copy.deepcopy(_parse(path, text))
+
+
+@lru_cache(maxsize=8)
+def _parse(path: Path, text: str) -> ElementTree.Element:
+    return files.parse_xml(path, text, CharacterError)
 
 
 def links_without_inertial(robot: ElementTree.Element) -> set[str]:

@@ -1,4 +1,4 @@
-"""Where a ball that flies straight at a link meets a character. No ROS in here."""
+"""Where a ball that flies straight at a link meets a character."""
 
 from dataclasses import dataclass
 
@@ -58,11 +58,11 @@ def find_impact(
     with World(WorldSettings(ground=False)) as world:
         body = world.add(character)
         body.set_state(position, np.zeros(character.layout.size))
-        target = np.array(body.links.centres()[row])
+        target = np.array(body.centres()[row])
         far = target + distance * origin
         x, y, z = far.tolist()
         world.balls.add(ProjectileThrow(1.0, radius, (x, y, z), (0.0, 0.0, 0.0)))
-        gaps = world.balls.gaps(body.links)
+        gaps = body.gaps(world.balls.numbers[0])
         if not np.isfinite(gaps[row]):
             raise ConfigurationError(f"link '{link}' has no surface that could be hit")
         if gaps[row] <= 0.0:
@@ -75,8 +75,8 @@ def find_impact(
             if gaps[row] < _CLOSE:
                 break
             left -= min(gaps[row], radius)  # or it would jump over what is in the way
-            world.balls.place(target + left * origin)
-            gaps = world.balls.gaps(body.links)
+            world.balls.place(0, target + left * origin)
+            gaps = body.gaps(world.balls.numbers[0])
             before |= {names[each] for each in np.flatnonzero(gaps < 0.0).tolist() if each != row}
         else:
             raise ConfigurationError(

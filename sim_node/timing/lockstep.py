@@ -109,10 +109,6 @@ class LockstepBarrier:
             self._missing = int(np.count_nonzero(self._required & ~self._tick.given))
         return verdict
 
-    def count_rejected(self) -> None:
-        """Count a command that was refused, here or before it could be offered."""
-        self.counts[CommandStatus.REJECTED] += 1
-
     def fill_missing(self, effort: FloatArray) -> None:
         """Complete the tick with the entries of `effort` (n,) wherever a command is missing."""
         self._filled = self._required & ~self._tick.given

@@ -81,10 +81,6 @@ class ZeroOrderHold:
             self._was_held[indices] = True
         return verdict
 
-    def count_rejected(self) -> None:
-        """Count a command that was refused, here or before it could be offered."""
-        self.counts[CommandStatus.REJECTED] += 1
-
     @property
     def _held(self) -> BoolArray:
         held: BoolArray = (self._given_ns != _NEVER) & (

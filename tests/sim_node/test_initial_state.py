@@ -111,7 +111,7 @@ def test_one_character_may_ask_while_another_is_given_its_state() -> None:
         "two.initial_position": [0.2],
     }
 
-    one, two = load_parameters(given).parts
+    one, two = load_parameters(given).characters
 
     assert one.values["initial_state"] == "reference"
     assert two.values["initial_state"] == "given"
@@ -124,11 +124,11 @@ def test_values_of_one_character_leave_those_of_others() -> None:
 
     changed = cast.with_values({"two": {"initial_position": [0.75]}})
 
-    assert [part.values["initial_position"] for part in changed.parts] == [[0.5], [0.75]]
+    assert [part.values["initial_position"] for part in changed.characters] == [[0.5], [0.75]]
     assert changed.values["one.initial_position"] == [0.5]
     assert changed.values["two.initial_position"] == [0.75]
     assert changed.values.keys() == cast.values.keys()
-    assert cast.parts[1].values["initial_position"] == [0.5]
+    assert cast.characters[1].values["initial_position"] == [0.5]
 
 
 # The simulation
@@ -138,8 +138,8 @@ def bits_after(run: Simulation, ticks: int = 60) -> list[bytes]:
     """Every bit of the states of all actors, from now on."""
     states = []
     for _ in range(ticks):
-        states += [a.state.position.tobytes() + a.state.velocity.tobytes() for a in run.actors]
-        run.step([np.zeros(actor.layout.size) for actor in run.actors])
+        states += [a.state.position.tobytes() + a.state.velocity.tobytes() for a in run.characters]
+        run.step([np.zeros(actor.layout.size) for actor in run.characters])
     return states
 
 

@@ -45,7 +45,7 @@ def declared_names(cast: SimulatorParameters) -> list[str]:
 def test_without_names_there_is_one_character_whose_parameters_have_no_prefix() -> None:
     cast = load_parameters({})
 
-    (part,) = cast.parts
+    (part,) = cast.characters
     assert part.name == ""
     assert part.character.name == "humanoid"
     world = [parameter.name for parameter in WORLD_PARAMETERS]
@@ -71,7 +71,7 @@ def test_the_one_has_the_values_that_its_parameters_alone_have(given: dict[str, 
     cast = load_parameters(given)
 
     # Assert
-    assert cast.parts[0].values == alone
+    assert cast.characters[0].values == alone
     assert cast.values == {**alone, "characters": []}
 
 
@@ -106,8 +106,8 @@ def test_what_is_made_of_the_parameters_is_the_simulation_of_the_one() -> None:
         run.advance(np.ones(1))
 
         # Assert
-        (actor,) = cast.actors
-        assert actor.role == run.actor.role
+        (actor,) = cast.characters
+        assert actor.setup == run.actor.setup
         assert cast.settings == run.settings
         assert actor.state.position.tobytes() == run.state.position.tobytes()
 
@@ -120,8 +120,8 @@ def test_each_name_is_a_character_with_parameters_of_its_own() -> None:
     cast = load_parameters({"characters": ["one", "arm"], "arm.character": "franka_panda"})
 
     # Assert
-    assert [part.name for part in cast.parts] == ["one", "arm"]
-    assert [part.character.name for part in cast.parts] == ["humanoid", "franka_panda"]
+    assert [part.name for part in cast.characters] == ["one", "arm"]
+    assert [part.character.name for part in cast.characters] == ["humanoid", "franka_panda"]
     world = [parameter.name for parameter in WORLD_PARAMETERS]
     own = [f"{name}.{parameter}" for name in ("one", "arm") for parameter in OWN]
     assert declared_names(cast) == [CHARACTERS.name, *world, *own]
@@ -159,8 +159,8 @@ def test_what_is_given_without_a_name_is_for_all_that_have_nothing_of_their_own(
     )
 
     # Assert
-    assert [part.character.name for part in cast.parts] == ["lift", "pendulum", "lift"]
-    velocities = [part.values.numbers("initial_velocity") for part in cast.parts]
+    assert [part.character.name for part in cast.characters] == ["lift", "pendulum", "lift"]
+    velocities = [part.values.numbers("initial_velocity") for part in cast.characters]
     assert velocities == [(0.5,), (0.5,), (0.25,)]
     assert cast.values["one.initial_velocity"] == [0.5]
 
@@ -172,7 +172,7 @@ def test_a_characters_own_value_counts_wherever_it_is_given(own_first: bool) -> 
 
     cast = load_parameters({"characters": ["one"], **given})
 
-    assert cast.parts[0].character.name == "lift"
+    assert cast.characters[0].character.name == "lift"
 
 
 def test_each_part_has_all_values_as_if_it_were_alone() -> None:
@@ -181,7 +181,7 @@ def test_each_part_has_all_values_as_if_it_were_alone() -> None:
 
     # Assert
     alone = resolve(PARAMETERS + character_parameters(character("lift")), {"rate": 100} | LIFT)
-    assert cast.parts[1].values == alone
+    assert cast.characters[1].values == alone
 
 
 LIFT = {"character": "lift"}
@@ -194,7 +194,7 @@ def test_a_placement_moves_the_rest_pose_that_a_character_begins_in() -> None:
     )
 
     # Assert: turned about z at the world's origin, then moved
-    one, two = (part.values.numbers("initial_position") for part in cast.parts)
+    one, two = (part.values.numbers("initial_position") for part in cast.characters)
     assert one == character("humanoid").rest_position
     x, y, z = one[:3]
     np.testing.assert_allclose(two[:3], [1.0 - y, 2.0 + x, 0.5 + z], atol=1e-12)
@@ -213,7 +213,7 @@ def test_a_placement_that_is_not_four_numbers_is_refused(placement: object) -> N
 def test_one_file_may_be_several_characters() -> None:
     cast = load_parameters({"characters": ["a", "b"], "character": FLOATING_TURNED_FRAMES})
 
-    assert cast.parts[0].character == cast.parts[1].character
+    assert cast.characters[0].character == cast.characters[1].character
 
 
 @pytest.mark.parametrize(
@@ -256,7 +256,7 @@ def test_names_may_be_short_long_and_of_any_case() -> None:
 
     cast = load_parameters({"characters": names, "character": "lift"})
 
-    assert [part.name for part in cast.parts] == names
+    assert [part.name for part in cast.characters] == names
 
 
 @pytest.mark.parametrize("name", ["three.character", "three.initial_position", "On.character"])
@@ -305,13 +305,17 @@ def test_roles_carry_the_names_their_topics_and_messages_have() -> None:
     cast = load_parameters({"characters": ["one", "arm"], "arm.character": "lift"})
 
     # Act
-    roles = [make_character_setup(part.character, part.values, part.name) for part in cast.parts]
+    roles = [
+        make_character_setup(part.character, part.values, part.name) for part in cast.characters
+    ]
 
     # Assert
     assert [role.prefix for role in roles] == ["one/", "arm/"]
     assert roles[1].commanded_joints == ("height",)
     assert roles[1].initial_velocity == (0.0,)
-    assert make_character_setup(cast.parts[0].character, cast.parts[0].values).prefix == ""
+    assert (
+        make_character_setup(cast.characters[0].character, cast.characters[0].values).prefix == ""
+    )
 
 
 # --- terrain -------------------------------------------------------------------------------------
@@ -324,7 +328,7 @@ def resting_height(box: Path, terrain: str) -> float:
     ) as run:
         for _ in range(480):
             run.step([np.zeros(6)])
-        return float(run.actors[0].state.position[2])
+        return float(run.characters[0].state.position[2])
 
 
 @pytest.fixture
@@ -391,7 +395,7 @@ def test_the_grounds_friction_is_the_terrain_files_too(
         # Act
         for _ in range(240):
             run.step([np.zeros(6)])
-        speed = run.actors[0].state.velocity[0]
+        speed = run.characters[0].state.velocity[0]
 
     # Assert
     assert speed == pytest.approx(1.0 if slides else 0.0, abs=1e-2)
@@ -405,7 +409,7 @@ def test_the_terrain_is_there_after_a_reset(box: Path, tmp_path: Path) -> None:
         for _ in range(240):
             run.step([np.zeros(6)])
 
-        assert run.actors[0].state.position[2] == pytest.approx(0.1, abs=5e-3)
+        assert run.characters[0].state.position[2] == pytest.approx(0.1, abs=5e-3)
 
 
 def test_settings_know_which_ground_there_is(tmp_path: Path) -> None:

@@ -40,10 +40,10 @@ def trajectories(given: Mapping[str, object], *efforts: Efforts) -> list[bytes]:
 
 
 def states_of(run: Simulation, *efforts: Efforts) -> list[bytes]:
-    states = [b""] * len(run.actors)
+    states = [b""] * len(run.characters)
     for together in zip(*efforts, strict=True):
         run.step(together)
-        for number, actor in enumerate(run.actors):
+        for number, actor in enumerate(run.characters):
             states[number] += actor.state.position.tobytes() + actor.state.velocity.tobytes()
     return states
 
@@ -107,10 +107,10 @@ def test_a_push_moves_the_one_that_it_is_for() -> None:
             left_alone.step([nothing, nothing])
 
         # Assert
-        assert pushed.actors[1].pushes == ()
+        assert pushed.characters[1].pushes == ()
         one, other = (
             np.abs(mine.state.position - theirs.state.position).max()
-            for mine, theirs in zip(pushed.actors, left_alone.actors, strict=True)
+            for mine, theirs in zip(pushed.characters, left_alone.characters, strict=True)
         )
     assert one == 0.0
     assert other > 0.1
@@ -126,7 +126,7 @@ def test_what_each_touches_is_its_own_affair() -> None:
         # Act
         for _ in range(20):
             run.step([nothing, nothing])
-        stands, falls = (actor.contacts for actor in run.actors)
+        stands, falls = (actor.contacts for actor in run.characters)
 
         # Assert
         assert stands is not None and falls is not None
@@ -161,8 +161,10 @@ def test_watching_the_contacts_changes_no_bit_of_what_follows() -> None:
 
         # Assert
         assert seen == unseen
-        assert all(actor.contacts is None for actor in blind.actors)
-        assert all(actor.contacts and actor.contacts.touching.any() for actor in watching.actors)
+        assert all(actor.contacts is None for actor in blind.characters)
+        assert all(
+            actor.contacts and actor.contacts.touching.any() for actor in watching.characters
+        )
 
 
 def test_without_weight_and_ground_what_touches_presses_equally_in_opposite_directions() -> None:
@@ -183,7 +185,9 @@ def test_without_weight_and_ground_what_touches_presses_equally_in_opposite_dire
             # Act
             run.step([nothing, nothing])
             one, other = (
-                actor.contacts.wrenches[:, :3].sum(axis=0) for actor in run.actors if actor.contacts
+                actor.contacts.wrenches[:, :3].sum(axis=0)
+                for actor in run.characters
+                if actor.contacts
             )
 
             # Assert
@@ -216,7 +220,7 @@ def test_an_initial_state_of_the_wrong_length_names_the_character() -> None:
 def test_stamps_are_the_same_for_all() -> None:
     with joint_simulation(FAR) as run:
         for _ in range(5):
-            assert [actor.state.stamp_ns for actor in run.actors] == [run.stamp_ns] * 2
+            assert [actor.state.stamp_ns for actor in run.characters] == [run.stamp_ns] * 2
             run.step([np.zeros(HUMANOID.size)] * 2)
 
 

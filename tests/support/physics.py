@@ -110,9 +110,9 @@ class LoneWorld(World):
 class LoneSimulation(Simulation):
     """A simulation of one actor."""
 
-    def __init__(self, role: CharacterSetup, settings: SimulationSettings) -> None:
-        super().__init__([role], settings)
-        (self.actor,) = self.actors
+    def __init__(self, setup: CharacterSetup, settings: SimulationSettings) -> None:
+        super().__init__([setup], settings)
+        (self.actor,) = self.characters
         self.layout = self.actor.layout
 
     @property
@@ -257,9 +257,12 @@ def simulation(name: str, **given: object) -> LoneSimulation:
 
 def joint_simulation(given: Mapping[str, object]) -> Simulation:
     """A simulation of several characters, with the parameters given."""
-    cast = for_simulator.load_parameters(given)
-    roles = [for_simulator.make_character_setup(p.character, p.values, p.name) for p in cast.parts]
-    return Simulation(roles, for_simulator.make_settings(cast.values))
+    loaded = for_simulator.load_parameters(given)
+    setups = [
+        for_simulator.make_character_setup(each.character, each.values, each.name)
+        for each in loaded.characters
+    ]
+    return Simulation(setups, for_simulator.make_settings(loaded.values))
 
 
 def controller(name: str, **given: object) -> Controller:

@@ -66,14 +66,14 @@ def first_hit(plan: Plan, planned: PlannedThrow) -> Hit:
     with Simulation(
         [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
     ) as run:
-        (actor,) = run.actors
+        (actor,) = run.characters
         start, let_go = run.stamp_ns, run.clock.first_tick_from(planned.stamp_ns)
         motion = np.zeros(13)
         for _ in range(plan.ticks):
             effort, _ = controller.compute_effort(actor.state, start)
             run.step([effort], None, [planned.throw] if run.tick == let_go else ())
             touched = run._world.touched_links()
-            balls = run._world.balls._numbers
+            balls = run._world.balls.numbers
             if balls and balls[0] in touched:
                 links = _touching(run, balls[0])
                 return Hit(run.tick, links, motion, let_go)
@@ -86,9 +86,9 @@ def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
     """The links of the character that a ball pushes, by the engine's own list."""
     from msgs_config.character.bullet import pybullet
 
-    body = run.actors[0]._body
+    body = run.characters[0]._body
     points = pybullet.getContactPoints(ball, body._body, physicsClientId=body._client)
-    rows = {number: row for row, number in enumerate(body.links._numbers)}
+    rows = {number: row for row, number in enumerate(body._numbers)}
     return tuple(LINKS[rows[point[4]]] for point in points)
 
 

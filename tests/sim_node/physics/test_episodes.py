@@ -153,7 +153,7 @@ def test_every_episode_is_the_same_however_many_there_were() -> None:
 
 def touch_each_other(run: Simulation) -> bool:
     """Whether the two bodies of a simulation are in contact with each other."""
-    one, other = (actor._body for actor in run.actors)
+    one, other = (actor._body for actor in run.characters)
     return bool(pybullet.getContactPoints(one._body, other._body, physicsClientId=one._client))
 
 
@@ -177,13 +177,13 @@ def test_a_reset_of_two_humanoids_in_contact_is_a_fresh_simulation_to_the_bit(
         used.reset()
 
         # Assert
-        assert [actor.state.stamp_ns for actor in used.actors] == [used.stamp_ns] * 2
+        assert [actor.state.stamp_ns for actor in used.characters] == [used.stamp_ns] * 2
         touched = False
         for both in zip(*efforts, strict=True):
             used.step(both)
             fresh.step(both)
             touched |= touch_each_other(used)
-            for actor, expected in zip(used.actors, fresh.actors, strict=True):
+            for actor, expected in zip(used.characters, fresh.characters, strict=True):
                 assert actor.state.position.tobytes() == expected.state.position.tobytes()
                 assert actor.state.velocity.tobytes() == expected.state.velocity.tobytes()
         assert touched

@@ -20,7 +20,6 @@ from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.geometry import rotations
 from sim_node.physics.body import Body
 from sim_node.physics.world import World, WorldSettings
-from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import (
     EVERY_CHARACTER,
     INSTANT,
@@ -56,7 +55,7 @@ def frames_differ(world: LoneWorld, whole: Character, model: DynamicsModel) -> t
     position, velocity = world.body.read()
     model.update(position, velocity)
     expected_origins, expected_turns = model.link_poses()
-    origins, turns = world.body.links.frames()
+    origins, turns = world.body.link_frames()
     far = np.abs(origins - expected_origins).max()
     return float(far), float(np.max(rotations.angle_between(turns, expected_turns)))
 
@@ -104,7 +103,7 @@ def test_there_is_one_frame_a_link_in_the_characters_order() -> None:
         world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
 
         # Act
-        origins, turns = world.body.links.frames()
+        origins, turns = world.body.link_frames()
 
     # Assert
     assert origins.shape == (len(whole.links), 3)
@@ -152,9 +151,11 @@ def generalised_force(
     return result
 
 
-def as_push(row: int, force: FloatArray, torque: FloatArray, point: FloatArray) -> ExternalWrench:
-    """A push of one tick."""
-    return ExternalWrench(row, np.concatenate((force, torque)), point, first_tick=1, ticks=1)
+def as_push(
+    row: int, force: FloatArray, torque: FloatArray, point: FloatArray
+) -> tuple[int, FloatArray, FloatArray]:
+    """A push as a body takes it."""
+    return row, np.concatenate((force, torque)), point
 
 
 @dataclass
@@ -178,7 +179,7 @@ class Pushing:
         for present in (pushes, ()):
             self.world.body.set_state(*self.state)
             self.world.body.apply(np.zeros(self.whole.layout.size))
-            self.world.body.links.push([as_push(*push) for push in present])
+            self.world.body.push([as_push(*push) for push in present])
             self.world.step()
             velocities.append(self.world.body.read()[1])
         return (velocities[0] - velocities[1]) / INSTANT
@@ -268,9 +269,7 @@ def test_a_push_lasts_one_engine_step(pushing: Pushing) -> None:
     for link in range(len(pushing.whole.links)):
         pushing.draw()
         body.set_state(pushing.state[0], np.zeros(pushing.whole.layout.size))
-        body.links.push(
-            [as_push(link, np.array([30.0, -20.0, 10.0]), np.array([1.0, 2.0, 3.0]), ZERO)]
-        )
+        body.push([as_push(link, np.array([30.0, -20.0, 10.0]), np.array([1.0, 2.0, 3.0]), ZERO)])
         world.step()
         pushed = body.read()[1]
 
@@ -289,11 +288,11 @@ def test_a_push_on_a_fixed_base_moves_nothing() -> None:
         world.body.set_state(position, np.zeros_like(position))
 
         # Act
-        world.body.links.push(
+        world.body.push(
             [as_push(0, np.array([1e4, 1e4, 1e4]), np.array([1e4, 0.0, 0.0]), np.ones(3))]
         )
         world.step()
-        origins, _ = world.body.links.frames()
+        origins, _ = world.body.link_frames()
 
     # Assert
     expected = whole.links[0].joint.pose_in_parent.position
@@ -308,11 +307,11 @@ def test_a_pushed_character_gains_the_pushs_momentum() -> None:
     with still_world(whole) as world:
         position, _ = free_random_state(world.body, whole, np.random.default_rng(5))
         world.body.set_state(position, np.zeros_like(position))
-        origins, turns = world.body.links.frames()
+        origins, turns = world.body.link_frames()
         at = origins[hand] + rotations.matrix(turns[hand]) @ point
 
         # Act
-        world.body.links.push([as_push(hand, force, torque, point)])
+        world.body.push([as_push(hand, force, torque, point)])
         world.step()
         linear, angular = momentum(world.body, whole)
 
@@ -355,12 +354,12 @@ def at_height(z: float, x: float = 0.0) -> FloatArray:
 
 def contact_wrenches(world: World, body: Body, centres: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Contact wrenches (links, 6) of the last step, about the centres of mass before."""
-    return body.links.contact_wrenches(world.touched_links(), centres)
+    return body.contact_wrenches(world.touched_links(), centres)
 
 
 def contact_forces(world: World, body: Body) -> tuple[FloatArray, BoolArray]:
     """Contact forces (links, 3) of the last step."""
-    wrenches, touching = contact_wrenches(world, body, body.links.centres())
+    wrenches, touching = contact_wrenches(world, body, body.centres())
     return wrenches[:, :3], touching
 
 
@@ -463,7 +462,7 @@ def test_contacts_and_gravity_are_all_that_changes_the_momentum_of_a_tumbling_bo
         world.body.set_state(start, np.array([1.0, 0.5, -1.0, 3.0, 4.0, -2.0]))
         for _ in range(240):
             before = np.concatenate(momentum(world.body, box))
-            centres = world.body.links.centres()
+            centres = world.body.centres()
 
             # Act
             advance(world, np.zeros(6))
@@ -604,7 +603,7 @@ def test_the_contact_wrenches_of_a_falling_humanoid_are_what_changes_its_momentu
     with LoneWorld(whole, WorldSettings()) as world:
         world.body.set_state(np.array(whole.rest_position), velocity)
         for _ in range(480):
-            before, centres = raw_state(world.body), world.body.links.centres()
+            before, centres = raw_state(world.body), world.body.centres()
 
             # Act
             advance(world, np.zeros(whole.layout.size))
@@ -627,7 +626,7 @@ def test_the_torque_of_a_standing_humanoids_contacts_is_about_each_foots_centre_
     with LoneWorld(whole, WorldSettings()) as world:
         world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
         advance(world, np.zeros(whole.layout.size), 9)
-        centres = world.body.links.centres()
+        centres = world.body.centres()
 
         # Act
         advance(world, np.zeros(whole.layout.size))

@@ -79,11 +79,11 @@ def test_what_follows_a_restored_state_is_what_followed_the_saved_one() -> None:
     # Arrange
     with fallen_humanoid() as world:
         assert touches(world.body)
-        saved = world.save()
+        saved = world.to_bytes()
         first = trajectory(world, wriggling(1), 240)
 
         # Act
-        world.restore(saved)
+        world.from_bytes(saved)
         second = trajectory(world, wriggling(1), 240)
 
     # Assert
@@ -93,7 +93,7 @@ def test_what_follows_a_restored_state_is_what_followed_the_saved_one() -> None:
 def test_a_restored_state_remembers_nothing_of_what_was_done_in_between() -> None:
     # Arrange
     with fallen_humanoid() as world:
-        saved = world.save()
+        saved = world.to_bytes()
         first = trajectory(world, wriggling(1), 240)
 
         # Act
@@ -101,7 +101,7 @@ def test_a_restored_state_remembers_nothing_of_what_was_done_in_between() -> Non
         thrown[2] = 5.0
         world.body.set_state(thrown, wriggling(2)())
         trajectory(world, wriggling(3), 100)
-        world.restore(saved)
+        world.from_bytes(saved)
         second = trajectory(world, wriggling(1), 240)
 
     # Assert
@@ -111,16 +111,16 @@ def test_a_restored_state_remembers_nothing_of_what_was_done_in_between() -> Non
 def test_several_saved_states_are_kept_apart() -> None:
     # Arrange
     with fallen_humanoid() as world:
-        early = world.save()
+        early = world.to_bytes()
         trajectory(world, wriggling(1), 60)
-        late = world.save()
+        late = world.to_bytes()
         after_late = trajectory(world, wriggling(2), 60)
 
         # Act
-        world.restore(early)
+        world.from_bytes(early)
         again = trajectory(world, wriggling(1), 60)
         again_after_late = trajectory(world, wriggling(2), 60)
-        world.restore(late)
+        world.from_bytes(late)
         restored_after_late = trajectory(world, wriggling(2), 60)
 
     # Assert

@@ -14,9 +14,9 @@ def control() -> RunControl:
     return RunControl()
 
 
-def paused(fault: str | None = None, *, stuck: bool = False) -> RunControl:
+def paused(fault: str | None = None, *, diverged: bool = False) -> RunControl:
     control = RunControl()
-    control.pause(fault, stuck=stuck)
+    control.pause(fault, diverged=diverged)
     return control
 
 
@@ -145,8 +145,8 @@ def test_resuming_ends_the_steps_and_runs_on() -> None:
 # Stuck
 
 
-def test_what_is_stuck_neither_goes_on_nor_takes_a_step_and_says_why() -> None:
-    control = paused("diverged at tick 7", stuck=True)
+def test_a_diverged_simulation_neither_goes_on_nor_takes_a_step_and_says_why() -> None:
+    control = paused("diverged at tick 7", diverged=True)
     assert control.has_diverged
 
     for go_on in (control.resume, lambda: control.begin_steps(1)):
@@ -157,8 +157,8 @@ def test_what_is_stuck_neither_goes_on_nor_takes_a_step_and_says_why() -> None:
     assert control.fault == "diverged at tick 7"
 
 
-def test_a_pause_by_hand_does_not_loosen_what_is_stuck() -> None:
-    control = paused("diverged at tick 7", stuck=True)
+def test_a_pause_by_hand_does_not_loosen_a_divergence() -> None:
+    control = paused("diverged at tick 7", diverged=True)
 
     control.pause()
 
@@ -167,11 +167,11 @@ def test_a_pause_by_hand_does_not_loosen_what_is_stuck() -> None:
         control.resume()
 
 
-def test_a_divergence_during_steps_is_stuck_too() -> None:
+def test_a_divergence_during_steps_counts_too() -> None:
     control = paused()
     control.begin_steps(3)
 
-    control.pause("diverged at tick 7", stuck=True)
+    control.pause("diverged at tick 7", diverged=True)
 
     assert not control.runs
     with pytest.raises(CommandError):
@@ -181,8 +181,8 @@ def test_a_divergence_during_steps_is_stuck_too() -> None:
 # Reset
 
 
-def test_a_reset_loosens_what_was_stuck_and_leaves_it_paused() -> None:
-    control = paused("diverged at tick 7", stuck=True)
+def test_a_reset_ends_a_divergence_and_leaves_it_paused() -> None:
+    control = paused("diverged at tick 7", diverged=True)
 
     control.reset()
 
@@ -214,7 +214,7 @@ def test_what_runs_goes_on_through_a_reset(control: RunControl) -> None:
 
 
 class AnyCalls(RuleBasedStateMachine):
-    """All calls in any order keep it in one of four conditions: runs, paused, steps, stuck."""
+    """All calls in any order keep it in one of four conditions: runs, paused, steps, diverged."""
 
     @initialize()
     def begin(self) -> None:
@@ -222,15 +222,15 @@ class AnyCalls(RuleBasedStateMachine):
         self.condition = "runs"
         self.left = 0
 
-    @rule(stuck=st.booleans())
-    def pause(self, stuck: bool) -> None:
-        self.control.pause("a fault" if stuck else None, stuck=stuck)
-        self.condition = "stuck" if stuck or self.condition == "stuck" else "paused"
+    @rule(diverged=st.booleans())
+    def pause(self, diverged: bool) -> None:
+        self.control.pause("a fault" if diverged else None, diverged=diverged)
+        self.condition = "diverged" if diverged or self.condition == "diverged" else "paused"
         self.left = 0
 
     @rule()
     def resume(self) -> None:
-        if self.condition == "stuck":
+        if self.condition == "diverged":
             with pytest.raises(CommandError):
                 self.control.resume()
             return
@@ -265,9 +265,9 @@ class AnyCalls(RuleBasedStateMachine):
     def it_is_as_the_rules_say(self) -> None:
         assert self.control.runs == (self.condition in ("runs", "steps"))
         assert self.control.paused == (self.condition != "runs")
-        assert self.control.has_diverged == (self.condition == "stuck")
+        assert self.control.has_diverged == (self.condition == "diverged")
         assert self.control.steps_left == self.left
-        if self.condition == "stuck":
+        if self.condition == "diverged":
             assert self.control.fault
 
 

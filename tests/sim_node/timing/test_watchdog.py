@@ -15,7 +15,7 @@ waits = st.lists(st.integers(0, 60).map(lambda count: count / 16), max_size=40)
 
 
 def restarted(republish: float = 0.5, explain: float = 2.0, timeout: float = 4.0) -> Watchdog:
-    patience = Watchdog(republish_period=republish, explain_after=explain, timeout=timeout)
+    patience = Watchdog(republish, timeout, explain)
     patience.restart(START)
     return patience
 
