@@ -39,7 +39,6 @@ from sim_node.timing.flow_control import FlowControl
 from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
 from sim_node.timing.rate_limiter import RateLimiter
 from sim_node.timing.run_state import RunControl
-from sim_node.timing.tick_times import TickTimes
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
@@ -79,10 +78,11 @@ class SimNode(Node):
         self._open_topics()
         self._watchdog = Watchdog(self._settings.republish_period, self._settings.lockstep_timeout)
         self._rate_limiter = RateLimiter(self._settings.tick_period)
-        self._flow_control = FlowControl(self._is_acknowledged)
+        self._flow_control = FlowControl(
+            self._is_acknowledged, self._once_logger.log_once, not self._settings.is_realtime
+        )
         self._next_diagnostics = 0.0
         self._timeouts = 0
-        self._tick_times = TickTimes()
         self._begun = False
         self._control = RunControl()
         self._run_services = Services(self, self._control, self._resume, self._reset)
@@ -126,7 +126,7 @@ class SimNode(Node):
             self._run_services.end(executor)
             self._publish_diagnostics()
             seconds = _FLUSH_TIME if self._finished else _STOP_FLUSH_TIME
-            if not (self._is_acknowledged(seconds) and self._diagnostics.flush(_STOP_FLUSH_TIME)):
+            if not (self._is_acknowledged(seconds) and self._diagnostics.flush(seconds)):
                 self.get_logger().warning("a subscriber has not acknowledged the last messages")
             executor.close()
             self._simulation.close()
@@ -169,7 +169,7 @@ class SimNode(Node):
                 executor.rest()
         elif wait := self._rate_limiter.wait(time.monotonic()):
             executor.rest_for(wait)
-        elif self._is_held_back():
+        elif self._flow_control.holds(self._simulation.tick, time.monotonic()):
             executor.serve()
         else:
             self._advance()  # before the clock: a command that came in time is no timeout
@@ -187,16 +187,6 @@ class SimNode(Node):
                 if status is CommandStatus.CONFLICT and self._control.runs:
                     self._on_conflict(each)
         return received
-
-    def _is_held_back(self) -> bool:
-        """Whether a subscriber is so far behind that it would lose messages; never in real time."""
-        if self._settings.is_realtime:
-            return False
-        if self._flow_control.holds(self._simulation.tick, time.monotonic()):
-            return True
-        if self._flow_control.complaint is not None:
-            self._once_logger.log_once(self._flow_control.complaint)
-        return False
 
     def _is_acknowledged(self, seconds: float) -> bool:
         """Wait at most `seconds` until every subscriber has the last tick; whether it has."""
@@ -239,7 +229,6 @@ class SimNode(Node):
         except SimulationError as error:
             self._raise_fault(str(error), diverged=True)
             return
-        self._tick_times.tick()
         self._begin_tick()
         if self._control.tick():
             self._run_services.end_steps()
@@ -302,7 +291,6 @@ class SimNode(Node):
     def _resume(self) -> None:
         """Go on after a pause: what was collected before it is asked for again."""
         if self._begun:
-            self._tick_times.resume()
             self._rate_limiter.restart(time.monotonic())
             self._begin_tick()
 
@@ -312,7 +300,6 @@ class SimNode(Node):
         self._world.begin_episode()
         for each in self._characters:
             each.begin_episode()
-        self._tick_times.resume()
         if self._begun:
             self._begin_episode()
 
@@ -335,6 +322,6 @@ class SimNode(Node):
             "timeouts": self._timeouts,
             UNLOGGED: self._once_logger.unlogged,
         }
-        values |= self._tick_times.summary() | self._rate_limiter.summary() | self._world.report()
+        values |= self._rate_limiter.summary() | self._world.report()
         for each in self._characters:
             self._diagnostics.publish(values | each.report(), self._control.fault, below=each.name)

@@ -134,7 +134,7 @@ class CharacterInterface:
             "rejected_pushes": self._wrench_messages.rejected,
             "foreign_commands": foreign[self.torques.name],
             "foreign_pushes": foreign[self._wrench.name],
-            "saturated_ticks": sum(saturated.tolist()),
+            "saturated_ticks": sum(int(ticks) for ticks in saturated),
         }
         names = self.character.character.vector_names
         if named := [name for name, ticks in zip(names, saturated, strict=True) if ticks]:

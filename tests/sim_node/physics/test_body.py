@@ -3,15 +3,12 @@
 The oracles are conservation laws and Newton's, on the numbers that the engine has of every link.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import pybullet
 from msgs_config.character.layout import JointType
-from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from sim_node.physics.world import WorldSettings
@@ -35,13 +32,6 @@ from tests.support.physics import (
     still_world,
     without_self_collision,
 )
-
-PUCK_URDF = """
-<robot name="puck"><link name="puck"><inertial>
-  <origin xyz="0.1 0.2 -0.1" rpy="0.3 -0.5 0.7"/>
-  <mass value="2"/><inertia ixx="0.1" ixy="0.01" ixz="0" iyy="0.1" iyz="0" izz="0.15"/>
-</inertial></link></robot>
-"""
 
 every_character = pytest.mark.parametrize("name", EVERY_CHARACTER, ids=character_id)
 floating_characters = pytest.mark.parametrize("name", FLOATING_CHARACTERS, ids=character_id)
@@ -116,22 +106,6 @@ def test_setting_a_state_leaves_nothing_of_the_state_before(name: str) -> None:
 
         # Assert
         np.testing.assert_array_equal(acceleration(world, np.zeros_like(position)), fresh)
-
-
-def test_a_single_rigid_body_is_a_character_too(tmp_path: Path) -> None:
-    # Arrange
-    (tmp_path / "puck.urdf").write_text(PUCK_URDF)
-    (tmp_path / "puck.yaml").write_text("urdf: puck.urdf\ninertia: file\n")
-    whole = load_character(str(tmp_path / "puck.yaml"))
-    position, velocity = random_state(whole, np.random.default_rng(13))
-    with still_world(whole) as world:
-        # Act
-        world.body.set_state(position, velocity)
-        read_position, read_velocity = world.body.read()
-
-    # Assert
-    np.testing.assert_allclose(read_position, position, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(read_velocity, velocity, rtol=0.0, atol=1e-12)
 
 
 @floating_characters
@@ -399,21 +373,6 @@ def test_a_pendulum_keeps_its_energy() -> None:
     window = int(seconds_a_window / step)
     assert max(energies[-window:]) == pytest.approx(max(energies[:window]), abs=1e-6)
     assert min(energies[-window:]) == pytest.approx(min(energies[:window]), abs=1e-6)
-
-
-def test_a_mass_falls_freely() -> None:
-    # Arrange
-    step, steps = 1e-3, 2000
-    with LoneWorld(character("lift"), WorldSettings(step_s=step)) as world:
-        world.body.set_state(np.zeros(1), np.zeros(1))
-
-        # Act
-        advance(world, np.zeros(1), steps)
-        (height,), (speed,) = world.body.read()
-
-    # Assert: the closed form of the engine's integrator, velocity first
-    assert speed == pytest.approx(-9.81 * steps * step, abs=1e-9)
-    assert height == pytest.approx(-9.81 * step**2 * steps * (steps + 1) / 2.0, abs=1e-9)
 
 
 @floating_characters

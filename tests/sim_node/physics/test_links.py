@@ -95,23 +95,6 @@ def test_link_frames_are_those_of_the_state_after_a_step_too(name: str) -> None:
             assert turned < ROUNDING
 
 
-def test_there_is_one_frame_a_link_in_the_characters_order() -> None:
-    # Arrange
-    whole = character("humanoid")
-    row = {link.name: index for index, link in enumerate(whole.links)}
-    with still_world(whole) as world:
-        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
-
-        # Act
-        origins, turns = world.body.link_frames()
-
-    # Assert
-    assert origins.shape == (len(whole.links), 3)
-    assert turns.shape == (len(whole.links), 4)
-    assert origins[row["neck"], 2] > origins[row["chest"], 2] > origins[row["root"], 2] > 0.8
-    assert origins[row["left_ankle"], 1] > 0.05 > -0.05 > origins[row["right_ankle"], 1]
-
-
 @pytest.mark.slow
 @every_character
 def test_looking_at_links_changes_no_bit_of_what_follows(name: str) -> None:
@@ -232,22 +215,6 @@ def test_a_torque_on_any_link_accelerates_as_mujoco_says_wherever_it_acts(
 
 
 @pushed_characters
-def test_a_force_off_the_centre_of_mass_is_one_at_it_and_its_moment(pushing: Pushing) -> None:
-    for link, described in enumerate(pushing.whole.links):
-        pushing.draw()
-        centre = np.array(described.inertial_pose.position)
-        force, torque, point = pushing.rng.uniform(-5.0, 5.0, (3, 3))
-        turn = pushing.model.link_poses()[1][link]
-        moment = np.cross(rotations.matrix(turn) @ (point - centre), force)
-
-        off_centre = pushing.acceleration((link, force, torque, point))
-        at_centre = pushing.acceleration((link, force, torque + moment, centre))
-
-        largest = np.abs(at_centre).max()
-        assert np.abs(off_centre - at_centre).max() < 1e-6 * largest + NOISE, described.name
-
-
-@pushed_characters
 def test_pushes_on_several_links_at_once_and_twice_on_one_add_up(pushing: Pushing) -> None:
     # Arrange
     pushing.draw()
@@ -299,27 +266,6 @@ def test_a_push_on_a_fixed_base_moves_nothing() -> None:
     np.testing.assert_allclose(origins[0], expected, rtol=0.0, atol=ROUNDING)
 
 
-def test_a_pushed_character_gains_the_pushs_momentum() -> None:
-    # Arrange
-    whole = without_self_collision("humanoid")
-    hand = [link.name for link in whole.links].index("left_wrist")
-    force, torque, point = np.array([100.0, -50.0, 25.0]), np.array([4.0, 5.0, 6.0]), np.ones(3)
-    with still_world(whole) as world:
-        position, _ = free_random_state(world.body, whole, np.random.default_rng(5))
-        world.body.set_state(position, np.zeros_like(position))
-        origins, turns = world.body.link_frames()
-        at = origins[hand] + rotations.matrix(turns[hand]) @ point
-
-        # Act
-        world.body.push([as_push(hand, force, torque, point)])
-        world.step()
-        linear, angular = momentum(world.body, whole)
-
-    # Assert
-    np.testing.assert_allclose(linear / INSTANT, force, rtol=1e-6)
-    np.testing.assert_allclose(angular / INSTANT, torque + np.cross(at, force), rtol=1e-6)
-
-
 # --- contacts ------------------------------------------------------------------------------------
 
 BOX_MASS = 2.0
@@ -369,17 +315,7 @@ def about_origin(wrenches: FloatArray, centres: FloatArray) -> FloatArray:
     return np.concatenate((forces.sum(axis=0), (np.cross(centres, forces) + torques).sum(axis=0)))
 
 
-def test_in_the_air_nothing_touches(box: Character) -> None:
-    with LoneWorld(box, WorldSettings()) as world:
-        world.body.set_state(at_height(1.0), np.zeros(6))
-        world.step()
-        forces, touching = contact_forces(world, world.body)
-
-    np.testing.assert_array_equal(forces, np.zeros((1, 3)))
-    np.testing.assert_array_equal(touching, [False])
-
-
-@pytest.mark.parametrize("gap", [1e-4, 1e-3, 5e-3, 1e-2])
+@pytest.mark.parametrize("gap", [1e-4, 1e-3, 5e-3, 1e-2, 0.9])
 def test_what_is_only_near_does_not_touch(box: Character, gap: float) -> None:
     with LoneWorld(box, WorldSettings(gravity=0.0)) as world:
         world.body.set_state(at_height(0.1 + gap), np.zeros(6))
@@ -475,29 +411,6 @@ def test_contacts_and_gravity_are_all_that_changes_the_momentum_of_a_tumbling_bo
             np.testing.assert_allclose(total, rate, rtol=1e-9, atol=1e-9)
             turned = max(turned, float(np.abs(wrenches[:, 3:]).max()))
     assert turned > 10.0
-
-
-@pytest.mark.parametrize("lower_first", [True, False])
-def test_of_two_boxes_on_each_other_the_lower_is_pressed_by_its_own_weight_alone(
-    box: Character, lower_first: bool
-) -> None:
-    # Arrange
-    with World(WorldSettings()) as world:
-        bodies = [world.add(box), world.add(box)]
-        lower, upper = bodies if lower_first else reversed(bodies)
-        lower.set_state(at_height(0.1), np.zeros(6))
-        upper.set_state(at_height(0.3), np.zeros(6))
-
-        # Act
-        for _ in range(960):
-            world.step()
-        carried, _ = contact_forces(world, lower)
-        resting, _ = contact_forces(world, upper)
-
-    # Assert: from below by both weights, from above by one
-    weight = BOX_MASS * 9.81
-    np.testing.assert_allclose(resting, [[0.0, 0.0, weight]], rtol=0.0, atol=1e-3)
-    np.testing.assert_allclose(carried, [[0.0, 0.0, weight]], rtol=0.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("order", [1, -1])
@@ -641,42 +554,6 @@ def test_the_torque_of_a_standing_humanoids_contacts_is_about_each_foots_centre_
         assert abs(aside) < half_width + 1e-3
 
 
-def test_a_fallen_humanoid_that_has_come_to_rest_weighs_what_it_weighs() -> None:
-    # Arrange
-    whole = character("humanoid")
-    with LoneWorld(whole, WorldSettings()) as world:
-        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
-        advance(world, np.zeros(whole.layout.size), 960)
-        start = momentum(world.body, whole)[0]
-        total = np.zeros(3)
-
-        # Act
-        for _ in range(240):
-            advance(world, np.zeros(whole.layout.size))
-            total += contact_forces(world, world.body)[0].sum(axis=0) / 240.0
-        gained = momentum(world.body, whole)[0] - start
-
-    # Assert: the mean over a second
-    weight = np.array([0.0, 0.0, whole.mass * 9.81])
-    np.testing.assert_allclose(total, gained + weight, rtol=0.0, atol=0.01 * whole.mass * 9.81)
-
-
-def test_a_standing_humanoid_touches_the_ground_with_its_feet_alone() -> None:
-    # Arrange
-    whole = character("humanoid")
-    with LoneWorld(whole, WorldSettings()) as world:
-        world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
-
-        # Act
-        advance(world, np.zeros(whole.layout.size), 10)
-        forces, touching = contact_forces(world, world.body)
-
-    # Assert
-    names = {whole.links[row].name for row in np.flatnonzero(touching)}
-    assert names == {"left_ankle", "right_ankle"}
-    assert (forces[touching, 2] > 0.0).all()
-
-
 def test_a_contact_is_the_links_own_whatever_the_order_of_the_urdf(tmp_path: Path) -> None:
     # Arrange: only `foot` is low; the file lists it last, the character right after `left`
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
@@ -730,36 +607,3 @@ def test_contacts_inside_a_character_cancel() -> None:
             assert np.abs(forces.sum(axis=0)).max() <= 1e-12 * max(largest, 1.0)
             assert touching.sum() != 1
     assert pressed
-
-
-def test_two_humanoids_that_collide_press_equally_in_opposite_directions() -> None:
-    # Arrange: they fly at each other, and neither has weight
-    whole = character("humanoid")
-    size = whole.layout.size
-    untouched = Untouched("humanoid", in_the_void(gravity=0.0))
-    starts = [np.array(whole.rest_position) for _ in range(2)]
-    starts[1][:2] = 0.6, 0.1
-    motions = np.zeros((2, size))
-    motions[:, 0] = 1.0, -1.0
-    largest = 0.0
-    with World(in_the_void(gravity=0.0)) as world:
-        bodies = [world.add(whole) for _ in range(2)]
-        for body, position, velocity in zip(bodies, starts, motions, strict=True):
-            body.set_state(position, velocity)
-        for _ in range(120):
-            before = [raw_state(body) for body in bodies]
-            for body in bodies:
-                body.apply(np.zeros(size))
-
-            # Act
-            world.step()
-            forces = [contact_forces(world, body)[0].sum(axis=0) for body in bodies]
-
-            # Assert: Newton's third law, and his second for each
-            for body, state, force in zip(bodies, before, forces, strict=True):
-                expected = untouched.wrench(state, raw_state(body))[:3]
-                np.testing.assert_allclose(force, expected, rtol=1e-9, atol=1e-7)
-            np.testing.assert_allclose(forces[0], -forces[1], rtol=1e-9, atol=1e-7)
-            largest = max(largest, float(np.abs(forces).max()))
-    untouched.close()
-    assert largest > 100.0

@@ -8,7 +8,7 @@ from actuated_characters.runs.plan import make_plan
 from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import read_clip
 from msgs_config.arrays import FloatArray
-from msgs_config.character.model import Character, Placement
+from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
 from msgs_config.shared_parameters import placed
@@ -114,13 +114,3 @@ def test_a_fixed_arm_keeps_its_answer_wherever_it_stands() -> None:
     run.close()
 
     np.testing.assert_allclose(there, here, atol=1e-9)
-
-
-@pytest.mark.parametrize("value", [[], [1.0], [0.0] * 5, [0.0, 0.0, 0.0, np.nan], 3.0, ["a"] * 4])
-def test_a_placement_that_is_not_four_numbers_is_refused(value: object) -> None:
-    with pytest.raises(ConfigurationError, match="'placement'"):
-        placed(character("lift"), {"placement": value})
-
-
-def test_a_placement_is_kept_by_the_character() -> None:
-    assert elsewhere("humanoid").placement == Placement(*ELSEWHERE)

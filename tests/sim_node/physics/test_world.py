@@ -75,21 +75,6 @@ def trajectory(world: LoneWorld, effort: Callable[[], FloatArray], steps: int) -
 # --- repeatable ----------------------------------------------------------------------------------
 
 
-def test_what_follows_a_restored_state_is_what_followed_the_saved_one() -> None:
-    # Arrange
-    with fallen_humanoid() as world:
-        assert touches(world.body)
-        saved = world.to_bytes()
-        first = trajectory(world, wriggling(1), 240)
-
-        # Act
-        world.from_bytes(saved)
-        second = trajectory(world, wriggling(1), 240)
-
-    # Assert
-    assert second == first
-
-
 def test_a_restored_state_remembers_nothing_of_what_was_done_in_between() -> None:
     # Arrange
     with fallen_humanoid() as world:
@@ -106,26 +91,6 @@ def test_a_restored_state_remembers_nothing_of_what_was_done_in_between() -> Non
 
     # Assert
     assert second == first
-
-
-def test_several_saved_states_are_kept_apart() -> None:
-    # Arrange
-    with fallen_humanoid() as world:
-        early = world.to_bytes()
-        trajectory(world, wriggling(1), 60)
-        late = world.to_bytes()
-        after_late = trajectory(world, wriggling(2), 60)
-
-        # Act
-        world.from_bytes(early)
-        again = trajectory(world, wriggling(1), 60)
-        again_after_late = trajectory(world, wriggling(2), 60)
-        world.from_bytes(late)
-        restored_after_late = trajectory(world, wriggling(2), 60)
-
-    # Assert
-    assert again and again_after_late == after_late
-    assert restored_after_late == after_late
 
 
 def test_two_fresh_worlds_go_the_same_way_to_the_bit() -> None:

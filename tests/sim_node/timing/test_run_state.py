@@ -23,32 +23,6 @@ def paused(fault: str | None = None, *, diverged: bool = False) -> RunControl:
 # Pausing
 
 
-def test_at_first_it_runs_without_a_fault(control: RunControl) -> None:
-    assert control.runs
-    assert not control.paused
-    assert not control.has_diverged
-    assert control.fault is None
-    assert control.steps_left == 0
-
-
-def test_a_pause_stops_it_and_resuming_lets_it_go_on(control: RunControl) -> None:
-    control.pause()
-    assert not control.runs
-    assert control.paused
-    assert control.fault is None
-
-    control.resume()
-    assert control.runs
-    assert not control.paused
-
-
-def test_resuming_what_runs_changes_nothing(control: RunControl) -> None:
-    control.resume()
-
-    assert control.runs
-    assert control.fault is None
-
-
 def test_a_fault_is_remembered_until_it_goes_on() -> None:
     control = paused("a conflict")
     assert control.fault == "a conflict"
@@ -60,12 +34,6 @@ def test_a_fault_is_remembered_until_it_goes_on() -> None:
 
     control.resume()
     assert control.fault is None
-
-
-def test_a_tick_while_it_runs_is_no_step(control: RunControl) -> None:
-    assert not control.tick()
-    assert control.steps_left == 0
-    assert control.runs
 
 
 # Steps
@@ -112,36 +80,6 @@ def test_steps_are_refused_while_others_are_not_done() -> None:
     assert control.steps_left == 2
 
 
-def test_steps_can_follow_steps() -> None:
-    control = paused()
-    for _ in range(3):
-        control.begin_steps(1)
-        assert control.tick()
-
-
-@pytest.mark.parametrize("fault", [None, "a conflict"])
-def test_a_pause_ends_the_steps(fault: str | None) -> None:
-    control = paused()
-    control.begin_steps(3)
-
-    control.pause(fault)
-
-    assert not control.runs
-    assert control.steps_left == 0
-    assert control.fault == fault
-
-
-def test_resuming_ends_the_steps_and_runs_on() -> None:
-    control = paused()
-    control.begin_steps(3)
-
-    control.resume()
-
-    assert not control.paused
-    assert control.steps_left == 0
-    assert [control.tick() for _ in range(4)] == [False] * 4
-
-
 # Stuck
 
 
@@ -167,17 +105,6 @@ def test_a_pause_by_hand_does_not_loosen_a_divergence() -> None:
         control.resume()
 
 
-def test_a_divergence_during_steps_counts_too() -> None:
-    control = paused()
-    control.begin_steps(3)
-
-    control.pause("diverged at tick 7", diverged=True)
-
-    assert not control.runs
-    with pytest.raises(CommandError):
-        control.begin_steps(1)
-
-
 # Reset
 
 
@@ -190,23 +117,6 @@ def test_a_reset_ends_a_divergence_and_leaves_it_paused() -> None:
     assert control.fault is None
     assert control.paused
     control.begin_steps(2)
-    assert control.runs
-
-
-def test_a_reset_ends_the_steps() -> None:
-    control = paused()
-    control.begin_steps(3)
-
-    control.reset()
-
-    assert not control.runs
-    assert control.steps_left == 0
-    control.begin_steps(1)  # a new episode's
-
-
-def test_what_runs_goes_on_through_a_reset(control: RunControl) -> None:
-    control.reset()
-
     assert control.runs
 
 

@@ -27,10 +27,6 @@ def test_nothing_is_due_before_the_first_state(now: float) -> None:
     assert patience.due(now) == []
 
 
-def test_nothing_is_due_at_once() -> None:
-    assert restarted().due(START) == []
-
-
 def test_everything_comes_at_its_time() -> None:
     patience = restarted()
 
