@@ -62,6 +62,21 @@ def without_self_collision(name_or_path: str) -> Character:
     return replace(whole, loading=replace(whole.loading, self_collision=False))
 
 
+def box_character(
+    folder: Path, size: str, mass: float = 2.0, *, fixed: bool = False, name: str = "box"
+) -> Character:
+    """A box of a mass in kg and edges in m, about its link's origin, as files in a folder."""
+    inertia = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+    (folder / f"{name}.urdf").write_text(
+        f'<robot name="{name}"><link name="box"><inertial><mass value="{mass}"/>{inertia}'
+        f'</inertial><collision><geometry><box size="{size}"/></geometry></collision></link>'
+        "</robot>"
+    )
+    file = folder / f"{name}.yaml"
+    file.write_text(f"urdf: {name}.urdf\nfixed_base: {str(fixed).lower()}\ninertia: file\n")
+    return load_character(str(file))
+
+
 def random_state(whole: Character, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """A position (n,) within the limits and a velocity (n,), high above the ground."""
     layout = whole.layout

@@ -114,20 +114,17 @@ def test_a_throw_begins_at_its_tick_and_does_what_it_does_without_ros(
 def test_balls_are_shown_where_they_are_until_a_reset(
     processes: Processes, client: SimulatorClient
 ) -> None:
-    # Arrange
     throws, shown = client.speak(topics.THROW), client.listen(topics.VISUALIZATION)
     _, thrown = hear(client)
     processes.simulator("pendulum", display_rate=240.0, wait_for_subscribers=1)
     send(client, throws, throw_message(CLOCK.stamp_ns(3), AT_CHEST))
 
-    # Act
     state = client.drive(client.first_state(), 9, np.random.default_rng(1))
     client.spin_until(lambda: markers_at(shown, tick_of(state)), "the last markers")
     client.spin_until(lambda: tick_of(state) in thrown.ticks(), "the last place of the ball")
     client.reset()
     again = client.spin_until(lambda: markers_at(shown, tick_of(state) + 1), "the next episode")
 
-    # Assert
     before, last = markers_at(shown, 2), markers_at(shown, tick_of(state))
     *body, ball = last
     assert [m.id for m in before] == [m.id for m in body]

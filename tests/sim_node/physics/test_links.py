@@ -26,6 +26,7 @@ from tests.support.physics import (
     TURNED_FRAMES,
     LoneWorld,
     advance,
+    box_character,
     character,
     character_id,
     free_random_state,
@@ -62,24 +63,21 @@ def frames_differ(world: LoneWorld, whole: Character, model: DynamicsModel) -> t
 
 @every_character
 def test_link_frames_are_where_mujoco_has_them(name: str) -> None:
-    # Arrange
     whole = without_self_collision(name)
     model, rng = DynamicsModel(whole), np.random.default_rng(1)
     with still_world(whole) as world:
         for _ in range(30):
             free_random_state(world.body, whole, rng)
 
-            # Act
             far, turned = frames_differ(world, whole, model)
 
-            # Assert
             assert far < ROUNDING
             assert turned < ROUNDING
 
 
 @every_character
 def test_link_frames_are_those_of_the_state_after_a_step_too(name: str) -> None:
-    # Arrange: from a random state to the ground
+    # from a random state to the ground
     whole = without_self_collision(name)
     model, rng = DynamicsModel(whole), np.random.default_rng(2)
     with LoneWorld(whole, WorldSettings()) as world:
@@ -87,10 +85,8 @@ def test_link_frames_are_those_of_the_state_after_a_step_too(name: str) -> None:
         for _ in range(240):
             advance(world, rng.uniform(-0.5, 0.5, whole.layout.size))
 
-            # Act
             far, turned = frames_differ(world, whole, model)
 
-            # Assert
             assert far < ROUNDING
             assert turned < ROUNDING
 
@@ -98,7 +94,6 @@ def test_link_frames_are_those_of_the_state_after_a_step_too(name: str) -> None:
 @pytest.mark.slow
 @every_character
 def test_looking_at_links_changes_no_bit_of_what_follows(name: str) -> None:
-    # Arrange
     rng = np.random.default_rng(3)
     size = character(name).layout.size
     efforts = [rng.uniform(-0.5, 0.5, size) for _ in range(240)]
@@ -106,12 +101,10 @@ def test_looking_at_links_changes_no_bit_of_what_follows(name: str) -> None:
         for effort in efforts:
             expected = blind.advance(effort)
 
-            # Act
             watched.actor.link_frames()
             state = watched.advance(effort)
             watched.actor.link_frames()
 
-            # Assert
             assert state.position.tobytes() == expected.position.tobytes()
             assert state.velocity.tobytes() == expected.velocity.tobytes()
 
@@ -216,22 +209,18 @@ def test_a_torque_on_any_link_accelerates_as_mujoco_says_wherever_it_acts(
 
 @pushed_characters
 def test_pushes_on_several_links_at_once_and_twice_on_one_add_up(pushing: Pushing) -> None:
-    # Arrange
     pushing.draw()
     last = len(pushing.whole.links) - 1
     pushes = [(link, *pushing.rng.uniform(-5.0, 5.0, (3, 3))) for link in (0, last, last, last - 1)]
 
-    # Act
     measured = pushing.acceleration(*pushes)
 
-    # Assert
     total = sum(generalised_force(pushing.model, *push) for push in pushes)
     pushing.check(measured, np.asarray(total))
 
 
 @pushed_characters
 def test_a_push_lasts_one_engine_step(pushing: Pushing) -> None:
-    # Arrange
     body, world = pushing.world.body, pushing.world
     for link in range(len(pushing.whole.links)):
         pushing.draw()
@@ -240,28 +229,23 @@ def test_a_push_lasts_one_engine_step(pushing: Pushing) -> None:
         world.step()
         pushed = body.read()[1]
 
-        # Act
         world.step()
 
-        # Assert
         assert np.abs(body.read()[1] - pushed).max() <= 1e-4 * np.abs(pushed).max()
 
 
 def test_a_push_on_a_fixed_base_moves_nothing() -> None:
-    # Arrange
     whole = without_self_collision("franka_panda")
     position = np.array(whole.rest_position)
     with still_world(whole, step_s=1e-3) as world:
         world.body.set_state(position, np.zeros_like(position))
 
-        # Act
         world.body.push(
             [as_push(0, np.array([1e4, 1e4, 1e4]), np.array([1e4, 0.0, 0.0]), np.ones(3))]
         )
         world.step()
         origins, _ = world.body.link_frames()
 
-    # Assert
     expected = whole.links[0].joint.pose_in_parent.position
     np.testing.assert_allclose(origins[0], expected, rtol=0.0, atol=ROUNDING)
 
@@ -269,14 +253,6 @@ def test_a_push_on_a_fixed_base_moves_nothing() -> None:
 # --- contacts ------------------------------------------------------------------------------------
 
 BOX_MASS = 2.0
-BOX_URDF = """
-<robot name="box"><link name="box">
-  <inertial>
-    <mass value="2"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
-  </inertial>
-  <collision><geometry><box size="0.5 0.5 0.2"/></geometry></collision>
-</link></robot>
-"""
 SLOPE_URDF = """
 <robot name="slope"><link name="slope">
   <collision>
@@ -289,9 +265,7 @@ SLOPE_URDF = """
 @pytest.fixture
 def box(tmp_path: Path) -> Character:
     """A box of 2 kg, 0.2 m high."""
-    (tmp_path / "box.urdf").write_text(BOX_URDF)
-    (tmp_path / "box.yaml").write_text("urdf: box.urdf\ninertia: file\n")
-    return load_character(str(tmp_path / "box.yaml"))
+    return box_character(tmp_path, "0.5 0.5 0.2", BOX_MASS)
 
 
 def at_height(z: float, x: float = 0.0) -> FloatArray:
@@ -327,15 +301,12 @@ def test_what_is_only_near_does_not_touch(box: Character, gap: float) -> None:
 
 
 def test_the_ground_carries_the_weight_of_a_box_at_rest(box: Character) -> None:
-    # Arrange
     with LoneWorld(box, WorldSettings()) as world:
         world.body.set_state(at_height(0.1), np.zeros(6))
 
-        # Act
         advance(world, np.zeros(6), 480)
         forces, touching = contact_forces(world, world.body)
 
-    # Assert
     np.testing.assert_allclose(forces, [[0.0, 0.0, BOX_MASS * 9.81]], rtol=0.0, atol=1e-9)
     assert touching.all()
 
@@ -344,7 +315,6 @@ def test_the_ground_carries_the_weight_of_a_box_at_rest(box: Character) -> None:
 def test_a_slope_carries_the_weight_too_by_pressure_and_friction(
     box: Character, tmp_path: Path, roll: float, pitch: float
 ) -> None:
-    # Arrange
     text = SLOPE_URDF.format(roll=roll, pitch=pitch)
     terrain = UrdfOptions(tmp_path / "slope.urdf", text, fixed_base=True)
     settings = WorldSettings(friction=2.0, link_friction=1.0, ground=False, terrain=terrain)
@@ -356,18 +326,15 @@ def test_a_slope_carries_the_weight_too_by_pressure_and_friction(
     with LoneWorld(box, settings) as world:
         world.body.set_state(start, np.zeros(6))
 
-        # Act
         advance(world, np.zeros(6), 960)
         forces, _ = contact_forces(world, world.body)
         speed = np.abs(world.body.read()[1]).max()
 
-    # Assert
     assert speed < 1e-2
     np.testing.assert_allclose(forces, [[0.0, 0.0, BOX_MASS * 9.81]], rtol=0.0, atol=0.05)
 
 
 def test_the_friction_of_a_sliding_box_is_against_its_motion(box: Character) -> None:
-    # Arrange
     settings = WorldSettings(step_s=1e-3, friction=0.4, link_friction=0.5)
     with LoneWorld(box, settings) as world:
         world.body.set_state(at_height(0.1), np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
@@ -376,11 +343,10 @@ def test_the_friction_of_a_sliding_box_is_against_its_motion(box: Character) -> 
         for _ in range(200):
             before = world.body.read()[1]
 
-            # Act
             world.step()
             forces, _ = contact_forces(world, world.body)
 
-            # Assert: it is what slows the box, and in the mean it is Coulomb's
+            # it is what slows the box, and in the mean it is Coulomb's
             pulls.append(forces[0, 0])
             slowing = BOX_MASS * (world.body.read()[1][0] - before[0]) / settings.step_s
             assert forces[0, 0] == pytest.approx(slowing, abs=1e-9)
@@ -390,7 +356,7 @@ def test_the_friction_of_a_sliding_box_is_against_its_motion(box: Character) -> 
 def test_contacts_and_gravity_are_all_that_changes_the_momentum_of_a_tumbling_box(
     box: Character,
 ) -> None:
-    # Arrange: it falls on an edge, spinning and with speed along the ground, and rolls over
+    # it falls on an edge, spinning and with speed along the ground, and rolls over
     step_s, weight = 1.0 / 240.0, np.array([0.0, 0.0, -BOX_MASS * 9.81])
     start = np.array([0.3, -0.2, 0.6, 0.4, 0.5, 0.2])
     turned = 0.0
@@ -400,11 +366,10 @@ def test_contacts_and_gravity_are_all_that_changes_the_momentum_of_a_tumbling_bo
             before = np.concatenate(momentum(world.body, box))
             centres = world.body.centres()
 
-            # Act
             advance(world, np.zeros(6))
             wrenches, _ = contact_wrenches(world, world.body, centres)
 
-            # Assert: Newton's and Euler's law, about the world's origin
+            # Newton's and Euler's law, about the world's origin
             rate = (np.concatenate(momentum(world.body, box)) - before) / step_s
             gravity = np.concatenate((weight, np.cross(centres[0], weight)))
             total = about_origin(wrenches, centres) + gravity
@@ -417,7 +382,7 @@ def test_contacts_and_gravity_are_all_that_changes_the_momentum_of_a_tumbling_bo
 def test_two_boxes_that_collide_press_equally_in_opposite_directions(
     box: Character, order: int
 ) -> None:
-    # Arrange: one falls aslant onto the other's corner, and neither has weight
+    # one falls aslant onto the other's corner, and neither has weight
     step_s, touched = 1.0 / 240.0, 0
     with World(WorldSettings(gravity=0.0, ground=False)) as world:
         resting, coming = [world.add(box), world.add(box)][::order]
@@ -428,11 +393,10 @@ def test_two_boxes_that_collide_press_equally_in_opposite_directions(
         for _ in range(60):
             before = momenta(box, resting, coming)
 
-            # Act
             world.step()
             forces = [contact_forces(world, body)[0][0] for body in (resting, coming)]
 
-            # Assert: Newton's third law, and his second for each
+            # Newton's third law, and his second for each
             rates = (momenta(box, resting, coming) - before) / step_s
             touched += bool(np.abs(forces[0]).max() > 1.0)
             np.testing.assert_allclose(forces[0], -forces[1], rtol=0.0, atol=1e-9)
@@ -505,7 +469,7 @@ def in_the_void(gravity: float = 9.81) -> WorldSettings:
 
 @pytest.mark.slow
 def test_the_contact_wrenches_of_a_falling_humanoid_are_what_changes_its_momentum() -> None:
-    # Arrange: limp, moving over the ground and turning, so that there is friction; it lies in the
+    # limp, moving over the ground and turning, so that there is friction; it lies in the
     # end, with links of its own on each other
     whole = character("humanoid")
     velocity = np.zeros(whole.layout.size)
@@ -518,11 +482,9 @@ def test_the_contact_wrenches_of_a_falling_humanoid_are_what_changes_its_momentu
         for _ in range(480):
             before, centres = raw_state(world.body), world.body.centres()
 
-            # Act
             advance(world, np.zeros(whole.layout.size))
             wrenches, touching = contact_wrenches(world, world.body, centres)
 
-            # Assert
             expected = untouched.wrench(before, raw_state(world.body))
             total = about_origin(wrenches, centres)
             np.testing.assert_allclose(total, expected, rtol=1e-9, atol=1e-7)
@@ -533,7 +495,7 @@ def test_the_contact_wrenches_of_a_falling_humanoid_are_what_changes_its_momentu
 
 
 def test_the_torque_of_a_standing_humanoids_contacts_is_about_each_foots_centre_of_mass() -> None:
-    # Arrange: what presses on a sole, 0.177 m by 0.09 m, acts on it, and not beside it
+    # what presses on a sole, 0.177 m by 0.09 m, acts on it, and not beside it
     whole = character("humanoid")
     half_length, half_width = 0.0885, 0.045
     with LoneWorld(whole, WorldSettings()) as world:
@@ -541,11 +503,9 @@ def test_the_torque_of_a_standing_humanoids_contacts_is_about_each_foots_centre_
         advance(world, np.zeros(whole.layout.size), 9)
         centres = world.body.centres()
 
-        # Act
         advance(world, np.zeros(whole.layout.size))
         wrenches, touching = contact_wrenches(world, world.body, centres)
 
-    # Assert
     for row in np.flatnonzero(touching):
         (fx, fy, fz), (tx, ty, _) = wrenches[row, :3], wrenches[row, 3:]
         height = centres[row][2]
@@ -555,7 +515,7 @@ def test_the_torque_of_a_standing_humanoids_contacts_is_about_each_foots_centre_
 
 
 def test_a_contact_is_the_links_own_whatever_the_order_of_the_urdf(tmp_path: Path) -> None:
-    # Arrange: only `foot` is low; the file lists it last, the character right after `left`
+    # only `foot` is low; the file lists it last, the character right after `left`
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
     inertial = f'<inertial><mass value="1"/>{inertia}</inertial>'
     block = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
@@ -578,18 +538,16 @@ def test_a_contact_is_the_links_own_whatever_the_order_of_the_urdf(tmp_path: Pat
     with LoneWorld(whole, WorldSettings()) as world:
         world.body.set_state(at_height(0.549), np.zeros(6))
 
-        # Act
         world.step()
         forces, touching = contact_forces(world, world.body)
 
-    # Assert
     assert [link.name for link in whole.links] == ["base", "left", "foot", "right"]
     np.testing.assert_array_equal(touching, [False, False, True, False])
     assert forces[2, 2] > 0.0
 
 
 def test_contacts_inside_a_character_cancel() -> None:
-    # Arrange: in the void the knees and elbows are folded until the limbs press on each other
+    # in the void the knees and elbows are folded until the limbs press on each other
     whole = character("humanoid")
     rng, pressed = np.random.default_rng(6), 0
     motors = np.concatenate((np.zeros(6), np.ones(whole.layout.size - 6)))
@@ -597,11 +555,9 @@ def test_contacts_inside_a_character_cancel() -> None:
     with LoneWorld(whole, in_the_void(gravity=0.0)) as world:
         world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
         for _ in range(120):
-            # Act
             advance(world, effort)
             forces, touching = contact_forces(world, world.body)
 
-            # Assert
             largest = np.abs(forces).max()
             pressed += bool(largest > 10.0)
             assert np.abs(forces.sum(axis=0)).max() <= 1e-12 * max(largest, 1.0)

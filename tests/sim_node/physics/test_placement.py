@@ -39,13 +39,10 @@ def test_no_placement_is_the_character_itself(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["humanoid", *FIXED])
 def test_every_link_of_the_rest_pose_is_moved_and_turned(name: str) -> None:
-    # Arrange
     origins, turns = rest_frames(character(name))
 
-    # Act
     moved_origins, moved_turns = rest_frames(elsewhere(name))
 
-    # Assert
     np.testing.assert_allclose(moved_origins, moved(origins), atol=1e-9)
     about_z = np.array([0.0, 0.0, np.sin(0.35), np.cos(0.35)])
     expected = rotations.multiply(about_z, turns)
@@ -60,14 +57,11 @@ def rest_frames(whole: Character) -> tuple[FloatArray, FloatArray]:
 
 @pytest.mark.parametrize("clip", ["spin", "getup_faceup"])
 def test_a_clip_is_moved_at_all_times_with_its_velocities(clip: str) -> None:
-    # Arrange
     at_origin = ClipReference(character("humanoid").layout, read_clip(character("humanoid"), clip))
     whole = elsewhere("humanoid")
 
-    # Act
     there = ClipReference(whole.layout, read_clip(whole, clip))
 
-    # Assert
     for time in np.linspace(0.0, 12.0, 40):
         state, same = there.sample(float(time)), at_origin.sample(float(time))
         place = same.configuration.position[:3]
@@ -83,11 +77,9 @@ def test_a_clip_is_moved_at_all_times_with_its_velocities(clip: str) -> None:
 
 def test_both_sides_are_placed_by_one_setting_and_the_motion_is_the_same_moved() -> None:
     """Until rounding, which contacts amplify, has grown."""
-    # Arrange
     flat = [*ELSEWHERE[:2], 0.0, ELSEWHERE[3]]
     clip = {"reference": "clip", "clip": "walk"}
 
-    # Act
     plan = make_plan("humanoid", 0.05, clip, {}, {"placement": flat})
     here = make_plan("humanoid", 0.05, clip, {}, {})
     roots = [
@@ -95,7 +87,6 @@ def test_both_sides_are_placed_by_one_setting_and_the_motion_is_the_same_moved()
         for each in (here, plan)
     ]
 
-    # Assert
     assert plan.simulator["placement"] == plan.controller["placement"] == flat
     np.testing.assert_allclose(roots[1], moved(roots[0]) - [0.0, 0.0, ELSEWHERE[2]], atol=1e-4)
 

@@ -19,7 +19,15 @@ from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import MOST_BALLS, ThrowQueue
 from sim_node.physics.world import WorldSettings
-from tests.support.physics import DATA, LoneWorld, character, joint_simulation, momentum, simulation
+from tests.support.physics import (
+    DATA,
+    LoneWorld,
+    box_character,
+    character,
+    joint_simulation,
+    momentum,
+    simulation,
+)
 
 FREE_BOX = str(DATA / "free_box.yaml")
 RATE = 240
@@ -46,26 +54,14 @@ def in_bytes(rows: Sequence[FloatArray]) -> bytes:
     return b"".join(row.tobytes() for row in rows)
 
 
-def _box(folder: Path, name: str, size: str, fixed: bool) -> str:
-    """A character that is a box of 2 kg, as a file."""
-    inertia = '<inertia ixx="0.03" iyy="0.04" izz="0.05" ixy="0" ixz="0" iyz="0"/>'
-    (folder / f"{name}.urdf").write_text(
-        f'<robot name="{name}"><link name="box"><inertial><mass value="2"/>{inertia}</inertial>'
-        f'<collision><geometry><box size="{size}"/></geometry></collision></link></robot>'
-    )
-    file = folder / f"{name}.yaml"
-    file.write_text(f"urdf: {name}.urdf\nfixed_base: {str(fixed).lower()}\ninertia: file\n")
-    return str(file)
-
-
 @pytest.fixture
 def block(tmp_path: Path) -> str:
-    return _box(tmp_path, "block", "0.2 0.3 0.2", fixed=False)
+    return str(box_character(tmp_path, "0.2 0.3 0.2").file)
 
 
 @pytest.fixture
 def wall(tmp_path: Path) -> str:
-    return _box(tmp_path, "wall", "0.2 4 4", fixed=True)
+    return str(box_character(tmp_path, "0.2 4 4", fixed=True).file)
 
 
 @pytest.fixture(scope="module")

@@ -78,19 +78,19 @@ def test_a_deadline_is_missed_when_the_next_tick_was_due_already() -> None:
 
 
 def test_a_small_backlog_is_caught_up_with() -> None:
-    # Arrange: 1 ms ticks, the first of them 20 ms late
+    # 1 ms ticks, the first of them 20 ms late
     period, now = 0.001, START
     pace = started(period, now)
     now += period + 0.020
     taken = 0
 
-    # Act: the others begin as soon as they may, each takes 0.1 ms
+    # the others begin as soon as they may, each takes 0.1 ms
     while pace.wait(now) == 0.0:
         pace.tick(now)
         taken += 1
         now += 0.0001
 
-    # Assert: all that were due by now began, and the schedule is the old one
+    # all that were due by now began, and the schedule is the old one
     assert taken == math.floor((now - START) / period)
     due = START + (taken + 1) * period
     assert pace.wait(now) == pytest.approx(due - now, abs=1e-9)
