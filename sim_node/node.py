@@ -57,22 +57,10 @@ class SimNode(Node):
         """
         super().__init__(topics.SIM_NODE)
         self._loaded = load_parameters(given_parameters(self))
-        values, characters = self._loaded.values, self._loaded.characters
+        values, unknown = self._loaded.values, self._loaded.open
         self._settings = make_node_settings(values)
-        probes = [probe_engine(one.character, values.number("gravity")) for one in characters]
-        self._samples = [sample for sample, _ in probes]
-        setups = [
-            make_character_setup(one.character, one.values, one.name, inverse_mass)
-            for one, (_, inverse_mass) in zip(characters, probes, strict=True)
-        ]
-        self._simulation = Simulation(setups, make_settings(values))
-        unknown = [
-            simulated
-            for simulated, one in zip(self._simulation.characters, characters, strict=True)
-            if begins_with_reference(one.values)
-        ]
-        self._initial_states = InitialStates(self, unknown, values)
-        declare(self, self._loaded.known, values)
+        self._build_simulation()
+        declare(self, [each for each in self._loaded.declared if each not in unknown], values)
         self._session = self._settings.session or make_session(self.get_fully_qualified_name())
         self._once_logger = OnceLogger(self)
         self._open_topics()
@@ -87,6 +75,20 @@ class SimNode(Node):
         self._control = RunControl()
         self._run_services = Services(self, self._control, self._resume, self._reset)
         LiveParameters(self, self._loaded.declared, values, self._change_parameters)
+
+    def _build_simulation(self) -> None:
+        """Build the world, with the inverse mass matrices that the probes of the engine measure."""
+        values, loaded = self._loaded.values, self._loaded.characters
+        probes = [probe_engine(each.character, values.number("gravity")) for each in loaded]
+        self._samples = [sample for sample, _ in probes]
+        setups = [
+            make_character_setup(each.character, each.values, each.name, inverse_mass)
+            for each, (_, inverse_mass) in zip(loaded, probes, strict=True)
+        ]
+        self._simulation = Simulation(setups, make_settings(values))
+        pairs = zip(self._simulation.characters, loaded, strict=True)
+        waiting = [simulated for simulated, each in pairs if begins_with_reference(each.values)]
+        self._initial_states = InitialStates(self, waiting, values)
 
     def _open_topics(self) -> None:
         own_session = OwnSession(self._session, self._once_logger.log_once)

@@ -87,7 +87,7 @@ WORLD_PARAMETERS = [
     Parameter(
         "initial_state_timeout",
         60.0,
-        "longest wait for a controller that says where a character begins; 0: no limit",
+        "longest wait for a controller that publishes where a character begins; 0: no limit",
         unit="s",
     ),
     Parameter("republish_period", 0.5, "an unanswered state is sent again", unit="s", minimum=0.01),
@@ -186,11 +186,6 @@ class SimulatorParameters:
         waiting = [one for one in self.characters if begins_with_reference(one.values)]
         names = {one.prefix + name for one in waiting for name in (POSITION, VELOCITY)}
         return [parameter for parameter in self.declared if parameter.name in names]
-
-    @property
-    def known(self) -> list[Parameter]:
-        """The parameters whose values are known from the beginning."""
-        return [parameter for parameter in self.declared if parameter not in self.open]
 
     def with_values(self, changes: Mapping[str, Mapping[str, Value]]) -> "SimulatorParameters":
         """The same with other values of parameters of characters, by the characters' names."""

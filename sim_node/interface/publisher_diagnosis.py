@@ -32,7 +32,7 @@ def describe_publishers(node: Node, topic: Topic) -> str:
     """One sentence: the nodes that publish on a topic, and whose QoS does not fit."""
     infos = node.get_publishers_info_by_topic(topic.name)
     if not infos:
-        return f"nobody publishes on '{topic.name}'"
+        return f"'{topic.name}' has no publisher"
     sentence = f"'{topic.name}' is published by {', '.join(publisher_names(node, topic))}"
     for info in infos:
         compatibility, reason = qos_check_compatible(info.qos_profile, topic.qos)

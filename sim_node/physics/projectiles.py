@@ -22,7 +22,7 @@ class Projectiles:
         self.throws: tuple[ProjectileThrow, ...] = ()
 
     def add(self, throw: ProjectileThrow) -> None:
-        """Let a ball go: put it into the world where and as fast as the throw says."""
+        """Let a ball go: put it into the world with the position and velocity of the throw."""
         client = self._client
         number = pybullet.createMultiBody(
             throw.mass, self._shape(throw.radius), -1, throw.position, physicsClientId=client

@@ -18,6 +18,7 @@ from msgs_config.parameters import resolve
 from sim_node.initial_state import check_state
 from sim_node.parameters import load_parameters
 from sim_node.physics.simulation import Simulation
+from tests.sim_node.conftest import Join
 from tests.support.physics import (
     EVERY_CHARACTER,
     character,
@@ -214,11 +215,11 @@ def begins_in(state: JointState) -> tuple[list[float], list[float]]:
 
 
 def test_the_simulator_begins_where_it_is_told_and_tells_all_of_it(
-    processes: Processes, client: SimulatorClient, context: Context
+    processes: Processes, client: SimulatorClient, join: Join
 ) -> None:
     simulator = asking(processes)
     line = wait_for_line(client, simulator, "waiting")
-    assert "nobody publishes on 'controller_node/initial_state'" in line
+    assert "'controller_node/initial_state' has no publisher" in line
     assert not client.states.messages and not client.configuration.messages
 
     client.speak(SAID).publish(pendulum_state())
@@ -228,11 +229,10 @@ def test_the_simulator_begins_where_it_is_told_and_tells_all_of_it(
     said = ["reference", [THIRD], [-THIRD]]
     values = client.get_parameters(topics.SIM_NODE, names)
     assert [values[0], *map(list, values[1:])] == said
-    late = SimulatorClient(context, "late")
+    late = join("late")
     late.spin_until(lambda: late.configuration.messages, "the configuration")
     parameters = json.loads(late.configuration.last.data)["parameters"]
     assert [parameters[name] for name in names] == said
-    late.close()
     assert simulator.stderr.count("waiting for the initial state") == 1
 
 
@@ -305,7 +305,7 @@ def test_what_cannot_be_is_rejected_each_in_a_line_and_the_next_one_taken(
 @pytest.mark.parametrize(
     ("message", "timeout", "expected"),
     [
-        (None, 0.5, "nobody publishes on 'controller_node/initial_state'"),
+        (None, 0.5, "'controller_node/initial_state' has no publisher"),
         (pendulum_state(np.inf), 4.0, "'hinge' is at inf"),  # time enough to be heard
     ],
     ids=["nothing", "something wrong"],
@@ -388,7 +388,7 @@ def test_while_several_controllers_say_a_state_none_counts(
 
 
 def test_each_of_several_characters_is_told_by_its_own_controller(
-    processes: Processes, client: SimulatorClient, context: Context
+    processes: Processes, client: SimulatorClient, join: Join
 ) -> None:
     given: dict[str, object] = {"characters": ["one", "two", "three"], "character": "pendulum"}
     simulator = processes.simulator(
@@ -398,12 +398,10 @@ def test_each_of_several_characters_is_told_by_its_own_controller(
     assert "'one/controller_node/initial_state'" in line
     assert "'two/controller_node/initial_state'" in line
     assert "three" not in line
-    first = [SimulatorClient(context, f"at_{name}", name) for name in ("one", "two", "three")]
+    first = [join(f"at_{name}", name) for name in ("one", "two", "three")]
     client.speak(SAID.under("two")).publish(pendulum_state(0.2))
     client.speak(SAID.under("one")).publish(pendulum_state(0.1))
 
     states = [begins_in(each.first_state()) for each in first]
 
     assert states == [([0.1], [-THIRD]), ([0.2], [-THIRD]), ([0.5], [0.0])]
-    for each in first:
-        each.close()

@@ -105,22 +105,6 @@ def test_a_push_moves_the_one_that_it_is_for() -> None:
     assert other > 0.1
 
 
-def test_what_each_touches_is_its_own_affair() -> None:
-    # one stands, the other is a metre above the ground
-    given = FAR | {"other.placement": [0.0, 5.0, 1.0, 0.0]}
-    nothing = np.zeros(HUMANOID.size)
-    with joint_simulation(given) as run:
-        run.watches_contacts = True
-
-        for _ in range(20):
-            run.step([nothing, nothing])
-        stands, falls = (actor.contacts for actor in run.characters)
-
-        assert stands is not None and falls is not None
-        assert stands.touching.any()
-        assert not falls.touching.any()
-
-
 # --- in contact ----------------------------------------------------------------------------------
 
 
@@ -132,20 +116,6 @@ def test_a_run_in_contact_is_a_function_of_its_inputs(given: dict[str, object]) 
 
     assert trajectories(NEAR | given, *efforts) == first
     assert first != trajectories(FAR | given, *efforts)
-
-
-def test_watching_the_contacts_changes_no_bit_of_what_follows() -> None:
-    efforts = [humanoid_efforts(seed) for seed in (1, 2)]
-    with joint_simulation(NEAR) as blind, joint_simulation(NEAR) as watching:
-        watching.watches_contacts = True
-
-        seen, unseen = states_of(watching, *efforts), states_of(blind, *efforts)
-
-        assert seen == unseen
-        assert all(actor.contacts is None for actor in blind.characters)
-        assert all(
-            actor.contacts and actor.contacts.touching.any() for actor in watching.characters
-        )
 
 
 def test_without_weight_and_ground_what_touches_presses_equally_in_opposite_directions() -> None:
@@ -192,16 +162,3 @@ def test_a_divergence_names_the_character_and_the_joint() -> None:
 def test_an_initial_state_of_the_wrong_length_names_the_character() -> None:
     with pytest.raises(ConfigurationError, match=r"'other\.initial_position' has 2 entries"):
         joint_simulation(FAR | {"other.initial_position": [0.0, 0.0]})
-
-
-def test_stamps_are_the_same_for_all() -> None:
-    with joint_simulation(FAR) as run:
-        for _ in range(5):
-            assert [actor.state.stamp_ns for actor in run.characters] == [run.stamp_ns] * 2
-            run.step([np.zeros(HUMANOID.size)] * 2)
-
-
-@pytest.mark.parametrize("count", [0, 1, 3])
-def test_an_effort_for_each_is_needed(count: int) -> None:
-    with joint_simulation(FAR) as run, pytest.raises(ValueError, match="zip"):
-        run.step([np.zeros(HUMANOID.size)] * count)

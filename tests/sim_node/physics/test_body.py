@@ -215,39 +215,25 @@ def test_an_effort_inside_the_character_changes_no_momentum(name: str) -> None:
 
 
 @floating_characters
-def test_the_root_force_acts_in_the_world_at_the_base_links_origin(name: str) -> None:
+def test_root_force_is_the_worlds_at_the_base_links_origin_and_root_torque_the_base_frames(
+    name: str,
+) -> None:
     whole = without_self_collision(name)
     rng = np.random.default_rng(7)
     with still_world(whole) as world:
-        position, _ = free_random_state(world.body, whole, rng)
-        world.body.set_state(position, np.zeros_like(position))
-        effort = np.zeros_like(position)
-        effort[:3] = rng.uniform(20.0, 50.0, 3)
+        for part in (slice(0, 3), slice(3, 6)):
+            position, _ = free_random_state(world.body, whole, rng)
+            world.body.set_state(position, np.zeros_like(position))
+            effort = np.zeros_like(position)
+            effort[part] = rng.uniform(20.0, 50.0, 3)
 
-        advance(world, effort)
-        linear, angular = momentum(world.body, whole)
+            advance(world, effort)
+            linear, angular = momentum(world.body, whole)
 
-    force, origin = effort[:3], position[:3]
-    np.testing.assert_allclose(linear / INSTANT, force, rtol=1e-6)
-    np.testing.assert_allclose(angular / INSTANT, np.cross(origin, force), rtol=1e-6, atol=1e-5)
-
-
-@floating_characters
-def test_the_root_torque_acts_in_the_base_frame(name: str) -> None:
-    whole = without_self_collision(name)
-    rng = np.random.default_rng(8)
-    with still_world(whole) as world:
-        position, _ = free_random_state(world.body, whole, rng)
-        world.body.set_state(position, np.zeros_like(position))
-        effort = np.zeros_like(position)
-        effort[3:6] = rng.uniform(20.0, 50.0, 3)
-
-        advance(world, effort)
-        linear, angular = momentum(world.body, whole)
-
-    torque_in_world = rotations.matrix(rotations.exp(position[3:6])) @ effort[3:6]
-    np.testing.assert_allclose(linear / INSTANT, np.zeros(3), atol=1e-6)
-    np.testing.assert_allclose(angular / INSTANT, torque_in_world, rtol=1e-6)
+            force, torque = effort[:3], rotations.matrix(rotations.exp(position[3:6])) @ effort[3:6]
+            moment = np.cross(position[:3], force) + torque
+            np.testing.assert_allclose(linear / INSTANT, force, rtol=1e-6, atol=1e-6)
+            np.testing.assert_allclose(angular / INSTANT, moment, rtol=1e-6, atol=1e-5)
 
 
 @ball_joints
@@ -383,24 +369,12 @@ def test_joints_turn_without_friction(name: str) -> None:
         np.testing.assert_allclose(last_angular, angular, rtol=0.0, atol=5e-3)
 
 
-@pytest.mark.parametrize(("name", "dof"), [("lift", "height"), ("pendulum", "hinge")])
-def test_a_joint_moves_on_at_its_speed_for_ever(name: str, dof: str) -> None:
+@pytest.mark.parametrize("name", ["lift", "pendulum", *FLOATING_CHARACTERS], ids=character_id)
+def test_a_joint_and_a_base_move_on_at_their_speed_forever(name: str) -> None:
     # faster than 100, where the engine clamps speeds if it is not told otherwise
-    whole = character(name)
-    with still_world(whole, step_s=1e-3) as world:
-        world.body.set_state(np.zeros(1), np.array([400.0]))
-
-        advance(world, np.zeros(1), 1000)
-        _, velocity = world.body.read()
-
-    assert velocity[0] == pytest.approx(400.0, rel=1e-12), dof
-
-
-@floating_characters
-def test_a_base_moves_on_at_its_speed_for_ever(name: str) -> None:
     whole = without_self_collision(name)
     velocity = np.zeros(whole.layout.size)
-    velocity[:3] = 300.0, -200.0, 400.0
+    velocity[:3] = [300.0, -200.0, 400.0] if whole.layout.has_floating_base else 400.0
     with still_world(whole, step_s=1e-3) as world:
         world.body.set_state(np.array(whole.rest_position), velocity)
 

@@ -121,11 +121,13 @@ def test_a_zero_effort_has_one_sign_whatever_the_senders(zero: float) -> None:
     assert state.effort.tobytes() == np.zeros(1).tobytes()
 
 
-def test_a_hinges_effort_is_clipped_to_its_limit() -> None:
+def test_an_effort_is_clipped_and_a_ball_joints_keeps_its_direction() -> None:
     effort = np.zeros(HUMANOID.size)
     effort[HUMANOID.joint("right_knee").entries] = 1000.0
     effort[HUMANOID.joint("left_knee").entries] = -151.0
     effort[HUMANOID.joint("right_elbow").entries] = 59.0
+    effort[HUMANOID.joint("chest").entries] = 300.0, 0.0, -400.0  # the limit is 200 N m
+    effort[HUMANOID.joint("right_hip").entries] = 100.0, 100.0, 100.0
     with simulation("humanoid") as run:
         applied = run.advance(effort).effort
 
@@ -133,17 +135,6 @@ def test_a_hinges_effort_is_clipped_to_its_limit() -> None:
     assert applied[HUMANOID.joint("right_knee").entries] == [150.0]
     assert applied[HUMANOID.joint("left_knee").entries] == [-150.0]
     assert applied[HUMANOID.joint("right_elbow").entries] == [59.0]
-
-
-def test_a_ball_joints_effort_is_clipped_by_its_norm_and_keeps_its_direction() -> None:
-    # the limit is 200 N m
-    effort = np.zeros(HUMANOID.size)
-    effort[HUMANOID.joint("chest").entries] = 300.0, 0.0, -400.0
-    effort[HUMANOID.joint("right_hip").entries] = 100.0, 100.0, 100.0
-    with simulation("humanoid") as run:
-        applied = run.advance(effort).effort
-
-    assert applied is not None
     chest, hip = (applied[HUMANOID.joint(name).entries] for name in ("chest", "right_hip"))
     np.testing.assert_allclose(chest, [120.0, 0.0, -160.0], rtol=1e-14)
     np.testing.assert_array_equal(hip, [100.0, 100.0, 100.0])
@@ -328,22 +319,17 @@ def test_an_initial_state_of_the_wrong_length_is_an_error_that_lists_the_entries
         simulation("humanoid", **{name: [0.0, 0.0, 0.9]})
 
 
-def test_the_root_may_be_commanded_only_if_it_is_listed() -> None:
-    motors = HUMANOID.actuated_joint_names
-    with (
-        simulation("humanoid") as free,
-        simulation("humanoid", commanded_joints=[ROOT, *motors]) as assisted,
-    ):
-        assert not free.actor.commanded[:6].any()
-        assert free.actor.commanded[6:].all()
-        assert assisted.actor.commanded.all()
+@pytest.mark.parametrize(
+    "joints", [None, [ROOT, *HUMANOID.actuated_joint_names], ["neck", "right_knee"]]
+)
+def test_the_listed_joints_are_commanded_and_by_default_all_but_the_root(
+    joints: list[str] | None,
+) -> None:
+    given = {} if joints is None else {"commanded_joints": joints}
+    with simulation("humanoid", **given) as run:
+        expected = HUMANOID.mask(joints or HUMANOID.actuated_joint_names)
 
-
-def test_only_the_listed_joints_are_commanded() -> None:
-    with simulation("humanoid", commanded_joints=["neck", "right_knee"]) as run:
-        commanded = [HUMANOID.dof_names[index] for index in np.flatnonzero(run.actor.commanded)]
-
-    assert commanded == ["neck_x", "neck_y", "neck_z", "right_knee"]
+        np.testing.assert_array_equal(run.actor.commanded, expected)
 
 
 def test_an_unknown_commanded_joint_is_an_error_that_lists_those_that_exist() -> None:

@@ -24,7 +24,6 @@ from tests.support.physics import (
     LoneWorld,
     box_character,
     character,
-    joint_simulation,
     momentum,
     simulation,
 )
@@ -245,24 +244,6 @@ def test_the_same_throws_lead_to_the_same_states(walk: Plan) -> None:
         other, _ = walked(walk, run, 150, throws)
 
     assert in_bytes(one) == in_bytes(other)
-
-
-def test_far_away_two_characters_are_hit_as_if_each_were_alone() -> None:
-    given: dict[str, object] = {
-        "characters": ["one", "other"],
-        "other.placement": [0.0, 9.0, 0.0, 0.0],
-    }
-    hit = ProjectileThrow(2.0, 0.1, (1.0, 0.02, 1.1), (-8.0, 0.0, 0.0))
-    nothing = np.zeros(character("humanoid").layout.size)
-
-    with joint_simulation(given) as run, simulation("humanoid") as alone:
-        for _ in range(80):
-            run.step([nothing, nothing], None, [hit] if run.tick == 5 else ())
-            alone.step([nothing], None, [hit] if alone.tick == 5 else ())
-
-        one, other = run.characters
-        assert one.state.position.tobytes() == alone.state.position.tobytes()
-        assert not np.allclose(one.state.velocity, other.state.velocity, atol=0.1)
 
 
 # Balls whose time is over

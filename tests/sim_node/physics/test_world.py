@@ -16,7 +16,6 @@ from tests.support.physics import (
     box_character,
     character,
     kinetic_energy,
-    touches,
 )
 
 SIZE = character("humanoid").layout.size
@@ -81,12 +80,6 @@ def test_a_restored_state_remembers_nothing_of_what_was_done_in_between() -> Non
         second = trajectory(world, wriggling(1), 240)
 
     assert second == first
-
-
-def test_two_fresh_worlds_go_the_same_way_to_the_bit() -> None:
-    with fallen_humanoid() as one, fallen_humanoid() as other:
-        assert touches(one.body)
-        assert trajectory(one, wriggling(1), 240) == trajectory(other, wriggling(1), 240)
 
 
 def test_two_worlds_at_once_do_not_disturb_each_other() -> None:
