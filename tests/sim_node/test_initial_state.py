@@ -236,17 +236,6 @@ def test_the_simulator_begins_where_it_is_told_and_tells_all_of_it(
     assert simulator.stderr.count("waiting for the initial state") == 1
 
 
-def test_a_state_that_is_there_already_is_taken_without_a_word(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    client.speak(SAID).publish(pendulum_state())
-
-    simulator = asking(processes)
-
-    assert begins_in(client.first_state()) == ([THIRD], [-THIRD])
-    assert simulator.stderr == ""
-
-
 def test_entries_are_matched_by_name(processes: Processes, client: SimulatorClient) -> None:
     position, velocity = random_state(character("humanoid"), np.random.default_rng(5))
     order = [*range(6, HUMANOID.size), *range(6)]
@@ -263,10 +252,15 @@ def test_entries_are_matched_by_name(processes: Processes, client: SimulatorClie
     assert parameters["initial_velocity"] == velocity.tolist()
 
 
-def test_a_reset_begins_in_the_same_state(processes: Processes, client: SimulatorClient) -> None:
+def test_a_state_that_is_there_already_is_taken_without_a_word_and_again_after_a_reset(
+    processes: Processes, client: SimulatorClient
+) -> None:
     client.speak(SAID).publish(pendulum_state())
-    asking(processes)
-    state = client.answer(client.first_state(), ANSWERED)
+    simulator = asking(processes)
+    first = client.first_state()
+    assert begins_in(first) == ([THIRD], [-THIRD])
+    assert simulator.stderr == ""
+    state = client.answer(first, ANSWERED)
 
     client.reset()
 
@@ -329,16 +323,6 @@ def test_without_a_state_in_time_it_ends_with_what_is_missing_and_the_remedy(
     assert expected in line
     assert "start controller_node" in line and "'initial_state' to given" in line
     assert not client.states.messages and not client.configuration.messages
-
-
-def test_it_ends_at_once_if_a_state_is_given_as_well(processes: Processes) -> None:
-    simulator = asking(processes, initial_position=[0.1])
-
-    assert simulator.wait() == 1
-    assert simulator.stderr.splitlines() == [
-        "error: parameter 'initial_position' is given, and 'initial_state' is reference; leave out "
-        "'initial_position', or set 'initial_state' to given"
-    ]
 
 
 def test_a_signal_ends_the_wait(processes: Processes, client: SimulatorClient) -> None:

@@ -413,6 +413,10 @@ WRONG: dict[str, tuple[dict[str, Any], list[str]]] = {
     "character": ({"character": "centaur"}, ["centaur", "humanoid"]),
     "name": ({"max_tick": 3}, ["'max_tick'", "max_ticks"]),
     "joint": ({"commanded_joints": ["hinge", "tail"]}, ["'tail'", "hinge"]),
+    "both": (
+        {"initial_state": "reference", "initial_position": [0.1]},
+        ["'initial_position' is given, and 'initial_state' is reference", "to given"],
+    ),
     "length": ({"initial_position": [0.0, 1.0]}, ["'initial_position'", "2 entries", "hinge"]),
 }
 
