@@ -8,6 +8,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.body import Body
 from sim_node.physics.world import World, WorldSettings
 
 _CLOSE = 1e-6  # m that count as touching
@@ -32,15 +33,10 @@ def find_impact(
     radius: float,
     distance: float,
 ) -> Impact:
-    """Where a ball meets a link of a character that stands still.
+    """Where a ball meets a link of a character that stands still at a position (n,), message form.
 
-    Args:
-        character: The character.
-        position: Where it stands (n,), message form.
-        link: The link that the ball flies at.
-        origin: Unit vector (3,) from the link's centre of mass to where the ball comes from.
-        radius: The ball's, m.
-        distance: How far from the centre of mass it comes, m.
+    The ball, of a radius in m, flies at the link's centre of mass, from a distance in m along
+    `origin`, a unit vector (3,).
 
     Raises:
         ConfigurationError: the link does not exist, has no surface, or is in the ball already; or
@@ -59,8 +55,7 @@ def find_impact(
         body = world.add(character)
         body.set_state(position, np.zeros(character.layout.size))
         target = np.array(body.centres()[row])
-        far = target + distance * origin
-        x, y, z = far.tolist()
+        x, y, z = (target + distance * origin).tolist()
         world.balls.add(ProjectileThrow(1.0, radius, (x, y, z), (0.0, 0.0, 0.0)))
         gaps = body.gaps(world.balls.numbers[0])
         if not np.isfinite(gaps[row]):
@@ -69,18 +64,38 @@ def find_impact(
             raise ConfigurationError(
                 f"distance is {distance:g} m; '{link}' is nearer than the radius, {radius:g} m"
             )
-        left, before = distance, set[str]()
-        # the gap is how far the ball may go, at least, until it touches (sphere tracing)
-        for _ in range(_LAST_STEPS + round(distance / radius)):
-            if gaps[row] < _CLOSE:
-                break
-            left -= min(gaps[row], radius)  # or it would jump over what is in the way
-            world.balls.place(0, target + left * origin)
-            gaps = body.gaps(world.balls.numbers[0])
-            before |= {names[each] for each in np.flatnonzero(gaps < 0.0).tolist() if each != row}
-        else:
-            raise ConfigurationError(
-                f"a ball with a radius of {radius:.3g} m that comes from {distance:g} m away does "
-                f"not touch '{link}'; take another 'radius' or 'from', or come from nearer"
-            )
-    return Impact(target, target + left * origin, tuple(sorted(before)))
+        swept = _sweep(world, body, row, target, origin, distance)
+    if swept is None:
+        raise ConfigurationError(
+            f"a ball with a radius of {radius:.3g} m that comes from {distance:g} m away does "
+            f"not touch '{link}'; take another 'radius' or 'from', or come from nearer"
+        )
+    centre, met = swept
+    return Impact(target, centre, tuple(sorted(names[each] for each in met)))
+
+
+def _sweep(
+    world: World,
+    body: Body,
+    row: int,
+    target: FloatArray,
+    origin: FloatArray,
+    distance: float,
+) -> tuple[FloatArray, set[int]] | None:
+    """Move the world's ball towards a target (3,), m, until it touches a link.
+
+    It comes from `origin`, a unit vector (3,), and begins at a distance in m. Returns its centre
+    (3,) and the rows of other links that it met; None if it passes. The gap is how far the ball may
+    go, at least, until it touches (sphere tracing).
+    """
+    ball, radius = world.balls.numbers[0], world.balls.throws[0].radius
+    left, met = distance, set[int]()
+    gaps = body.gaps(ball)
+    for _ in range(_LAST_STEPS + round(distance / radius)):
+        if gaps[row] < _CLOSE:
+            return target + left * origin, met
+        left -= min(gaps[row], radius)  # or it would jump over what is in the way
+        world.balls.place(0, target + left * origin)
+        gaps = body.gaps(ball)
+        met |= {each for each in np.flatnonzero(gaps < 0.0).tolist() if each != row}
+    return None

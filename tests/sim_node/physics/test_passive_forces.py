@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller_node.references.files.clip import available_clips, read_clip
@@ -25,6 +25,7 @@ from sim_node.physics.probe import measure_inverse_mass, probe_engine
 from sim_node.physics.world import World, WorldSettings
 from tests.support.physics import character, random_rotation_vector, without_self_collision
 
+PROPERTY = settings(deadline=None)
 HUMANOID = character("humanoid")
 LAYOUT = HUMANOID.layout
 BALLS = [joint for joint in HUMANOID.moving_joints if joint.type is JointType.SPHERICAL]
@@ -226,6 +227,7 @@ def test_a_limb_about_to_pass_its_bound_is_slowed_in_the_step_before() -> None:
     assert not torque(passive, ball, turn - 1.1 * STEP * speed, speed).any()
 
 
+@PROPERTY
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8))
 def test_forces_push_or_are_zero_where_nothing_is_to_be_held(seed: int, size: int) -> None:
     rng = np.random.default_rng(seed)
@@ -324,6 +326,7 @@ def test_what_has_neither_damping_nor_limits_has_no_passive_forces() -> None:
     assert not passive.effort(np.zeros(9), np.ones(9)).any()
 
 
+@PROPERTY
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.floats(1e-4, 1e-1))
 def test_no_mode_of_bounded_damping_takes_more_than_the_whole_velocity_in_a_step(
     seed: int, size: int, step: float
