@@ -1,5 +1,6 @@
 """The lockstep barrier: a tick ends when every required degree of freedom has a command."""
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ class CommandStatus(Enum):
     REJECTED = "rejected"  # malformed; nothing of it is taken
 
 
-class CommandCollector:
+class CommandCollector(ABC):
     """Checks and counts commands; a subclass decides which of them make the effort of a tick."""
 
     def __init__(self, dof_names: Sequence[str], allowed: BoolArray) -> None:
@@ -47,8 +48,9 @@ class CommandCollector:
         self.counts[status] += 1
         return status
 
+    @abstractmethod
     def _take(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
-        raise NotImplementedError
+        """Take a command that is well-formed, or not; which, its status says."""
 
     def _check(self, indices: IntArray, effort: FloatArray) -> None:
         if len(indices) != len(effort):
