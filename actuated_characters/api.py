@@ -22,6 +22,7 @@ from msgs_config.parameters import resolve
 from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import as_values
+from sim_node.node_settings import make_node_settings
 from sim_node.physics import simulation
 from sim_node.physics.wrenches import WrenchQueue
 
@@ -157,7 +158,7 @@ class Simulation:
     @property
     def state(self) -> StampedState:
         """The present state; without effort if it is an episode's first."""
-        return self._simulation.actors[0].state
+        return self._simulation.characters[0].state
 
     @property
     def rate_hz(self) -> int:
@@ -177,7 +178,7 @@ class Simulation:
     @property
     def contacts(self) -> FloatArray:
         """Net contact wrenches (links, 6) of the last tick: N and N m, world axes."""
-        contacts = self._simulation.actors[0].contacts
+        contacts = self._simulation.characters[0].contacts
         if contacts is None:
             return np.zeros((len(self.character.links), 6))
         return contacts.wrenches
@@ -208,7 +209,7 @@ class Simulation:
             np.array([[*force, *torque]], dtype=float),
             np.zeros((0, 3)),
             first_tick=self._simulation.tick,
-            ticks=simulator_parameters.push_ticks(self._values),
+            ticks=make_node_settings(self._values).push_ticks,
         )
 
     def step(self, effort: FloatArray) -> StampedState:
@@ -223,7 +224,7 @@ class Simulation:
                 f"an effort has shape {np.shape(effort)}; it must be "
                 f"({self.character.layout.size},), one entry a degree of freedom"
             )
-        (one,) = self._simulation.actors
+        (one,) = self._simulation.characters
         if one.state.effort is None:
             self._hash.add(one.state)
         pushes = self._pushes.take(self._simulation.tick)

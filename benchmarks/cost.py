@@ -98,13 +98,15 @@ def humanoids(count: int) -> dict[str, object]:
 
 def make_simulation(cast: SimulatorParameters) -> Simulation:
     """The simulation of a cast, without ROS."""
-    roles = [make_character_setup(part.character, part.values, part.name) for part in cast.parts]
+    roles = [
+        make_character_setup(part.character, part.values, part.name) for part in cast.characters
+    ]
     return Simulation(roles, make_settings(cast.values))
 
 
 def _measure(label: str, given: Mapping[str, object]) -> Cost:
     cast = load_parameters(given)
-    dofs = sum(part.character.layout.size for part in cast.parts)
+    dofs = sum(part.character.layout.size for part in cast.characters)
     with timed_engine() as engine:
         alone = np.median(1e6 * step_durations(cast))
     engine_us = 1e6 * float(np.median(engine[-_TICKS:]))
@@ -129,7 +131,7 @@ def timed_engine() -> Iterator[list[float]]:
 def step_durations(cast: SimulatorParameters) -> FloatArray:
     """Durations (ticks,) in s of the steps of a simulation without ROS and without efforts."""
     with make_simulation(cast) as simulation:
-        efforts = [np.zeros(actor.layout.size) for actor in simulation.actors]
+        efforts = [np.zeros(actor.layout.size) for actor in simulation.characters]
         times = []
         for _ in range(_WARM_UP + _TICKS + 1):
             times.append(time.perf_counter())
@@ -144,7 +146,7 @@ def _over_topics(cast: SimulatorParameters, given: Mapping[str, object]) -> floa
         nodes.start(topics.SIM_NODE, {**given, "max_ticks": ticks})
         nodes.wait_until(lambda: nodes.reports)
         spinner = PollingExecutor(nodes.node)
-        limp = [_LimpController(nodes, part) for part in cast.parts]
+        limp = [_LimpController(nodes, part) for part in cast.characters]
 
         def answer() -> None:
             answered = [controller.answer() for controller in limp]

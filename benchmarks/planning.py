@@ -136,7 +136,7 @@ class _World:
         )
         role = make_character_setup(self._plan.character, values)
         with Simulation([role], make_settings(values)) as simulation:
-            (actor,) = simulation.actors
+            (actor,) = simulation.characters
             for tick in range(_HORIZON):
                 state = replace(actor.state, stamp_ns=clock.stamp_ns(1 + first + tick))
                 effort, _ = controller.compute_effort(state, clock.stamp_ns(1))

@@ -1,7 +1,8 @@
-"""`sim_node`: the simulation at one end of the topics, with whoever commands it at the other."""
+"""`sim_node`: the simulation behind its topics, in lockstep with controllers or real time."""
 
 import time
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 from rclpy.node import Node
@@ -10,7 +11,7 @@ from msgs_config.errors import SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.joint_state import encode_clock
-from msgs_config.messages.session import given_session, make_session
+from msgs_config.messages.session import OwnSession, make_session
 from msgs_config.messages.topics import Outgoing
 from msgs_config.parameters import Values
 from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
@@ -18,48 +19,35 @@ from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
-from sim_node.interface.character_interface import (
-    CharacterInterface,
-    open_ports,
-    publish_configurations,
-)
+from sim_node.initial_state import as_values, begins_with_reference
+from sim_node.interface.character_interface import CharacterInterface
 from sim_node.interface.initial_state_topic import InitialStates
-from sim_node.interface.other_publishers import RivalWatch
 from sim_node.interface.publisher_diagnosis import (
-    UNKNOWN_NODE,
+    ConflictLog,
+    OtherSimulators,
     describe_conflict,
     describe_waiting,
-    publisher_names,
 )
+from sim_node.interface.publishers import wait_for_subscribers
 from sim_node.interface.services import Services
-from sim_node.interface.status import report
 from sim_node.interface.world_interface import WorldInterface
-from sim_node.parameters import (
-    command_timeout_ns,
-    is_realtime,
-    load_parameters,
-    make_character_setup,
-    make_settings,
-    push_ticks,
-    tick_period,
-)
+from sim_node.node_settings import make_node_settings
+from sim_node.parameters import load_parameters, make_character_setup, make_settings
+from sim_node.physics.probe import probe_engine
 from sim_node.physics.simulation import Simulation
 from sim_node.timing.flow_control import FlowControl
 from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
 from sim_node.timing.rate_limiter import RateLimiter
 from sim_node.timing.run_state import RunControl
-from sim_node.timing.tick_times import TickTimes
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
-from sim_node.timing.zero_order_hold import ZeroOrderHold
 
-_EXPLAIN_AFTER = 2.0  # s without a complete command before the node says what is missing
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
 _STOP_FLUSH_TIME = 0.5  # s, after a signal or an error
 _MOST_COMMANDS = 1000  # that are taken in a row in real time; a flood must not stop the world
 
 
 class SimNode(Node):
-    """Publishes the states of each tick; goes on when they are answered, or when it is time."""
+    """Publishes the states of each tick; advances when they are answered, or when it is time."""
 
     def __init__(self) -> None:
         """Read the parameters, build the world, and offer the topics.
@@ -68,231 +56,215 @@ class SimNode(Node):
             ActuatedCharactersError: a parameter or a character cannot be used.
         """
         super().__init__(topics.SIM_NODE)
-        cast = load_parameters(given_parameters(self))
-        values = self._values = cast.values
-        self._realtime = is_realtime(values)
-        roles = [
-            make_character_setup(part.character, part.values, part.name) for part in cast.parts
-        ]
-        self._simulation = Simulation(roles, make_settings(values))
-        self._initial_states = InitialStates(self, cast, self._simulation)
-        declare(self, self._initial_states.known, values)
-        self._session = given_session(values) or make_session(self.get_fully_qualified_name())
+        self._loaded = load_parameters(given_parameters(self))
+        values, unknown = self._loaded.values, self._loaded.open
+        self._settings = make_node_settings(values)
+        self._build_simulation()
+        declare(self, [each for each in self._loaded.declared if each not in unknown], values)
+        self._session = self._settings.session or make_session(self.get_fully_qualified_name())
         self._once_logger = OnceLogger(self)
-        self._ports = open_ports(self, cast, self._simulation, self._session, self._once_logger)
-        self._rivals = RivalWatch(self, self._ports, self._session, self._once_logger)
-        self._world_port = WorldInterface(self, self._simulation, self._session, self._once_logger)
-        self._clock_topic = topics.create_publisher(self, topics.CLOCK)
-        self._max_ticks = values.integer("max_ticks")
-        self._patience = Watchdog(
-            republish_period=values.number("republish_period"),
-            explain_after=_EXPLAIN_AFTER,
-            timeout=values.number("lockstep_timeout"),
+        self._open_topics()
+        self._watchdog = Watchdog(self._settings.republish_period, self._settings.lockstep_timeout)
+        self._rate_limiter = RateLimiter(self._settings.tick_period)
+        self._flow_control = FlowControl(
+            self._is_acknowledged, self._once_logger.log_once, not self._settings.is_realtime
         )
-        self._pace = RateLimiter(tick_period(values))
-        self._back_pressure = FlowControl(self._is_acknowledged)
-        self._diagnostics = DiagnosticsPublisher(self)
         self._next_diagnostics = 0.0
         self._timeouts = 0
-        self._conflicts: dict[
-            str, CharacterInterface
-        ] = {}  # joints of which commands compete in real time
-        self._tick_times = TickTimes()
         self._begun = False
         self._control = RunControl()
         self._run_services = Services(self, self._control, self._resume, self._reset)
-        LiveParameters(self, cast.declared, values, self._take_parameters)
+        LiveParameters(self, self._loaded.declared, values, self._change_parameters)
+
+    def _build_simulation(self) -> None:
+        """Build the world, with the inverse mass matrices that the probes of the engine measure."""
+        values, loaded = self._loaded.values, self._loaded.characters
+        probes = [probe_engine(each.character, values.number("gravity")) for each in loaded]
+        self._samples = [sample for sample, _ in probes]
+        setups = [
+            make_character_setup(each.character, each.values, each.name, inverse_mass)
+            for each, (_, inverse_mass) in zip(loaded, probes, strict=True)
+        ]
+        self._simulation = Simulation(setups, make_settings(values))
+        pairs = zip(self._simulation.characters, loaded, strict=True)
+        waiting = [simulated for simulated, each in pairs if begins_with_reference(each.values)]
+        self._initial_states = InitialStates(self, waiting, values)
+
+    def _open_topics(self) -> None:
+        own_session = OwnSession(self._session, self._once_logger.log_once)
+        self._characters = [
+            CharacterInterface(
+                self,
+                character,
+                self._simulation.clock,
+                self._settings,
+                own_session,
+                self._once_logger,
+            )
+            for character in self._simulation.characters
+        ]
+        self._world = WorldInterface(self, self._simulation, own_session, self._once_logger)
+        self._clock_topic = topics.create_publisher(self, topics.CLOCK)
+        self._diagnostics = DiagnosticsPublisher(self)
+        self._conflict_log = ConflictLog(self, self._once_logger)
+        self._others = OtherSimulators(
+            self, [each.states for each in self._characters], self._session, self._once_logger
+        )
 
     def run(self, stop: StopSignal) -> None:
         """Simulate until `max_ticks`, or until `stop`.
 
         Raises:
             SimulationError: a fault or a timeout whose parameter says `abort`, or no controller
-                said where a reference begins.
-            CharacterError: the engine makes nothing sound of a character.
+                published where a reference begins.
+            CharacterError: a mesh cannot be read.
         """
-        spinner = PollingExecutor(self)
+        executor = PollingExecutor(self)
         try:
-            cast = self._initial_states.settle(stop, spinner)
-            if cast is None:
-                return
-            publish_configurations(
-                self._ports, cast, self._simulation.settings.world, self._session
-            )
-            self._wait_for_subscribers(stop, spinner)
-            self._begin_episode()
+            self._begin(stop, executor)
             while not stop and not self._finished:
-                self._turn(spinner)
+                self._turn(executor)
         finally:
-            self._run_services.end(spinner)
-            self._flush(_FLUSH_TIME if self._finished else _STOP_FLUSH_TIME)
-            spinner.close()
+            self._run_services.end(executor)
+            self._publish_diagnostics()
+            seconds = _FLUSH_TIME if self._finished else _STOP_FLUSH_TIME
+            if not (self._is_acknowledged(seconds) and self._diagnostics.flush(seconds)):
+                self.get_logger().warning("a subscriber has not acknowledged the last messages")
+            executor.close()
             self._simulation.close()
 
     @property
     def _finished(self) -> bool:
         ticks = self._simulation.tick - FIRST_TICK
-        return not self._control.has_diverged and 0 < self._max_ticks <= ticks
+        return not self._control.has_diverged and 0 < self._settings.max_ticks <= ticks
 
     @property
     def _complete(self) -> bool:
-        return all(port.collector.complete for port in self._ports)
+        return all(each.commands.complete for each in self._characters)
 
-    def _wait_for_subscribers(self, stop: StopSignal, spinner: PollingExecutor) -> None:
-        wanted = self._values.integer("wait_for_subscribers")
-        self._patience.restart(time.monotonic())
-        while not stop and (found := self._fewest_subscribers) < wanted:
-            spinner.rest()
-            if WatchdogEvent.EXPLAIN in self._patience.due(time.monotonic()):
-                sentence = f"waiting for {wanted} subscribers of joint_states; there are {found}"
-                self.get_logger().warning(f"{sentence}; has one not started, or ended?")
+    def _begin(self, stop: StopSignal, executor: PollingExecutor) -> None:
+        """Begin the first episode when initial states and subscribers are there."""
+        states = self._initial_states.wait(stop, executor)
+        parameters = self._loaded.with_values({n: as_values(s) for n, s in states.items()})
+        if stop:
+            return
+        if states:
+            self._simulation.begin_in(states)
+            declare(self, self._loaded.open, parameters.values)
+        terrain = self._simulation.settings.world.terrain
+        for each, own, sample in zip(
+            self._characters, parameters.characters, self._samples, strict=True
+        ):
+            each.publishers.publish_configuration(own.values, sample, terrain, parameters.names)
+        publishers = [each.publishers for each in self._characters]
+        wait_for_subscribers(self, publishers, self._settings.wait_for_subscribers, stop, executor)
+        self._begin_episode()
 
-    @property
-    def _fewest_subscribers(self) -> int:
-        return min(port.outputs.state_subscribers for port in self._ports)
-
-    def _turn(self, spinner: PollingExecutor) -> None:
+    def _turn(self, executor: PollingExecutor) -> None:
         """Take commands, and advance if the tick is complete and due; or rest."""
         received = self._receive()
         if received:
-            spinner.received()
-            spinner.serve()  # a flood of commands must not keep services waiting
+            executor.received()
+            executor.serve()  # a flood of commands must not keep services waiting
         if not (self._control.runs and self._complete):
             if not received:
-                spinner.rest()
-        elif wait := self._pace.wait(time.monotonic()):
-            spinner.rest_for(wait)
-        elif self._is_held_back():
-            spinner.serve()
+                executor.rest()
+        elif wait := self._rate_limiter.wait(time.monotonic()):
+            executor.rest_for(wait)
+        elif self._flow_control.holds(self._simulation.tick, time.monotonic()):
+            executor.serve()
         else:
             self._advance()  # before the clock: a command that came in time is no timeout
         self._look_at_the_clock()
 
-    def _is_held_back(self) -> bool:
-        """Whether a subscriber is so far behind that it would lose messages; never in real time."""
-        if self._realtime:
-            return False
-        if self._back_pressure.holds(self._simulation.tick, time.monotonic()):
-            return True
-        if self._back_pressure.complaint is not None:
-            self._once_logger.log_once(self._back_pressure.complaint)
-        return False
-
-    def _is_acknowledged(self, seconds: float) -> bool:
-        flushes = [port.outputs.flush for port in self._ports] + [self._world_port.flush]
-        return all(flush(seconds) for flush in flushes)
-
     def _receive(self) -> bool:
         """Take one command a character, or all in real time; whether there was one."""
         received = False
-        for port in self._ports:
-            for _ in range(_MOST_COMMANDS if self._realtime else 1):
-                verdict = port.take_command()
-                if verdict is None:
+        for each in self._characters:
+            for _ in range(_MOST_COMMANDS if self._settings.is_realtime else 1):
+                status = each.take_command()
+                if status is None:
                     break
                 received = True
-                if verdict is CommandStatus.CONFLICT:
-                    self._on_conflict(port)
+                if status is CommandStatus.CONFLICT and self._control.runs:
+                    self._on_conflict(each)
         return received
 
-    def _flush(self, seconds: float) -> None:
-        """Publish the last report, and wait until every subscriber has all that was published."""
-        self._publish_diagnostics()
-        deadline = time.monotonic() + seconds
-        flushes = [port.outputs.flush for port in self._ports]
-        flushes += [self._world_port.flush, self._diagnostics.flush]
-        flushed = [flush(max(deadline - time.monotonic(), 0.0)) for flush in flushes]
-        if not all(flushed):
-            self.get_logger().warning("a subscriber has not acknowledged the last messages")
+    def _is_acknowledged(self, seconds: float) -> bool:
+        """Wait at most `seconds` until every subscriber has the last tick; whether it has."""
+        of_characters = [each.publishers.of_ticks for each in self._characters]
+        return topics.flush(chain(self._world.publishers, *of_characters), seconds)
 
     def _begin_episode(self) -> None:
-        for port in self._ports:
-            port.outputs.publish_episode(self._simulation.episode, self._simulation.stamp_ns)
+        for each in self._characters:
+            each.publishers.publish_episode(self._simulation.episode, self._simulation.stamp_ns)
         self._begun = True
-        self._pace.restart(time.monotonic())
+        self._rate_limiter.restart(time.monotonic())
         self._begin_tick()
 
     def _begin_tick(self) -> None:
-        for port in self._ports:
-            port.begin_tick()
-        self._patience.restart(time.monotonic())
+        for each in self._characters:
+            each.begin_tick()
+        self._watchdog.restart(time.monotonic())
         topics.publish_together(self._messages())
-        for port in self._ports:
-            port.outputs.publish_display(self._simulation.tick)
+        for each in self._characters:
+            each.publishers.publish_display(self._simulation.tick)
 
     def _messages(self) -> Iterator[Outgoing]:
-        """What is published of a tick before anybody can answer it, the states last."""
+        """The messages of a tick that are published before it can be answered, the states last."""
         yield self._clock_topic, encode_clock(self._simulation.stamp_ns)
-        yield from self._world_port.messages()
-        for port in self._ports:
-            yield from port.outputs.before_state()
-        for port in self._ports:
-            yield port.outputs.state()
+        yield from self._world.messages()
+        for each in self._characters:
+            yield from each.publishers.before_state()
+        for each in self._characters:
+            yield each.publishers.state()
 
     def _advance(self) -> None:
-        simulation = self._simulation
-        self._pace.tick(time.monotonic())
-        ticks = push_ticks(self._values)
-        pushes = [
-            port.take_pushes(simulation.clock, simulation.tick, ticks) for port in self._ports
-        ]
-        throws = self._world_port.take_throws()
-        for port in self._ports:
-            port.last_effort = port.collector.effort
-        simulation.watches_contacts = any(port.outputs.wants_contacts for port in self._ports)
+        simulation, characters = self._simulation, self._characters
+        self._rate_limiter.tick(time.monotonic())
+        pushes = [each.take_pushes() for each in characters]
+        throws = self._world.take_throws()
+        efforts = [each.take_effort() for each in characters]
+        simulation.watches_contacts = any(each.publishers.wants_contacts for each in characters)
         try:
-            simulation.step([port.last_effort for port in self._ports], pushes, throws)
+            simulation.step(efforts, pushes, throws)
         except SimulationError as error:
-            self._raise_fault(str(error), stuck=True)
+            self._raise_fault(str(error), diverged=True)
             return
-        self._tick_times.tick()
         self._begin_tick()
         if self._control.tick():
             self._run_services.end_steps()
 
-    def _on_conflict(self, port: CharacterInterface) -> None:
-        if self._control.paused and not self._control.runs:
-            return
-        joint = f"{port.actor.role.prefix}{port.collector.conflict}"
-        if self._realtime:
-            self._conflicts[joint] = port  # finding out who publishes takes its time
+    def _on_conflict(self, character: CharacterInterface) -> None:
+        if self._settings.is_realtime:
+            self._conflict_log.add(character.conflict, character.torques)
         else:
-            senders = publisher_names(self, port.torques)
-            self._raise_fault(describe_conflict(joint, port.torques, senders))
-
-    def _tell_conflicts(self) -> None:
-        """Say who competes for a joint in real time, once for each, when their names are known."""
-        for joint, port in self._conflicts.items():
-            if not self._once_logger.has_logged(joint):
-                senders = publisher_names(self, port.torques, wait_for_names=False)
-                if UNKNOWN_NODE not in senders:
-                    sentence = describe_conflict(joint, port.torques, senders)
-                    self._once_logger.log_once(f"{sentence}; the last one counts", kind=joint)
+            self._raise_fault(describe_conflict(self, character.conflict, character.torques))
 
     def _look_at_the_clock(self) -> None:
         now = time.monotonic()
         if now >= self._next_diagnostics:
             self._next_diagnostics = now + DIAGNOSTICS_PERIOD
             self._publish_diagnostics()
-            self._tell_conflicts()
-            self._rivals.look()
-        for due in self._patience.due(now):
+            self._conflict_log.log()
+            self._others.look()
+        for event in self._watchdog.due(now):
             waits = self._control.runs and not self._complete
-            if due is WatchdogEvent.REPUBLISH:
-                for port in self._ports:
-                    port.outputs.republish(with_state=waits, with_episode=self._rivals.seen)
-            elif waits and due is WatchdogEvent.EXPLAIN:
+            if event is WatchdogEvent.REPUBLISH:
+                for each in self._characters:
+                    each.publishers.republish(with_state=waits, with_episode=self._others.seen)
+            elif waits and event is WatchdogEvent.EXPLAIN:
                 self.get_logger().warning(self._describe_waiting())
             elif waits and self._simulation.tick > FIRST_TICK:  # before that it just waits
                 self._on_timeout()
 
     def _describe_waiting(self) -> str:
-        waiting = [port for port in self._ports if port.missing]
-        return "; ".join(describe_waiting(self, port.torques, port.missing) for port in waiting)
+        waiting = [each for each in self._characters if each.missing]
+        return "; ".join(describe_waiting(self, each.torques, each.missing) for each in waiting)
 
     def _on_timeout(self) -> None:
-        action = self._values.text("on_timeout")
-        sentence = f"no command within {self._patience.timeout:g} s; {self._describe_waiting()}"
+        action = self._settings.on_timeout
+        sentence = f"no command within {self._watchdog.timeout:g} s; {self._describe_waiting()}"
         if action == "abort":
             self._control.fault = sentence
             raise SimulationError(sentence)
@@ -301,48 +273,45 @@ class SimNode(Node):
             self._pause(sentence)
             return
         self._timeouts += 1
-        for port in self._ports:
-            assert isinstance(port.collector, LockstepBarrier)  # real time has no missing commands
-            held = port.last_effort
-            port.collector.fill_missing(held if action == "hold" else np.zeros_like(held))
+        for each in self._characters:
+            assert isinstance(each.commands, LockstepBarrier)  # real time has no missing commands
+            held = each.last_effort
+            each.commands.fill_missing(held if action == "hold" else np.zeros_like(held))
 
-    def _raise_fault(self, sentence: str, *, stuck: bool = False) -> None:
-        if self._values.text("on_fault") == "abort":
-            self._control.pause(sentence, stuck=stuck)
+    def _raise_fault(self, sentence: str, *, diverged: bool = False) -> None:
+        if self._settings.on_fault == "abort":
+            self._control.pause(sentence, diverged=diverged)
             raise SimulationError(sentence)
         self.get_logger().error(f"{sentence}; paused")
-        self._pause(sentence, stuck=stuck)
+        self._pause(sentence, diverged=diverged)
 
-    def _pause(self, fault: str, *, stuck: bool = False) -> None:
-        self._control.pause(fault, stuck=stuck)
+    def _pause(self, fault: str, *, diverged: bool = False) -> None:
+        self._control.pause(fault, diverged=diverged)
         self._run_services.end_steps(fault)
         self._publish_diagnostics()
 
     def _resume(self) -> None:
         """Go on after a pause: what was collected before it is asked for again."""
         if self._begun:
-            self._tick_times.resume()
-            self._pace.restart(time.monotonic())
+            self._rate_limiter.restart(time.monotonic())
             self._begin_tick()
 
     def _reset(self) -> None:
-        """Begin a new episode, now or when all who are waited for are there."""
+        """Begin a new episode, now or when all awaited subscribers are there."""
         self._simulation.reset()
-        self._world_port.forget()
-        for port in self._ports:
-            port.forget()
-        self._tick_times.resume()
+        self._world.begin_episode()
+        for each in self._characters:
+            each.begin_episode()
         if self._begun:
             self._begin_episode()
 
-    def _take_parameters(self, values: Values) -> None:
+    def _change_parameters(self, values: Values) -> None:
         """Take changed parameters, at this tick's boundary."""
-        self._values = values
-        if (period := tick_period(values)) != self._pace.period:
-            self._pace.change(period, time.monotonic())
-        for port in self._ports:
-            if isinstance(port.collector, ZeroOrderHold):
-                port.collector.timeout_ns = command_timeout_ns(values)
+        self._settings = make_node_settings(values)
+        if self._settings.tick_period != self._rate_limiter.period:
+            self._rate_limiter.change(self._settings.tick_period, time.monotonic())
+        for each in self._characters:
+            each.change(self._settings)
 
     def _publish_diagnostics(self) -> None:
         if not self._diagnostics.is_heard:
@@ -355,8 +324,6 @@ class SimNode(Node):
             "timeouts": self._timeouts,
             UNLOGGED: self._once_logger.unlogged,
         }
-        values |= self._tick_times.summary() | self._pace.summary() | self._world_port.counts
-        for port in self._ports:
-            self._diagnostics.publish(
-                values | report(port), self._control.fault, below=port.actor.role.name
-            )
+        values |= self._rate_limiter.summary() | self._world.report()
+        for each in self._characters:
+            self._diagnostics.publish(values | each.report(), self._control.fault, below=each.name)

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from msgs_config import files
+from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.character.urdf_check import check_urdf
 from msgs_config.errors import CharacterError, ConfigurationError, LayoutError
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter, Value, Values, resolve
 from msgs_config.shared_parameters import (
@@ -23,13 +23,20 @@ from msgs_config.shared_parameters import (
     RATE,
     placed,
 )
-from sim_node.initial_state import POSITION, VELOCITY, check_given, initial_state_parameters
+from sim_node.initial_state import (
+    POSITION,
+    VELOCITY,
+    begins_with_reference,
+    check_given,
+    initial_state_parameters,
+)
+from sim_node.physics.probe import measure_inverse_mass
 from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import SimulationSettings
 from sim_node.physics.world import WorldSettings
 
 _LARGEST_COUNT = 2**62
-_BEFORE = (CHARACTER.name, PLACEMENT.name)  # what the other parameters depend on
+_FIRST = (CHARACTER, PLACEMENT)  # the others depend on them
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
 WORLD_PARAMETERS = [
@@ -80,7 +87,7 @@ WORLD_PARAMETERS = [
     Parameter(
         "initial_state_timeout",
         60.0,
-        "longest wait for a controller that says where a character begins; 0: no limit",
+        "longest wait for a controller that publishes where a character begins; 0: no limit",
         unit="s",
     ),
     Parameter("republish_period", 0.5, "an unanswered state is sent again", unit="s", minimum=0.01),
@@ -157,34 +164,37 @@ class CharacterParameters:
     @property
     def prefix(self) -> str:
         """What stands before the names of its parameters."""
-        return _prefix(self.name)
+        return f"{self.name}." if self.name else ""
 
 
 @dataclass(frozen=True)
 class SimulatorParameters:
     """The characters of a simulator, and its parameters as they are declared."""
 
-    parts: tuple[CharacterParameters, ...]
+    characters: tuple[CharacterParameters, ...]
     declared: tuple[Parameter, ...]
     values: Values
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the characters; empty for one alone, which has none."""
-        return tuple(part.name for part in self.parts if part.name)
+        return tuple(each.name for each in self.characters if each.name)
+
+    @property
+    def open(self) -> list[Parameter]:
+        """The parameters that wait for the state in which a controller's reference begins."""
+        waiting = [one for one in self.characters if begins_with_reference(one.values)]
+        names = {one.prefix + name for one in waiting for name in (POSITION, VELOCITY)}
+        return [parameter for parameter in self.declared if parameter.name in names]
 
     def with_values(self, changes: Mapping[str, Mapping[str, Value]]) -> "SimulatorParameters":
         """The same with other values of parameters of characters, by the characters' names."""
-        parts = [
-            replace(part, values=Values({**part.values, **changes.get(part.name, {})}))
-            for part in self.parts
-        ]
-        changed = {
-            part.prefix + name: value
-            for part in self.parts
-            for name, value in changes.get(part.name, {}).items()
-        }
-        return replace(self, parts=tuple(parts), values=Values(self.values | changed))
+        characters, values = [], dict(self.values)
+        for each in self.characters:
+            own = dict(changes.get(each.name, {}))
+            characters.append(replace(each, values=Values(each.values | own)))
+            values |= {each.prefix + name: value for name, value in own.items()}
+        return replace(self, characters=tuple(characters), values=Values(values))
 
 
 def load_parameters(given: Mapping[str, object]) -> SimulatorParameters:
@@ -196,16 +206,15 @@ def load_parameters(given: Mapping[str, object]) -> SimulatorParameters:
         ActuatedCharactersError: a parameter or a character cannot be used.
     """
     names = _names(given)
-    parts = tuple(_make_part(name, _own(given, name, names)) for name in names)
-    declared = [CHARACTERS, *WORLD_PARAMETERS]
-    shared = {p.name for part in parts for p in _of_character(part.character)}
+    characters = tuple(_load_one(name, _given_to(name, names, given)) for name in names)
+    own_parameters = [[*_FIRST, *character_parameters(each.character)] for each in characters]
+    shared = {parameter.name for own in own_parameters for parameter in own}
     values = {name: value for name, value in given.items() if name not in shared}
-    for part in parts:
-        for parameter in _of_character(part.character):
-            name = part.prefix + parameter.name
-            declared.append(replace(parameter, name=name))
-            values[name] = part.values[parameter.name]
-    return SimulatorParameters(parts, tuple(declared), resolve(declared, values))
+    declared = [CHARACTERS, *WORLD_PARAMETERS]
+    for each, own in zip(characters, own_parameters, strict=True):
+        declared += [replace(parameter, name=each.prefix + parameter.name) for parameter in own]
+        values |= {each.prefix + parameter.name: each.values[parameter.name] for parameter in own}
+    return SimulatorParameters(characters, tuple(declared), resolve(declared, values))
 
 
 def _names(given: Mapping[str, object]) -> list[str]:
@@ -221,12 +230,8 @@ def _names(given: Mapping[str, object]) -> list[str]:
     return names or [""]
 
 
-def _prefix(name: str) -> str:
-    return f"{name}." if name else ""
-
-
-def _own(given: Mapping[str, object], name: str, names: list[str]) -> dict[str, object]:
-    """What is given for one character: below its name, or else for all."""
+def _given_to(name: str, names: list[str], given: Mapping[str, object]) -> dict[str, object]:
+    """The parameters given to one character: below its name, or else for all."""
     own: dict[str, object] = {}
     for key, value in given.items():
         head, dot, rest = key.partition(".")
@@ -237,9 +242,10 @@ def _own(given: Mapping[str, object], name: str, names: list[str]) -> dict[str, 
     return own
 
 
-def _make_part(name: str, given: Mapping[str, object]) -> CharacterParameters:
+def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
     try:
-        alone = resolve([CHARACTER, PLACEMENT], {k: given[k] for k in given if k in _BEFORE})
+        first = {p.name: given[p.name] for p in _FIRST if p.name in given}
+        alone = resolve(_FIRST, first)
         character = placed(load_character(alone.text(CHARACTER.name)), alone)
         values = resolve(PARAMETERS + character_parameters(character), given)
         check_given(values, given)
@@ -249,51 +255,21 @@ def _make_part(name: str, given: Mapping[str, object]) -> CharacterParameters:
     return CharacterParameters(name, character, values)
 
 
-def _of_character(character: Character) -> list[Parameter]:
-    return [CHARACTER, PLACEMENT, *character_parameters(character)]
+def make_character_setup(
+    character: Character, values: Values, name: str = "", inverse_mass: FloatArray | None = None
+) -> CharacterSetup:
+    """The character's part in the simulation that the parameters' values say.
 
-
-def make_character_setup(character: Character, values: Values, name: str = "") -> CharacterSetup:
-    """The character's part in the simulation that the parameters' values say."""
+    `inverse_mass` (n, n) is the inverse mass matrix near the rest pose, if it was measured before.
+    """
     return CharacterSetup(
         character=character,
         commanded_joints=values.texts("commanded_joints"),
         initial_position=values.numbers(POSITION),
         initial_velocity=values.numbers(VELOCITY),
+        inverse_mass=measure_inverse_mass(character) if inverse_mass is None else inverse_mass,
         name=name,
     )
-
-
-def is_realtime(values: Values) -> bool:
-    """Whether the wall clock decides when a tick is over, and not the commands."""
-    return values.text("mode") == "realtime"
-
-
-def tick_period(values: Values) -> float:
-    """Wall time from tick to tick in s; 0 for as fast as it goes."""
-    factor = values.number("real_time_factor") or float(is_realtime(values))
-    return 1.0 / (factor * values.integer("rate")) if factor else 0.0
-
-
-def command_timeout_ns(values: Values) -> int:
-    """How long a command is held in real time, ns of simulated time."""
-    return round(values.number("command_timeout") * NANOSECONDS_PER_SECOND)
-
-
-def push_ticks(values: Values) -> int:
-    """How many ticks a push lasts."""
-    return max(round(values.number("wrench_duration") * values.integer("rate")), 1)
-
-
-def ball_ticks(values: Values) -> int:
-    """After how many ticks a ball is taken out of the way; 0: never."""
-    lifetime = values.number("ball_lifetime")
-    return max(round(lifetime * values.integer("rate")), 1) if lifetime else 0
-
-
-def display_ticks(values: Values) -> int:
-    """After how many ticks the markers are due again."""
-    return max(round(values.integer("rate") / values.number("display_rate")), 1)
 
 
 def make_settings(values: Values) -> SimulationSettings:
@@ -303,13 +279,13 @@ def make_settings(values: Values) -> SimulationSettings:
         CharacterError: the terrain's URDF cannot be read.
     """
     rate, substeps = values.integer("rate"), values.integer("substeps")
-    terrain = values.text("terrain")
+    terrain, lifetime = values.text("terrain"), values.number("ball_lifetime")
     return SimulationSettings(
         rate_hz=rate,
         substeps=substeps,
         speed_limit=values.number("speed_limit"),
         command_delay_ticks=values.integer("command_delay_ticks"),
-        ball_ticks=ball_ticks(values),
+        ball_ticks=max(round(lifetime * rate), 1) if lifetime else 0,
         world=WorldSettings(
             step_s=1.0 / (rate * substeps),
             gravity=values.number("gravity"),

@@ -194,9 +194,9 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
 
 def _check_options(options: argparse.Namespace, plan: "Plan") -> None:
     """Raise ConfigurationError where options contradict each other."""
-    from sim_node.parameters import tick_period
+    from sim_node.node_settings import make_node_settings
 
-    if options.in_process and tick_period(plan.simulator):
+    if options.in_process and make_node_settings(plan.simulator).tick_period:
         raise ConfigurationError(
             "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
             "nor a 'real_time_factor'"

@@ -21,7 +21,8 @@ from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
-from sim_node.physics.mass_matrix import make_passive_forces
+from sim_node.physics.passive_forces import PassiveForces
+from sim_node.physics.probe import measure_inverse_mass
 from sim_node.physics.wrenches import ExternalWrench
 
 _NEAR = 1e-4
@@ -71,7 +72,7 @@ class EquationOfMotion:
         self._model = DynamicsModel(character, gravity)
         self._damping = character.passive_damping()
         self._lower, self._upper = character.position_bounds()
-        self._passive = make_passive_forces(character, self._period)
+        self._passive = PassiveForces(character, self._period, measure_inverse_mass(character))
         poses = [link.inertial_pose for link in character.links]
         self._offsets = np.array([pose.position for pose in poses])  # (links, 3) m, link frames
 

@@ -66,7 +66,7 @@ class TrialWorld:
         self._period = planner.settings.period
         self._centre_at = DynamicsModel(self.plan.character).centre_of_mass_at
         self._simulation = self._fresh()
-        self._episode_ns = self._simulation.actors[0].state.stamp_ns
+        self._episode_ns = self._simulation.characters[0].state.stamp_ns
 
     def close(self) -> None:
         """End the engine."""
@@ -97,7 +97,7 @@ class TrialWorld:
         plans: list[tuple[int, Offsets]] = []
         costs: list[float] = []
         before, gains = self._planner.plan, self._controller.settings.gains
-        (actor,) = self._simulation.actors
+        (actor,) = self._simulation.characters
         pushes = push_schedule(self.plan, self._pushes)
         for tick in range(first, last):
             effort, _ = self._controller.compute_effort(actor.state, self._episode_ns)
@@ -128,7 +128,7 @@ class TrialWorld:
         return self.plan.reference.sample(self._controller.clock.time_after(tick))
 
     def _is_lost(self, tick: int) -> bool:
-        here = self._centre_at(self._simulation.actors[0].state.position)
+        here = self._centre_at(self._simulation.characters[0].state.position)
         return is_lost(here, self._centre_at(self._desired(tick).configuration.position))
 
     def _fresh(self) -> Simulation:

@@ -18,7 +18,7 @@ from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import LayoutError
 from msgs_config.messages.clock import TickClock
 from msgs_config.parameters import Values
-from sim_node.parameters import command_timeout_ns, is_realtime
+from sim_node.node_settings import make_node_settings
 
 _ARRIVAL_TICKS = 2  # by which the arrival of a command without a stamp is uncertain
 
@@ -56,15 +56,16 @@ class _Check:
     """A recording, with what decides on its commands."""
 
     def __init__(self, recording: Recording, values: Values) -> None:
-        self.is_realtime = is_realtime(values)
+        settings = make_node_settings(values)
+        self.is_realtime = settings.is_realtime
         self._recording = recording
         self._layout = recording.layout
         self._clock = TickClock(values.integer("rate"))
         self._limits = recording.character.effort_limits()
         self._may: BoolArray = self._layout.mask(values.texts("commanded_joints"))
         self._delay = values.integer("command_delay_ticks")
-        self._fills = "" if self.is_realtime else values.text("on_timeout")
-        self._timeout_ns = command_timeout_ns(values)
+        self._fills = "" if self.is_realtime else settings.on_timeout
+        self._timeout_ns = settings.command_timeout_ns
         self._zero = np.zeros(self._layout.size)
         self._nothing = np.zeros(self._layout.size, dtype=np.bool_)
         self.silent_rows: list[int] = []

@@ -157,7 +157,7 @@ class _WorldReplay:
                 if diverged is not None:
                     return offset, diverged
             difference = self._compare_balls(simulation, offset)
-            for part, actor in zip(self._parts, simulation.actors, strict=True):
+            for part, actor in zip(self._parts, simulation.characters, strict=True):
                 difference = self._compare(simulation, part, actor, offset) or difference
                 if difference is not None:
                     return offset + 1, difference

@@ -42,7 +42,7 @@ def ticks_in_process(
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))
     with Simulation([setup], make_settings(plan.simulator)) as simulation:
         simulation.watches_contacts = controller.needs_contacts
-        (character,) = simulation.actors
+        (character,) = simulation.characters
         episode_ns = character.state.stamp_ns
         for _ in range(plan.ticks):
             state = character.state

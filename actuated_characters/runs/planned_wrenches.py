@@ -11,7 +11,7 @@ from actuated_characters.runs.planned_files import Planned, read_planned
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.wrenches import WrenchArrays
-from sim_node.parameters import push_ticks
+from sim_node.node_settings import make_node_settings
 from sim_node.physics.wrenches import WrenchQueue
 
 
@@ -44,7 +44,7 @@ def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
             content.wrenches,
             content.points,
             first_tick=clock.first_tick_from(push.stamp_ns),
-            ticks=push_ticks(plan.simulator),
+            ticks=make_node_settings(plan.simulator).push_ticks,
         )
     return schedule
 

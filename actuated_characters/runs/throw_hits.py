@@ -33,7 +33,7 @@ def read_states(bag: Path) -> States | None:
 
 def watch_states(states: States, simulation: Simulation) -> None:
     """Add the present state of a simulation."""
-    states.append((simulation.actors[0].state.position, simulation.ball_motion()))
+    states.append((simulation.characters[0].state.position, simulation.ball_motion()))
 
 
 def describe_hits(plan: Plan, throws: Sequence[PlannedThrow], states: States | None) -> list[str]:

@@ -93,7 +93,7 @@ def _time_parts(walk: RunResult) -> dict[str, float]:
     setup = make_character_setup(plan.character, plan.simulator)
     physics, control = [], []
     with Simulation([setup], make_settings(plan.simulator)) as simulation:
-        (character,) = simulation.actors
+        (character,) = simulation.characters
         episode_ns = character.state.stamp_ns
         for _ in range(plan.ticks):
             began = time.perf_counter()

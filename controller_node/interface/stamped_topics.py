@@ -6,13 +6,14 @@ from trajectory_msgs.msg import JointTrajectory
 
 from controller_node.controller import Controller
 from controller_node.interface.publishers import Publishers
-from controller_node.interface.stamped_subscription import StampedSubscription, nanoseconds
+from controller_node.interface.stamped_message import decode_stamped, nanoseconds
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.joint_state import split_stamp
 from msgs_config.runtime.once_logger import OnceLogger
+from msgs_config.runtime.stamped_subscription import StampedSubscription
 
 
 class StampedTopics:
@@ -24,10 +25,10 @@ class StampedTopics:
         self._controller = controller
         self._outputs = outputs
         self._trajectories = StampedSubscription(
-            node, topics.JOINT_TRAJECTORY, "trajectory", self._set_trajectory, logger
+            node, topics.JOINT_TRAJECTORY, "refused ", self._set_trajectory, logger
         )
         self._strengths = StampedSubscription(
-            node, topics.STRENGTH, "strength", self._set_strengths, logger
+            node, topics.STRENGTH, "refused ", self._set_strengths, logger
         )
         self._now_ns = self._episode_ns = 0
 
@@ -35,8 +36,8 @@ class StampedTopics:
     def refused(self) -> dict[str, int]:
         """Numbers of rejected messages, for the diagnostics."""
         return {
-            "refused_trajectories": self._trajectories.refused,
-            "refused_strengths": self._strengths.refused,
+            "refused_trajectories": self._trajectories.rejected,
+            "refused_strengths": self._strengths.rejected,
         }
 
     def take(self, state_ns: int, episode_ns: int) -> None:
@@ -46,10 +47,11 @@ class StampedTopics:
         wrong one is rejected whole, and what was in force goes on.
         """
         self._now_ns, self._episode_ns = state_ns, episode_ns
-        self._trajectories.take(state_ns)
-        self._strengths.take(state_ns)
+        self._trajectories.take()
+        self._strengths.take()
 
-    def _set_trajectory(self, message: JointTrajectory, start_ns: int) -> None:
+    def _set_trajectory(self, raw: bytes) -> None:
+        message, start_ns = decode_stamped(raw, JointTrajectory, "trajectory", self._now_ns)
         points = message.points
         self._controller.set_trajectory(
             points_of_lists(
@@ -66,7 +68,8 @@ class StampedTopics:
         message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)
         self._outputs.publish_trajectory(message)
 
-    def _set_strengths(self, message: JointState, start_ns: int) -> None:
+    def _set_strengths(self, raw: bytes) -> None:
+        message, start_ns = decode_stamped(raw, JointState, "strength", self._now_ns)
         layout, clock = self._controller.layout, self._controller.clock
         start_ns = clock.stamp_ns(clock.first_tick_from(start_ns))
         strengths = strengths_of(layout, tuple(message.name), tuple(message.effort), start_ns)

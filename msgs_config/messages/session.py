@@ -168,3 +168,27 @@ class ForeignSessions:
             f"rejected '{topic}': its session is {named(session)}, this node's is {named(own)}; "
             f"{REMEDY}"
         )
+
+
+class OwnSession:
+    """Rejects what names the session of another simulator; what names none may be for any."""
+
+    def __init__(self, session: str, log: Callable[[str], None]) -> None:
+        """`log` is given one line for each of the first other sessions."""
+        self.session = session
+        self._log = log
+        self._foreign = ForeignSessions()
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many messages were rejected, by the topic's name."""
+        return self._foreign.counts
+
+    def rejects(self, topic: str, frame_id: str) -> bool:
+        """Whether a message with this `frame_id` is for another simulator; it is counted then."""
+        session = read_session(frame_id)
+        if session in (self.session, ANONYMOUS):
+            return False
+        if line := self._foreign.reject(topic, session, self.session):
+            self._log(line)
+        return True

@@ -21,6 +21,7 @@ _SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
 _SHORT_REST = 0.002  # s; waking up from the executor takes up to that
 _SLEEP_ERROR = 0.0002  # s by which a sleep may be late
 _MOST_TURNS = 50  # of the executor in a row, which has one callback a turn
+_MOST_DISCARDED = 20_000  # messages, more than can wait
 _BUSY_PERIOD = 0.003  # s of taking turns with other processes before the loop blocks
 
 
@@ -75,6 +76,12 @@ class DirectSubscription:
         """The next serialised message; None if there is none now."""
         received = self.take_received()
         return None if received is None else received.raw
+
+    def discard(self) -> None:
+        """Take the messages that have come so far, and do nothing with them."""
+        for _ in range(_MOST_DISCARDED):
+            if self.take() is None:
+                return
 
     def take_received(self) -> Received | None:
         """The next message with when it was published, and its number; None if there is none."""

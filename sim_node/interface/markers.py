@@ -35,48 +35,62 @@ _FIND_SECONDS = -1_987_654_321
 class MarkerEncoder:
     """Serialises where the shapes of a character and balls are, as markers in the world."""
 
-    def __init__(
-        self, character: Character, throws: Sequence[ProjectileThrow] = (), gone: int = 0
-    ) -> None:
-        """For a character, the balls of these throws, and `gone` balls that are to be taken away.
+    def __init__(self, character: Character) -> None:
+        self._links = len(character.links)
+        self._shapes = list(_shapes(character))
+        self._serialise((), 0)
 
-        The markers of the balls are numbered on from the character's.
+    def encode(
+        self,
+        stamp_ns: int,
+        origins: FloatArray,
+        turns_xyzw: FloatArray,
+        throws: Sequence[ProjectileThrow],
+        motion: FloatArray,
+    ) -> bytes:
+        """The serialised message.
+
+        The links' origins (links, 3) in m and orientations (links, 4); the balls' throws and
+        motion (m, 13). Balls that are there no more are deleted.
         """
-        parts = list(_parts(character))
-        for row, throw in enumerate(throws, start=len(character.links)):
-            parts.append((row, Shape(ShapeType.SPHERE, (throw.radius,), color_rgba=_BALL_RGBA)))
-        self._rows = [row for row, _ in parts]
-        self._offsets = np.array([part.pose.position for _, part in parts]).reshape(-1, 3)
-        turns = [part.pose.orientation_xyzw for _, part in parts]
-        self._turns_xyzw = np.array(turns).reshape(-1, 4)
-        markers = [_marker(number, part) for number, (_, part) in enumerate(parts)]
-        for number, marker in enumerate(markers):
-            marker.header.stamp.sec, marker.header.stamp.nanosec = _FIND_SECONDS, number
-            marker.pose.position = Point(x=_FIND_POSE * (number + 1))
-        deleted = [Marker(id=len(parts) + i, action=Marker.DELETE) for i in range(gone)]
-        for marker in deleted:
-            marker.header.frame_id = WORLD
-        self.takes_away = gone > 0
-        """Whether its messages take balls away."""
-        self._content = bytearray(serialize_message(MarkerArray(markers=markers + deleted)))
-        self._stamps = [
-            _find(self._content, "<iI", _FIND_SECONDS, number) for number in range(len(parts))
-        ]
-        self._poses = [
-            _find(self._content, "<d", _FIND_POSE * (number + 1)) for number in range(len(parts))
-        ]
-
-    def encode(self, stamp_ns: int, origins: FloatArray, turns_xyzw: FloatArray) -> bytes:
-        """The serialised message, of origins (b, 3) in m and orientations (b, 4): links, balls."""
-        turns = turns_xyzw[self._rows]
+        if throws != self._throws:
+            self._serialise(throws, max(len(self._throws) - len(throws), 0))
+        turns = np.concatenate((turns_xyzw, motion[:, 3:7]))[self._rows]
         poses = np.empty((len(self._rows), _POSE))
-        poses[:, :3] = origins[self._rows] + rotations.rotate(turns, self._offsets)
+        poses[:, :3] = np.concatenate((origins, motion[:, :3]))[self._rows]
+        poses[:, :3] += rotations.rotate(turns, self._offsets)
         poses[:, 3:] = rotations.multiply(turns, self._turns_xyzw)
         stamp = struct.pack("<iI", *split_stamp(stamp_ns))
         for at, pose_at, pose in zip(self._stamps, self._poses, poses, strict=True):
             self._content[at : at + len(stamp)] = stamp
             self._content[pose_at : pose_at + pose.nbytes] = pose.tobytes()
-        return bytes(self._content)
+        content = bytes(self._content)
+        if self._deletes:  # once is enough
+            self._serialise(throws, 0)
+        return content
+
+    def _serialise(self, throws: Sequence[ProjectileThrow], gone: int) -> None:
+        """Serialise a message of the shapes, balls and `gone` deleted balls, and find its numbers.
+
+        The markers of the balls are numbered on from the character's.
+        """
+        shapes = self._shapes + [
+            (row, Shape(ShapeType.SPHERE, (throw.radius,), color_rgba=_BALL_RGBA))
+            for row, throw in enumerate(throws, start=self._links)
+        ]
+        self._throws, self._deletes = throws, gone > 0
+        self._rows = [row for row, _ in shapes]
+        self._offsets = np.array([shape.pose.position for _, shape in shapes]).reshape(-1, 3)
+        turns = [shape.pose.orientation_xyzw for _, shape in shapes]
+        self._turns_xyzw = np.array(turns).reshape(-1, 4)
+        markers = [_marker(number, shape) for number, (_, shape) in enumerate(shapes)]
+        deleted = [Marker(id=len(shapes) + i, action=Marker.DELETE) for i in range(gone)]
+        for marker in deleted:
+            marker.header.frame_id = WORLD
+        self._content = bytearray(serialize_message(MarkerArray(markers=markers + deleted)))
+        numbers = range(len(shapes))
+        self._stamps = [_find(self._content, "<iI", _FIND_SECONDS, number) for number in numbers]
+        self._poses = [_find(self._content, "<d", _FIND_POSE * (n + 1)) for n in numbers]
 
 
 def _find(content: bytes | bytearray, form: str, *numbers: float) -> int:
@@ -87,7 +101,7 @@ def _find(content: bytes | bytearray, form: str, *numbers: float) -> int:
     return at
 
 
-def _parts(character: Character) -> Iterator[tuple[int, Shape]]:
+def _shapes(character: Character) -> Iterator[tuple[int, Shape]]:
     """Every shape with its link's row; a capsule as a cylinder and two spheres."""
     for row, link in enumerate(character.links):
         for shape in link.shapes:
@@ -96,10 +110,12 @@ def _parts(character: Character) -> Iterator[tuple[int, Shape]]:
 
 
 def _marker(number: int, shape: Shape) -> Marker:
-    red, green, blue, alpha = shape.color_rgba
+    """A marker whose stamp and pose are the numbers that are looked for."""
     marker = Marker(type=_TYPES[shape.type], id=number, scale=_scale(shape))
     marker.header.frame_id = WORLD
-    marker.color = ColorRGBA(r=red, g=green, b=blue, a=alpha)
+    marker.header.stamp.sec, marker.header.stamp.nanosec = _FIND_SECONDS, number
+    marker.pose.position = Point(x=_FIND_POSE * (number + 1))
+    marker.color = ColorRGBA(**dict(zip("rgba", shape.color_rgba, strict=True)))
     if shape.mesh:
         marker.mesh_resource = Path(shape.mesh).as_uri()
         marker.mesh_use_embedded_materials = True
@@ -109,13 +125,10 @@ def _marker(number: int, shape: Shape) -> Marker:
 def _scale(shape: Shape) -> Vector3:
     """A marker's edges or diameters."""
     if shape.type is ShapeType.SPHERE:
-        return _vector(np.full(3, 2.0 * shape.size[0]))
+        (radius,) = shape.size
+        return Vector3(x=2.0 * radius, y=2.0 * radius, z=2.0 * radius)
     if shape.type is ShapeType.CYLINDER:
         radius, length = shape.size
-        return _vector(np.array((2.0 * radius, 2.0 * radius, length)))
-    return _vector(np.array(shape.size))
-
-
-def _vector(values: FloatArray) -> Vector3:
-    x, y, z = values.tolist()
+        return Vector3(x=2.0 * radius, y=2.0 * radius, z=length)
+    x, y, z = shape.size
     return Vector3(x=x, y=y, z=z)

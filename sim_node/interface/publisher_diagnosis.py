@@ -1,13 +1,16 @@
-"""What to tell a user whose simulator waits: what is missing, and who could send it."""
+"""Describes to the user which nodes publish on a topic: missing, conflicting and competing ones."""
 
 import time
+from collections.abc import Sequence
 
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
+from msgs_config.messages.session import REMEDY
 from msgs_config.messages.topics import Topic
+from msgs_config.runtime.once_logger import OnceLogger
 
-UNKNOWN_NODE = "a node whose name is not known"
+_UNKNOWN_NODE = "a node whose name is not known"
 _NAMES_SHOWN = 6
 _UNKNOWN = "_UNKNOWN_"  # in what ROS says of a node whose name has not come yet
 _NAME_PATIENCE, _NAME_POLL = 1.0, 0.01  # s
@@ -20,45 +23,99 @@ def describe_waiting(node: Node, topic: Topic, missing: list[str]) -> str:
     return f"waiting for commands of {shown}{more}; {describe_publishers(node, topic)}"
 
 
-def describe_conflict(joint: str, topic: Topic, senders: list[str]) -> str:
-    """One sentence: the entry that is commanded twice, and who publishes commands."""
-    return (
-        f"two different commands for '{joint}' at one tick; '{topic.name}' is published by "
-        + ", ".join(senders)
-    )
-
-
-def publisher_names(node: Node, topic: Topic, *, wait_for_names: bool = True) -> list[str]:
-    """Full names of the nodes that publish on a topic.
-
-    A publisher is discovered a moment before the name of its node, which is worth a short wait
-    where there is time for it.
-    """
-    deadline = time.monotonic() + (_NAME_PATIENCE if wait_for_names else 0.0)
-    while True:
-        infos = node.get_publishers_info_by_topic(topic.name)
-        names = {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}
-        unknown = {name for name in names if _UNKNOWN in name}
-        if not unknown or time.monotonic() > deadline:
-            return sorted(names - unknown) + [UNKNOWN_NODE] * bool(unknown)
-        time.sleep(_NAME_POLL)
-
-
-def all_publisher_names(node: Node, topic: Topic) -> list[str] | None:
-    """The full name of each publisher's node, one for each publisher; None if one is to come."""
-    infos = node.get_publishers_info_by_topic(topic.name)
-    names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos]
-    return None if any(_UNKNOWN in name for name in names) else sorted(names)
+def describe_conflict(node: Node, joint: str, topic: Topic) -> str:
+    """One sentence: the entry that is commanded twice, and the nodes that publish commands."""
+    return _conflict(joint, topic, publisher_names(node, topic))
 
 
 def describe_publishers(node: Node, topic: Topic) -> str:
     """One sentence: the nodes that publish on a topic, and whose QoS does not fit."""
     infos = node.get_publishers_info_by_topic(topic.name)
     if not infos:
-        return f"nobody publishes on '{topic.name}'"
+        return f"'{topic.name}' has no publisher"
     sentence = f"'{topic.name}' is published by {', '.join(publisher_names(node, topic))}"
     for info in infos:
         compatibility, reason = qos_check_compatible(info.qos_profile, topic.qos)
         if compatibility == QoSCompatibility.ERROR:
             sentence += f"; the QoS of {info.node_name} does not fit: {reason.strip()}"
     return sentence
+
+
+def publisher_names(node: Node, topic: Topic) -> list[str]:
+    """Full names of the nodes that publish on a topic.
+
+    A publisher is discovered a moment before the name of its node, which is worth a short wait.
+    """
+    deadline = time.monotonic() + _NAME_PATIENCE
+    while _UNKNOWN_NODE in (names := _names(node, topic)) and time.monotonic() < deadline:
+        time.sleep(_NAME_POLL)
+    return sorted(set(names))
+
+
+def _names(node: Node, topic: Topic) -> list[str]:
+    """The full name of each publisher's node, one for each publisher; unknown ones last."""
+    infos = node.get_publishers_info_by_topic(topic.name)
+    names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos]
+    known = sorted(name for name in names if _UNKNOWN not in name)
+    return known + [_UNKNOWN_NODE] * (len(names) - len(known))
+
+
+def _conflict(joint: str, topic: Topic, senders: Sequence[str]) -> str:
+    return (
+        f"two different commands for '{joint}' at one tick; '{topic.name}' is published by "
+        + ", ".join(senders)
+    )
+
+
+class ConflictLog:
+    """Logs in real time which nodes compete for a joint, once for each, when they are known."""
+
+    def __init__(self, node: Node, logger: OnceLogger) -> None:
+        self._node = node
+        self._once_logger = logger
+        self._topics: dict[str, Topic] = {}  # by joint
+
+    def add(self, joint: str, topic: Topic) -> None:
+        """Note a conflict of commands for a joint; finding out who publishes takes its time."""
+        self._topics[joint] = topic
+
+    def log(self) -> None:
+        """Log the conflicts whose publishers' names are known."""
+        for joint, topic in self._topics.items():
+            if not self._once_logger.has_logged(joint):
+                senders = _names(self._node, topic)
+                if _UNKNOWN_NODE not in senders:
+                    sentence = _conflict(joint, topic, sorted(set(senders)))
+                    self._once_logger.log_once(f"{sentence}; the last one counts", kind=joint)
+
+
+class OtherSimulators:
+    """Logs, once for each set of names, that a topic of states has more than one publisher."""
+
+    def __init__(
+        self, node: Node, states: Sequence[Topic], session: str, logger: OnceLogger
+    ) -> None:
+        self._node = node
+        self._states = states
+        self._session = session
+        self._once_logger = logger
+        self.seen = False  # at the last look
+
+    def look(self) -> None:
+        """Look at the graph; cheap as long as this node is alone."""
+        shared = [topic for topic in self._states if self._node.count_publishers(topic.name) > 1]
+        self.seen = bool(shared)
+        for topic in shared:
+            self._log(topic)
+
+    def _log(self, topic: Topic) -> None:
+        own, names = self._node.get_fully_qualified_name(), _names(self._node, topic)
+        if _UNKNOWN_NODE in names or own not in names:  # they are yet to come
+            return
+        names.remove(own)
+        if names:
+            others = ", ".join(names)
+            self._once_logger.log_once(
+                f"'{topic.name}' of this node, {own} (session {self._session}), is published by "
+                f"{others} as well; unless that was killed just now, {REMEDY}"
+            )

@@ -1,107 +1,161 @@
-"""What the simulator publishes of one character, tick by tick."""
+"""The publishers of one character: state, contacts, wrenches, episode, and what ROS tools show."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
 
+import numpy as np
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import Header, String
 
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import UrdfOptions
 from msgs_config.character.robot_description import robot_description
-from msgs_config.messages import topics
-from msgs_config.messages.joint_state import JointStateEncoder, split_stamp, with_stamp
+from msgs_config.geometry import rotations
+from msgs_config.messages import configuration, topics
+from msgs_config.messages.joint_state import (
+    DoublesEncoder,
+    JointStateEncoder,
+    split_stamp,
+    with_stamp,
+)
+from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Outgoing, Topic
-from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches, select
-from sim_node.interface.display import Display
+from msgs_config.messages.wrenches import WORLD, WrenchArrays, encode_wrenches, select
+from msgs_config.parameters import Values
+from msgs_config.runtime.polling import PollingExecutor
+from msgs_config.runtime.process import StopSignal
+from sim_node.interface.markers import MarkerEncoder
 from sim_node.physics.simulated_character import SimulatedCharacter
+from sim_node.timing.watchdog import Watchdog, WatchdogEvent
+
+try:  # a full ROS install has it, the wheels have not
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    TFMessage = None
+
+_ODOMETRY_DOUBLES = 85  # position, orientation, 36 of a covariance, twist, 36 of a covariance
+_POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
+_LINEAR, _ANGULAR = slice(43, 46), slice(46, 49)
 
 
 class Publishers:
-    """The publishers of one character. A topic that nobody listens to costs nothing."""
+    """The publishers of one character. A topic without subscribers costs nothing."""
 
     def __init__(
-        self, node: Node, actor: SimulatedCharacter, display_ticks: int, session: str
+        self, node: Node, character: SimulatedCharacter, display_ticks: int, session: str
     ) -> None:
         """Offer the topics, below the character's name; markers come every `display_ticks`.
 
-        What is said names the simulator's session.
+        `session` is the simulator's, which messages name.
         """
-        self._actor = actor
+        self._character = character
         self._session = session
-        self._no_wrenches = encode_wrenches(WrenchArrays.of_rows(0, [], [], [], session))
-        namespace = actor.role.name
         self._display_ticks = display_ticks
-        self._encoder = JointStateEncoder(actor.layout.dof_names, session)
-        self._links = [link.name for link in actor.character.links]
+        self._links = [link.name for link in character.character.links]
+        self._base = character.setup.prefix + self._links[0]
+        self._last_state = b""
+        self._last_episode: Header | None = None
+        self._make_encoders()
 
         def offer(topic: Topic) -> Publisher:
-            return topics.create_publisher(node, topic.under(namespace))
+            return topics.create_publisher(node, topic.under(character.setup.name))
 
         self._episode = offer(topics.EPISODE)
         self._configuration = offer(topics.CONFIGURATION.of(node.get_name()))
         self._states = offer(topics.JOINT_STATES)
         self._contacts = offer(topics.CONTACTS)
         self._wrenches = offer(topics.APPLIED_WRENCH)
-        self._display = Display(node, actor, namespace)
-        self._last_state = b""
-        self._last_episode: Header | None = None
-        description = robot_description(actor.character)
+        self._odometry = offer(topics.ODOM)
+        self._visualization = offer(topics.VISUALIZATION)
+        self._transforms = None
+        if TFMessage is not None:
+            self._transforms = node.create_publisher(TFMessage, "/tf", topics.STREAM_QOS)
+        description = robot_description(character.character)
         if description is not None:
             self._description = offer(topics.ROBOT_DESCRIPTION)
             self._description.publish(String(data=description))
 
+    def _make_encoders(self) -> None:
+        session = self._session
+        self._state_encoder = JointStateEncoder(self._character.layout.dof_names, session)
+        self._no_wrenches = encode_wrenches(WrenchArrays.of_rows(0, [], [], [], session))
+        self._odometry_encoder = DoublesEncoder(WORLD, self._base)
+        self._markers = MarkerEncoder(self._character.character)
+
     @property
     def state_subscribers(self) -> int:
-        """How many subscribe to the states."""
+        """Number of subscribers of the states."""
         return int(self._states.get_subscription_count())
 
     @property
     def wants_contacts(self) -> bool:
-        """Whether anybody listens to the contacts."""
+        """Whether the contacts have subscribers."""
         return bool(self._contacts.get_subscription_count())
 
-    def publish_configuration(self, text: str) -> None:
-        """Publish the JSON text that a bag needs to repeat the run."""
+    def publish_configuration(
+        self,
+        values: Values,
+        sample: DynamicsSample,
+        terrain: UrdfOptions | None,
+        characters: Sequence[str],
+    ) -> None:
+        """Publish all that the character's run depends on, as a bag needs it to repeat the run.
+
+        `values` are the character's parameters, its initial state among them; `characters` are the
+        names of all in the world, where there are several.
+
+        Raises:
+            CharacterError: a mesh of the character or of the terrain cannot be read.
+        """
+        text = configuration.describe(
+            self._character.character,
+            values,
+            probe=sample,
+            terrain=terrain,
+            name=self._character.setup.name,
+            characters=characters,
+            session=self._session,
+        )
         self._configuration.publish(String(data=text))
 
     def publish_episode(self, number: int, stamp_ns: int) -> None:
         """Publish that an episode begins with the state of this stamp."""
-        seconds, nanoseconds = split_stamp(stamp_ns)
-        stamp = Time(sec=seconds, nanosec=nanoseconds)
-        frame_id = episode_text(number, self._session)
-        self._last_episode = Header(stamp=stamp, frame_id=frame_id)
+        self._last_episode = _header(stamp_ns, episode_text(number, self._session))
         self._episode.publish(self._last_episode)
 
     def before_state(self) -> Iterator[Outgoing]:
-        """What a controller may wait for beside a tick's state, which comes after it."""
-        if self._actor.contacts is not None and self.wants_contacts:
+        """The messages that a controller may wait for beside a tick's state, which follows them."""
+        if self._character.contacts is not None and self.wants_contacts:
             yield self._contacts, self._encode_contacts()
         if self._wrenches.get_subscription_count():
             yield self._wrenches, self._encode_applied()
 
     def state(self) -> Outgoing:
         """The state of a tick."""
-        state = self._actor.state
+        state = self._character.state
         effort = () if state.effort is None else (state.effort,)
-        self._last_state = self._encoder.encode(
+        self._last_state = self._state_encoder.encode(
             state.stamp_ns, state.position, state.velocity, *effort
         )
         return self._states, self._last_state
 
     def publish_display(self, tick: int) -> None:
-        """Publish what shows a tick's state; made while the controller works on that."""
-        self._display.publish_base()
-        if tick % self._display_ticks == 0 or self._actor.state.effort is None:
-            self._display.publish_markers()
+        """Publish what shows a tick's state, while the controller works on that state."""
+        self._publish_base()
+        if tick % self._display_ticks == 0 or self._character.state.effort is None:
+            self._publish_markers()
 
     def republish(self, *, with_state: bool, with_episode: bool) -> None:
-        """Publish the markers again, and the last state, the same bytes, for late joiners.
+        """Publish the markers again, and the last state, the same bytes, for late subscribers.
 
         A controller that needs the contacts waits for those as well. The episode shows that a
         simulator that is paused or held back is still there.
         """
-        self._display.publish_markers()
+        self._publish_markers()
         if with_episode and self._last_episode is not None:
             self._episode.publish(self._last_episode)
         if with_state:
@@ -109,22 +163,30 @@ class Publishers:
                 self._contacts.publish(self._encode_contacts())
             self._states.publish(self._last_state)
 
-    def flush(self, seconds: float) -> bool:
-        """Wait until every subscriber has the last tick, at the most `seconds`; whether it has."""
-        own = (self._states, self._contacts, self._wrenches)
-        return topics.flush((*own, *self._display.publishers), seconds)
+    @property
+    def of_ticks(self) -> list[Publisher]:
+        """The publishers of what comes again at each tick."""
+        every = (
+            self._states,
+            self._contacts,
+            self._wrenches,
+            self._odometry,
+            self._visualization,
+            self._transforms,
+        )
+        return [publisher for publisher in every if publisher is not None]
 
     def _encode_contacts(self) -> bytes:
-        """What touched; nothing if nobody listened while it happened."""
-        contacts, stamp_ns = self._actor.contacts, self._actor.state.stamp_ns
+        """The contacts; none if the topic had no subscriber while they happened."""
+        contacts, stamp_ns = self._character.contacts, self._character.state.stamp_ns
         if contacts is None:
             return with_stamp(self._no_wrenches, stamp_ns)
         touching = (self._links, contacts.wrenches, contacts.touching)
         return encode_wrenches(select(stamp_ns, *touching, self._session))
 
     def _encode_applied(self) -> bytes:
-        """What pushed during the tick."""
-        pushes, stamp_ns = self._actor.pushes, self._actor.state.stamp_ns
+        """The pushes that acted during the tick."""
+        pushes, stamp_ns = self._character.pushes, self._character.state.stamp_ns
         if not pushes:
             return with_stamp(self._no_wrenches, stamp_ns)
         return encode_wrenches(
@@ -136,3 +198,64 @@ class Publishers:
                 self._session,
             )
         )
+
+    def _publish_base(self) -> None:
+        """Publish the base link's pose and twist, if there are subscribers."""
+        odometry = self._odometry.get_subscription_count()
+        transforms = self._transforms and self._transforms.get_subscription_count()
+        if not (odometry or transforms):
+            return
+        origin, turn = self._character.base_frame()
+        if odometry:
+            self._odometry.publish(self._encode_odometry(origin, turn))
+        if self._transforms and transforms:
+            header = _header(self._character.state.stamp_ns, WORLD)
+            transform = TransformStamped(header=header, child_frame_id=self._base)
+            transform.transform.translation = Vector3(**dict(zip("xyz", origin, strict=True)))
+            transform.transform.rotation = Quaternion(**dict(zip("xyzw", turn, strict=True)))
+            self._transforms.publish(TFMessage(transforms=[transform]))
+
+    def _encode_odometry(self, origin: FloatArray, turn: FloatArray) -> bytes:
+        """The serialised message; its covariances are zero, which means unknown."""
+        values = np.zeros(_ODOMETRY_DOUBLES)
+        values[_POSITION], values[_ORIENTATION] = origin, turn
+        if self._character.layout.has_floating_base:
+            velocity = self._character.state.velocity
+            values[_LINEAR] = rotations.rotate(rotations.conjugate(turn), velocity[:3])
+            values[_ANGULAR] = velocity[3:6]
+        return self._odometry_encoder.encode(self._character.state.stamp_ns, values)
+
+    def _publish_markers(self) -> None:
+        """Publish the shapes and the world's balls where they are, if there are subscribers."""
+        if self._visualization.get_subscription_count():
+            balls = self._character.balls
+            origins, turns = self._character.link_frames()
+            self._visualization.publish(
+                self._markers.encode(
+                    self._character.state.stamp_ns, origins, turns, balls.throws, balls.motion()
+                )
+            )
+
+
+def wait_for_subscribers(
+    node: Node,
+    publishers: Sequence[Publishers],
+    wanted: int,
+    stop: StopSignal,
+    executor: PollingExecutor,
+) -> None:
+    """Wait until the states of every character have as many subscribers, or until `stop`."""
+    watchdog = Watchdog()
+    watchdog.restart(time.monotonic())
+    while not stop and (found := min(each.state_subscribers for each in publishers)) < wanted:
+        executor.rest()
+        if WatchdogEvent.EXPLAIN in watchdog.due(time.monotonic()):
+            node.get_logger().warning(
+                f"waiting for {wanted} subscribers of joint_states; there are {found}; has one "
+                "not started, or ended?"
+            )
+
+
+def _header(stamp_ns: int, frame_id: str) -> Header:
+    seconds, nanoseconds = split_stamp(stamp_ns)
+    return Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame_id)

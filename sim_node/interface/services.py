@@ -27,23 +27,23 @@ class Services:
         self._control = control
         self._resume = resume
         self._reset = reset
-        self._steps: Future | None = None  # of what ended them; empty if they are done
+        self._steps: Future | None = None  # of the reason that ended them
         node.create_service(SetBool, "~/pause", self._on_pause)
-        # of its own group: in the node's it would keep all others waiting until its steps are done
+        # in another group: in the node's it would keep all others waiting until its steps are done
         group = ReentrantCallbackGroup()
         node.create_service(Trigger, "~/step", self._on_step, callback_group=group)
         node.create_service(Trigger, "~/reset", self._on_reset)
 
     def end_steps(self, reason: str = "") -> None:
-        """Let a call of `~/step` be answered, if there is one; why, unless its steps are done."""
+        """Answer a call of `~/step`, if there is one; `reason` is empty if its steps are done."""
         if self._steps is not None:
             self._steps.set_result(reason)
             self._steps = None
 
-    def end(self, spinner: PollingExecutor) -> None:
-        """Answer what is still to be answered; the simulation ends."""
+    def end(self, executor: PollingExecutor) -> None:
+        """Answer all open calls; the simulation ends."""
         self.end_steps("the simulation ends")
-        spinner.serve_pending()  # the last step may have been the run's last tick
+        executor.serve_pending()  # the last step may have been the run's last tick
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         response.success = True

@@ -1,4 +1,4 @@
-"""One character in the engine: its state read and its efforts applied, in URDF link frames.
+"""One character in the engine: states and forces of its joints and links, in URDF link frames.
 
 PyBullet's base pose and velocity, and a ball joint's rotation, velocity and torque, are those of
 *inertial* frames. With `o` the orientation of a link's inertial frame in its link frame, a ball
@@ -6,47 +6,73 @@ joint's rotation `q` in the engine is `o q o^-1` here, its velocity `w` is `o w`
 orientation `q` in the engine is `q o^-1` here.
 """
 
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from msgs_config.arrays import FloatArray
+from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.bullet import load_urdf, pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
-from msgs_config.geometry import frames, rotations
-from sim_node.physics.links import Links
+from msgs_config.geometry import fixed_order, frames, rotations
 
 _UNLIMITED_SPEED = 1e9  # Bullet clamps at 100 otherwise, and a divergence would stay unseen
+_FAR = 1e3  # m, beyond which the engine need not look for what is near
+
+
+class Touch(NamedTuple):
+    """One contact as one of its two links feels it; world axes."""
+
+    link: int  # the engine's number
+    force: Sequence[float]  # (3,) N
+    point: Sequence[float]  # (3,) m, where the engine let the force act
+
+
+TouchedLinks: TypeAlias = Mapping[int, Sequence[Touch]]
+"""By body number, what touches its links."""
 
 
 class Body:
-    """A character loaded into an engine. Positions, velocities and efforts are (n,) arrays."""
+    """A character loaded into an engine.
+
+    Positions, velocities and efforts are (n,) arrays in message form; arrays of links have one row
+    a link, in the order of `Character.links`.
+    """
 
     def __init__(self, client: int, character: Character, friction: float) -> None:
+        """Load the character; `friction` is that of every link.
+
+        Raises:
+            CharacterError: the engine refuses the URDF or a mesh.
+        """
         self._client = client
         self._layout = character.layout
         self._body = load_urdf(client, character.loading)
         self._floating = self._layout.has_floating_base
-        base = character.links[0]
-        self._base_offset = base.inertial_pose.position
-        self._base_turn = np.array(base.inertial_pose.orientation_xyzw)
-        self._base_turn_back: list[float] = rotations.conjugate(self._base_turn).tolist()
+        poses = [link.inertial_pose for link in character.links]
+        self._offsets = np.array([pose.position for pose in poses])
+        turns = np.array([pose.orientation_xyzw for pose in poses])
+        self._turns_back = rotations.conjugate(turns)
+        self._base_offset = poses[0].position
+        self._base_turn = turns[0]
+        self._base_turn_back: list[float] = self._turns_back[0].tolist()
         self._find_joints(character)
         self._remove_motors_and_damping(friction)
         if not self._floating:
-            pose = base.joint.pose_in_parent
+            pose = character.links[0].joint.pose_in_parent
             self._place_base(np.array(pose.position), np.array(pose.orientation_xyzw))
 
     def _find_joints(self, character: Character) -> None:
-        """Where each joint of the layout is in the engine, and its entries in what it returns."""
+        """Find each link and joint in the engine, and the entries of each joint."""
         count = pybullet.getNumJoints(self._body, physicsClientId=self._client)
         infos = [
             pybullet.getJointInfo(self._body, i, physicsClientId=self._client) for i in range(count)
         ]
         numbers = {info[1].decode(): info[0] for info in infos}
-        in_order = [-1, *(numbers[link.joint.name] for link in character.links[1:])]
-        self.links = Links(self._client, self._body, character, in_order)
+        # the engine's number of each link; -1 is the base
+        self._numbers = [-1, *(numbers[link.joint.name] for link in character.links[1:])]
+        self._row = {number: row for row, number in enumerate(self._numbers)}
         joints = [j for j in self._layout.joints if j.type is not JointType.FLOATING]
         self._joints = [numbers[joint.name] for joint in joints]
         self._entries = [joint.entries for joint in joints]
@@ -59,7 +85,7 @@ class Body:
         ]
 
     def _remove_motors_and_damping(self, friction: float) -> None:
-        """Take away what the engine adds of its own, and set the friction."""
+        """Switch off the engine's default motors and damping, and set the friction."""
         # One call a setting: a link silently loses some of those that share a call.
         settings = (
             {"linearDamping": 0.0, "angularDamping": 0.0},
@@ -93,7 +119,7 @@ class Body:
             )
 
     def read(self) -> tuple[FloatArray, FloatArray]:
-        """Position and velocity (n,), message form."""
+        """Position and velocity (n,)."""
         position: list[float] = []
         velocity: list[float] = []
         if self._floating:
@@ -158,6 +184,106 @@ class Body:
         pybullet.applyExternalTorque(
             self._body, -1, torque, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
+
+    def base_frame(self) -> tuple[FloatArray, FloatArray]:
+        """Origin (3,) in m and orientation xyzw (4,) of the base link in the world."""
+        origin, turn, _ = self._base_frame()
+        return np.array(origin), np.array(turn)
+
+    def link_frames(self) -> tuple[FloatArray, FloatArray]:
+        """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""
+        states = self._link_states()
+        centres = np.array([state[0] for state in states])
+        turns = rotations.multiply(np.array([state[1] for state in states]), self._turns_back)
+        return centres - rotations.rotate(turns, self._offsets), turns
+
+    def centres(self) -> list[Sequence[float]]:
+        """Centres of mass (links, 3) in the world, m; plain numbers, of which few are used."""
+        return [state[0] for state in self._link_states()]
+
+    def kinetic_energy(self) -> float:
+        """Kinetic energy of all links, J, by the engine's own masses, inertia and velocities."""
+        energy = 0.0
+        for number, state in zip(self._numbers, self._link_states(velocities=True), strict=True):
+            _, turn, *_, linear, angular = map(np.array, state)
+            mass, _, inertia, *_ = pybullet.getDynamicsInfo(
+                self._body, number, physicsClientId=self._client
+            )
+            spin = rotations.rotate(rotations.conjugate(turn), angular)  # about principal axes
+            moving = mass * fixed_order.dot(linear, linear)
+            energy += 0.5 * float(moving + fixed_order.dot(spin * spin, np.array(inertia)))
+        return energy
+
+    def push(self, pushes: Iterable[tuple[int, FloatArray, FloatArray]]) -> None:
+        """Push links during the engine's next step, and only then.
+
+        Of each push: the link's row, its wrench (6,) in N and N m, world axes, and the point (3,)
+        in m, link frame, at which the force acts; that adds the torque `r x f` about the centre of
+        mass.
+        """
+        origins, turns = self.link_frames()
+        world = {"flags": pybullet.WORLD_FRAME, "physicsClientId": self._client}
+        for row, wrench, point in pushes:
+            number, at = self._numbers[row], origins[row] + rotations.rotate(turns[row], point)
+            pybullet.applyExternalForce(self._body, number, wrench[:3], at, **world)
+            pybullet.applyExternalTorque(self._body, number, wrench[3:], **world)
+
+    def contact_wrenches(
+        self, touched: TouchedLinks, centres: Sequence[Sequence[float]]
+    ) -> tuple[FloatArray, BoolArray]:
+        """Net contact wrench (links, 6) of what touches, world axes; and which links do (links,).
+
+        It is the force in N, and the torque in N m about `centres` (links, 3), the links' centres
+        of mass when the engine's step began. A contact between two links of the body counts on
+        both, in opposite directions.
+        """
+        sums: dict[int, list[float]] = {}  # by row; plain numbers: of few contacts it is faster
+        for number, (fx, fy, fz), (px, py, pz) in touched.get(self._body, ()):
+            row = self._row[number]
+            cx, cy, cz = centres[row]
+            x, y, z = px - cx, py - cy, pz - cz
+            total = sums.setdefault(row, [0.0] * 6)
+            total[0] += fx
+            total[1] += fy
+            total[2] += fz
+            total[3] += y * fz - z * fy
+            total[4] += z * fx - x * fz
+            total[5] += x * fy - y * fx
+        wrenches = np.zeros((len(self._numbers), 6))
+        touching = np.zeros(len(self._numbers), dtype=np.bool_)
+        for row, total in sums.items():
+            wrenches[row], touching[row] = total, True
+        return wrenches, touching
+
+    def gaps(self, other: int) -> FloatArray:
+        """Distance (links,) of each link's surface to another body's, m; inf where there is none.
+
+        `other` is the engine's number of that body.
+        """
+        gaps = np.full(len(self._numbers), np.inf)
+        for point in pybullet.getClosestPoints(
+            self._body, other, distance=_FAR, physicsClientId=self._client
+        ):
+            row, distance = self._row[point[3]], point[8]
+            gaps[row] = min(gaps[row], distance)
+        return gaps
+
+    def _link_states(self, *, velocities: bool = False) -> Sequence[tuple[Sequence[float], ...]]:
+        """Of each link the inertial frame's centre and orientation, and at the end its velocities.
+
+        Velocities are linear (m/s) and angular (rad/s, world) ones, about the centre.
+        """
+        body, client = self._body, self._client
+        base = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
+        if velocities:
+            base += pybullet.getBaseVelocity(body, physicsClientId=client)
+        moving = self._numbers[1:]
+        if not moving:
+            return (base,)
+        states = pybullet.getLinkStates(
+            body, moving, int(velocities), computeForwardKinematics=1, physicsClientId=client
+        )
+        return (base, *states)
 
     def _base_frame(self) -> tuple[frames.Triple, frames.Quaternion, frames.Axes]:
         """Origin in m, orientation xyzw and axes of the base link in the world."""

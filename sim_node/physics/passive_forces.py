@@ -1,4 +1,4 @@
-"""Forces that a character's joints have of themselves: damping, and the soft limits of ball joints.
+"""Passive forces of a character's joints: damping, and the soft limits of ball joints.
 
 A soft limit is a spring and a damper outside of bounds on the components of a joint's rotation
 vector r. With e the excess of a component over its bound, the force against it is
@@ -35,7 +35,7 @@ _ROUNDING = 1e-12  # of a force, that may be wrong without consequence
 class PassiveForces:
     """The passive forces of one character, for an engine that adds them at each of its steps.
 
-    `active` says whether there are any, `warnings` what the user should know of them.
+    `active` is true if there are any; `warnings` are for the user.
     """
 
     def __init__(self, character: Character, step_s: float, inverse_mass: FloatArray) -> None:

@@ -1,4 +1,6 @@
-"""Probes the engine: one state of a character, one effort, one short step."""
+"""The engine probed by short steps: a character's inverse mass matrix, and one dynamics sample."""
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -6,15 +8,12 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
 from msgs_config.messages.probe import DynamicsSample
-from sim_node.physics.mass_matrix import (
-    INSTANT,
-    clear_of_limits,
-    measure_inverse_mass_matrix,
-    passing_through_itself,
-    still_settings,
-)
+from sim_node.physics.body import Body
 from sim_node.physics.passive_forces import PassiveForces
-from sim_node.physics.world import World
+from sim_node.physics.world import World, WorldSettings
+
+INSTANT = 1e-7
+"""An engine step, s, so short that a difference quotient over it is a derivative."""
 
 _SEED = 1
 _ROOT_ENTRIES = 6
@@ -23,12 +22,33 @@ _SPEED = 1.0  # rad/s or m/s, at the most
 _ACCELERATION = 10.0  # rad/s^2 or m/s^2 that one effort alone leads to, at the most
 
 
-def measure_probe(character: Character, gravity: float) -> DynamicsSample:
-    """What the engine makes of a character in a state that has a bit of everything.
+def still_settings(gravity: float) -> WorldSettings:
+    """A world without ground, which advances by an instant."""
+    return WorldSettings(step_s=INSTANT, gravity=gravity, ground=False)
 
-    The state is off the rest pose and within all limits; it moves in every degree of freedom. Each
-    effort is such as to accelerate its own one by about as much as gravity does, so that none
-    hides another.
+
+def measure_inverse_mass(character: Character) -> FloatArray:
+    """The inverse mass matrix (n, n) near the rest pose, as far as passive forces need it.
+
+    All zeros where no joint has damping or a soft limit.
+    """
+    if any(joint.damping or joint.soft_limit for joint in character.moving_joints):
+        with World(still_settings(gravity=0.0)) as world:
+            return _inverse_mass_matrix(world, _add_without_collisions(world, character), character)
+    return np.zeros((character.layout.size,) * 2)
+
+
+def measure_probe(character: Character, gravity: float) -> DynamicsSample:
+    """The dynamics sample of `probe_engine` alone."""
+    return probe_engine(character, gravity)[0]
+
+
+def probe_engine(character: Character, gravity: float) -> tuple[DynamicsSample, FloatArray]:
+    """What the engine makes of a character: a dynamics sample, and the inverse mass matrix (n, n).
+
+    The sample's state is off the rest pose and within all limits; it moves in every degree of
+    freedom. Each effort is such as to accelerate its own one by about as much as gravity does, so
+    that none hides another.
 
     Args:
         character: The character.
@@ -41,25 +61,57 @@ def measure_probe(character: Character, gravity: float) -> DynamicsSample:
     rng = np.random.default_rng(_SEED)
     position = _position(character, rng)
     velocity = rng.uniform(-_SPEED, _SPEED, layout.size)
-    inverse_mass = measure_inverse_mass_matrix(character)
-    yielding = np.diag(inverse_mass)
-    _check_yielding(character, yielding)
-    effort = rng.uniform(-_ACCELERATION, _ACCELERATION, layout.size) / yielding
-    passive = PassiveForces(character, INSTANT, inverse_mass)
-    with World(still_settings(gravity)) as world:
-        body = world.add(passing_through_itself(character))
+    with World(still_settings(gravity=0.0)) as world:
+        body = _add_without_collisions(world, character)
+        inverse_mass = _inverse_mass_matrix(world, body, character)
+        _check_mobility(character, np.diag(inverse_mass))
+        effort = rng.uniform(-_ACCELERATION, _ACCELERATION, layout.size) / np.diag(inverse_mass)
+        passive = PassiveForces(character, INSTANT, inverse_mass)
+        world.set_gravity(gravity)
         body.set_state(position, velocity)
         position, velocity = body.read()  # as the engine has it
-        energy = body.links.kinetic_energy()
+        energy = body.kinetic_energy()
         body.apply(effort + passive.effort(position, velocity))
         world.step()
         acceleration = (body.read()[1] - velocity) / INSTANT
-    return DynamicsSample(position, velocity, effort, energy, acceleration)
+    return DynamicsSample(position, velocity, effort, energy, acceleration), inverse_mass
+
+
+def _add_without_collisions(world: World, character: Character) -> Body:
+    """Put a character into a world, its links passing through each other."""
+    return world.add(replace(character, loading=replace(character.loading, self_collision=False)))
+
+
+def _inverse_mass_matrix(world: World, body: Body, character: Character) -> FloatArray:
+    """The inverse mass matrix (n, n) near the rest pose: what a unit of each effort accelerates.
+
+    The world must be one of `still_settings` without gravity.
+    """
+    size = character.layout.size
+    rest, still = _clear_of_limits(character), np.zeros(size)
+    inverse_mass = np.zeros((size, size))
+    for column, effort in enumerate(np.eye(size)):
+        body.set_state(rest, still)
+        body.apply(effort)
+        world.step()
+        inverse_mass[:, column] = body.read()[1] / INSTANT
+    return inverse_mass
+
+
+def _clear_of_limits(character: Character) -> FloatArray:
+    """The rest pose (n,), with each joint a tenth of its range or more from its limits.
+
+    At a limit the engine's own constraint would answer to an effort as well.
+    """
+    lower, upper = character.position_bounds()
+    limited = np.isfinite(lower) & np.isfinite(upper)
+    margin = 0.1 * np.subtract(upper, lower, out=np.zeros_like(lower), where=limited)
+    return np.clip(character.rest_position, lower + margin, upper - margin)
 
 
 def _position(character: Character, rng: np.random.Generator) -> FloatArray:
     """A position (n,) near the rest pose, away from hard limits and inside the soft ones."""
-    rest = clear_of_limits(character)
+    rest = _clear_of_limits(character)
     lower, upper = character.position_bounds()
     for joint in character.moving_joints:
         if joint.soft_limit is not None:
@@ -69,9 +121,9 @@ def _position(character: Character, rng: np.random.Generator) -> FloatArray:
     return rest + rng.uniform(-1.0, 1.0, len(rest)) * np.minimum(_TURN, 0.5 * room)
 
 
-def _check_yielding(character: Character, yielding: FloatArray) -> None:
-    """Every degree of freedom yields to its effort, and none without resistance."""
-    sound = (yielding > 0.0) & np.isfinite(yielding)
+def _check_mobility(character: Character, mobility: FloatArray) -> None:
+    """Raise CharacterError unless each effort accelerates its entry, by a finite amount (n,)."""
+    sound = (mobility > 0.0) & np.isfinite(mobility)
     if sound.all():
         return
     worst = int(np.argmin(sound))

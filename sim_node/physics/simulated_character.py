@@ -1,4 +1,4 @@
-"""One character's part in a simulation: what drives it, what it does, what touches it. No ROS."""
+"""One character's part in a simulation: efforts and wrenches in, its state and contacts out."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -10,10 +10,9 @@ from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedState
-from sim_node.physics.contacts import TouchedLinks
-from sim_node.physics.mass_matrix import make_passive_forces
+from sim_node.physics.body import Body, TouchedLinks
+from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.projectiles import Projectiles
-from sim_node.physics.world import World
 from sim_node.physics.wrenches import ExternalWrench
 
 
@@ -25,6 +24,7 @@ class CharacterSetup:
     commanded_joints: tuple[str, ...]
     initial_position: tuple[float, ...]  # (n,)
     initial_velocity: tuple[float, ...]  # (n,)
+    inverse_mass: FloatArray  # (n, n) near the rest pose; zeros where no joint has passive forces
     name: str = ""  # where there are several
 
     @property
@@ -45,7 +45,7 @@ class Contacts:
 
 @dataclass(frozen=True)
 class CharacterSnapshot:
-    """What an actor knows between two ticks, beside the engine."""
+    """A simulated character's memory between two ticks, the engine's left aside."""
 
     state: StampedState
     contacts: Contacts | None
@@ -58,25 +58,26 @@ class SimulatedCharacter:
     """A character in a world."""
 
     state: StampedState
-    contacts: Contacts | None  # over the last tick; None if nobody watched
-    pushes: tuple[ExternalWrench, ...]  # what pushed it during the last tick
+    contacts: Contacts | None  # over the last tick; None if contacts were not watched
+    pushes: tuple[ExternalWrench, ...]  # that acted during the last tick
+    balls: Projectiles  # of the world that it is in
 
-    def __init__(self, role: CharacterSetup, *, delay_ticks: int, step_s: float) -> None:
-        """Check the role, for efforts that come late by some ticks and engine steps of `step_s`.
+    def __init__(self, setup: CharacterSetup, *, delay_ticks: int, step_s: float) -> None:
+        """Check the setup, for efforts that come late by some ticks and engine steps of `step_s`.
 
         Raises:
             ConfigurationError: an array does not fit the character.
             LayoutError: a commanded joint does not exist.
         """
-        self.role = role
-        self.character = role.character
-        self.layout = role.character.layout
-        self.commanded: BoolArray = self.layout.mask(role.commanded_joints)
-        self._limits = role.character.effort_limits()
+        self.setup = setup
+        self.character = setup.character
+        self.layout = setup.character.layout
+        self.commanded: BoolArray = self.layout.mask(setup.commanded_joints)
+        self._limits = setup.character.effort_limits()
         self.saturated_ticks: IntArray = np.zeros(len(self._limits), dtype=np.intp)  # (b,)
-        self._position = self._initial("initial_position", role.initial_position)
-        self._velocity = self._initial("initial_velocity", role.initial_velocity)
-        self._passive = make_passive_forces(role.character, step_s)
+        self._position = self._initial("initial_position", setup.initial_position)
+        self._velocity = self._initial("initial_velocity", setup.initial_velocity)
+        self._passive = PassiveForces(setup.character, step_s, setup.inverse_mass)
         self._delay_ticks = delay_ticks
 
     def begin_in(self, position: FloatArray, velocity: FloatArray) -> None:
@@ -85,16 +86,14 @@ class SimulatedCharacter:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the simulation does otherwise than the character's file says."""
+        """Where the simulation differs from the character's file."""
         return self._passive.warnings
 
-    def enter(self, world: World, stamp_ns: int) -> None:
-        """Enter a world in the initial state; an episode begins."""
-        zero = np.zeros(self.layout.size)
-        self._delayed = deque([zero] * self._delay_ticks)
-        self._body = world.add(self.character)
-        self._balls = world.balls
-        self._body.set_state(self._position, self._velocity)
+    def enter(self, body: Body, balls: Projectiles, stamp_ns: int) -> None:
+        """Enter a world, as the body that was added there, in the initial state."""
+        self._delayed = deque([np.zeros(self.layout.size)] * self._delay_ticks)
+        self._body, self.balls = body, balls
+        body.set_state(self._position, self._velocity)
         self.contacts = self._no_contacts()
         self.pushes = ()
         self._read(stamp_ns, effort=None)
@@ -110,24 +109,23 @@ class SimulatedCharacter:
             self.saturated_ticks += self.layout.norms(wanted) > self._limits
         self.pushes = tuple(pushes)
         self.contacts = self._no_contacts() if watches_contacts else None
-        self._motion = self.state.position, self.state.velocity
 
     def begin_substep(self, first: bool) -> None:
         """Apply all forces again for one engine step."""
         total = self._applied
         if self._passive.active:
-            motion = self._motion if first else self._body.read()
+            motion = (self.state.position, self.state.velocity) if first else self._body.read()
             total = total + self._passive.effort(*motion)
         self._body.apply(total)
         if self.pushes:
-            self._body.links.push(self.pushes)
+            self._body.push((push.link, push.wrench, push.point) for push in self.pushes)
         if self.contacts is not None:
-            self._centres = self._body.links.centres()
+            self._centres = self._body.centres()
 
     def add_contacts(self, touched: TouchedLinks, share: float) -> None:
-        """Take up the contacts of the last engine step, which is a share of the tick."""
+        """Add the contacts of the last engine step, which is a share of the tick."""
         assert self.contacts is not None
-        wrenches, touching = self._body.links.contact_wrenches(touched, self._centres)
+        wrenches, touching = self._body.contact_wrenches(touched, self._centres)
         self.contacts = Contacts(
             self.contacts.wrenches + share * wrenches, self.contacts.touching | touching
         )
@@ -147,23 +145,18 @@ class SimulatedCharacter:
         )
 
     def restore(self, snapshot: CharacterSnapshot) -> None:
-        """Know again what was known then; the engine is restored by who owns it."""
+        """Restore a snapshot; the engine's state is restored by the simulation."""
         self.state, self.contacts, self.pushes = snapshot.state, snapshot.contacts, snapshot.pushes
         self._delayed = deque(snapshot.delayed)
         self.saturated_ticks = snapshot.saturated_ticks.copy()
 
     def link_frames(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""
-        return self._body.links.frames()
-
-    @property
-    def balls(self) -> Projectiles:
-        """The balls of the world that it is in."""
-        return self._balls
+        return self._body.link_frames()
 
     def base_frame(self) -> tuple[FloatArray, FloatArray]:
         """Origin (3,) in m and orientation xyzw (4,) of the base link in the world."""
-        return self._body.links.base_frame()
+        return self._body.base_frame()
 
     def check_divergence(self, tick: int, speed_limit: float) -> None:
         """Raise SimulationError if the state is not finite or faster than a limit."""
@@ -173,7 +166,7 @@ class SimulatedCharacter:
         if not sound.all():
             worst = int(np.argmin(sound))
             raise SimulationError(
-                f"diverged at tick {tick}: '{self.role.prefix}{self.layout.dof_names[worst]}' is "
+                f"diverged at tick {tick}: '{self.setup.prefix}{self.layout.dof_names[worst]}' is "
                 f"at {state.position[worst]:.4g} with velocity {state.velocity[worst]:.4g}; "
                 f"the limit is {speed_limit:g}"
             )
@@ -188,7 +181,7 @@ class SimulatedCharacter:
 
     def _initial(self, name: str, values: tuple[float, ...]) -> FloatArray:
         if len(values) != self.layout.size:
-            below = f"{self.role.name}." if self.role.name else ""
+            below = f"{self.setup.name}." if self.setup.name else ""
             raise ConfigurationError(
                 f"parameter '{below}{name}' has {len(values)} entries; it must have "
                 f"{self.layout.size}: {', '.join(self.layout.dof_names)}"

@@ -1,4 +1,4 @@
-"""The simulation of characters in one world: efforts for one tick, then the next states. No ROS."""
+"""The simulation of characters in one world: efforts for one tick, then the next states."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from sim_node.physics.wrenches import ExternalWrench
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """All that a simulation depends on, beside its roles, the efforts and the pushes."""
+    """All that a simulation depends on beside its setups, the efforts, pushes and throws."""
 
     rate_hz: int
     substeps: int
@@ -30,35 +30,20 @@ class SimulationSettings:
 
 
 @dataclass(frozen=True)
-class CharactersSnapshot:
-    """A state between two ticks, but for the engine's."""
+class Snapshot:
+    """A state between two ticks, for any simulation of equal setups and settings."""
 
     tick: int
     episode: int
-    actors: tuple[CharacterSnapshot, ...]
+    characters: tuple[CharacterSnapshot, ...]
     throws: tuple[ProjectileThrow, ...]  # of the last tick
-    thrown_at: tuple[int, ...]  # ticks, of the balls that are in the world
-
-
-@dataclass(frozen=True)
-class InMemorySnapshot:
-    """A state between two ticks, which the simulation that saved it can return to."""
-
-    characters: CharactersSnapshot
-    world: int  # its number in the engine
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """A state between two ticks, for any simulation of equal roles and settings."""
-
-    characters: CharactersSnapshot
-    balls: tuple[ProjectileThrow, ...]
-    world: bytes
+    balls: tuple[ProjectileThrow, ...]  # that are in the world
+    thrown_at: tuple[int, ...]  # ticks, of the balls
+    world: bytes  # the engine's state
 
 
 class Simulation:
-    """Forward dynamics in ticks: `(q, v, effort) -> next (q, v)` of every actor.
+    """Forward dynamics in ticks: `(q, v, effort) -> next (q, v)` of every character.
 
     The effort is held over the tick and applied again at each engine step: a force in the world
     stays so, a torque in a body's frame turns with the body.
@@ -66,31 +51,29 @@ class Simulation:
 
     def __init__(
         self,
-        roles: Sequence[CharacterSetup],
+        setups: Sequence[CharacterSetup],
         settings: SimulationSettings,
         first_tick: int = FIRST_TICK,
     ) -> None:
         """Build the world and put the characters into their initial states, which are `first_tick`.
 
         Raises:
-            ConfigurationError: an array or a name in a role does not fit its character.
+            ConfigurationError: an array or a name in a setup does not fit its character.
             LayoutError: a commanded joint does not exist.
             CharacterError: the engine refuses a file.
         """
         self.settings = settings
         self.clock = TickClock(settings.rate_hz)
-        self.actors = tuple(
+        self.characters = tuple(
             SimulatedCharacter(
-                role, delay_ticks=settings.command_delay_ticks, step_s=settings.world.step_s
+                setup, delay_ticks=settings.command_delay_ticks, step_s=settings.world.step_s
             )
-            for role in roles
+            for setup in setups
         )
         self.tick = first_tick
         self.episode = 1
-        self.watches_contacts = False  # whether to find out what touches, which takes time
-        self.throws: tuple[
-            ProjectileThrow, ...
-        ] = ()  # what was thrown at the beginning of the last tick
+        self.watches_contacts = False  # finding out what touches takes time
+        self.throws: tuple[ProjectileThrow, ...] = ()  # at the beginning of the last tick
         self._thrown_at: tuple[int, ...] = ()
         self._world = self._fresh_world()
 
@@ -124,35 +107,35 @@ class Simulation:
         pushes: Sequence[Sequence[ExternalWrench]] | None = None,
         throws: Sequence[ProjectileThrow] = (),
     ) -> None:
-        """Advance one tick: for each actor an effort (n,), clipped to its limits, and its pushes.
+        """Advance one tick: each character's effort (n,), clipped to its limits, and its pushes.
 
-        What is thrown is let go first.
+        Throws are let go first.
 
         Raises:
             SimulationError: a next state is not finite or faster than the speed limit; it names
                 the degree of freedom.
         """
-        nothing: list[tuple[ExternalWrench, ...]] = [()] * len(self.actors)
-        for actor, effort, its in zip(self.actors, efforts, pushes or nothing, strict=True):
-            actor.begin_tick(effort, its, self.watches_contacts)
+        pushes = pushes or [()] * len(self.characters)
+        for character, effort, own in zip(self.characters, efforts, pushes, strict=True):
+            character.begin_tick(effort, own, self.watches_contacts)
         self._move_balls(throws)
         substeps = self.settings.substeps
         for substep in range(substeps):
-            for actor in self.actors:
-                actor.begin_substep(first=substep == 0)
+            for character in self.characters:
+                character.begin_substep(first=substep == 0)
             self._world.step()
             if self.watches_contacts:
                 touched = self._world.touched_links()
-                for actor in self.actors:
-                    actor.add_contacts(touched, share=1.0 / substeps)
+                for character in self.characters:
+                    character.add_contacts(touched, share=1.0 / substeps)
         self.tick += 1
-        for actor in self.actors:
-            actor.end_tick(self.stamp_ns)
+        for character in self.characters:
+            character.end_tick(self.stamp_ns)
         try:
-            for actor in self.actors:
-                actor.check_divergence(self.tick, self.settings.speed_limit)
+            for character in self.characters:
+                character.check_divergence(self.tick, self.settings.speed_limit)
         except SimulationError:
-            self.tick -= 1  # nobody is to see that state; a reset's first one has its stamp
+            self.tick -= 1  # that state is not published; a reset's first one has its stamp
             raise
 
     def _move_balls(self, throws: Sequence[ProjectileThrow]) -> None:
@@ -179,54 +162,45 @@ class Simulation:
         self._world = self._fresh_world()
 
     def begin_in(self, states: Mapping[str, StampedState]) -> None:
-        """Begin in other states, by the characters' names, before the first step; episodes, too."""
-        for actor in self.actors:
-            if (state := states.get(actor.role.name)) is not None:
-                actor.begin_in(state.position, state.velocity)
+        """Begin this and all later episodes in other states, by the characters' names.
+
+        To be called before the first step.
+        """
+        for character in self.characters:
+            if (state := states.get(character.setup.name)) is not None:
+                character.begin_in(state.position, state.velocity)
         self._world.close()
         self._world = self._fresh_world()
 
-    def save(self) -> InMemorySnapshot:
-        """Keep the present state in memory, until it is forgotten."""
-        return InMemorySnapshot(self._characters_snapshot(), self._world.save())
-
-    def restore(self, saved: InMemorySnapshot) -> None:
-        """Return to a saved state: what follows is what followed it, to the bit.
-
-        That holds of states that a step has led to; in a world without a step yet, the engine has
-        not found out what touches. After a reset no state saved before can be restored.
-        """
-        self._world.restore(saved.world)
-        self._restore(saved.characters)
-
-    def forget(self, saved: InMemorySnapshot) -> None:
-        """Give back the memory of a saved state."""
-        self._world.forget(saved.world)
-
     def snapshot(self) -> Snapshot:
-        """The present state, to be taken over by a simulation in another process."""
-        return Snapshot(self._characters_snapshot(), self.balls, self._world.to_bytes())
+        """The present state, for this simulation or one in another process."""
+        return Snapshot(
+            self.tick,
+            self.episode,
+            tuple(character.snapshot() for character in self.characters),
+            self.throws,
+            self.balls,
+            self._thrown_at,
+            self._world.to_bytes(),
+        )
 
     def load_snapshot(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot, as its own simulation would, to the bit."""
+        """Go on from a snapshot: what follows is what followed it, to the bit.
+
+        That holds of states that a step has led to; in a world without a step yet, the engine has
+        not found out what touches.
+        """
         self._world.from_bytes(snapshot.world, snapshot.balls)
-        self._restore(snapshot.characters)
-
-    def _characters_snapshot(self) -> CharactersSnapshot:
-        actors = tuple(actor.snapshot() for actor in self.actors)
-        return CharactersSnapshot(self.tick, self.episode, actors, self.throws, self._thrown_at)
-
-    def _restore(self, snapshot: CharactersSnapshot) -> None:
         self.tick, self.episode = snapshot.tick, snapshot.episode
         self.throws, self._thrown_at = snapshot.throws, snapshot.thrown_at
-        for actor, its in zip(self.actors, snapshot.actors, strict=True):
-            actor.restore(its)
+        for character, its in zip(self.characters, snapshot.characters, strict=True):
+            character.restore(its)
 
     def _fresh_world(self) -> World:
         world = World(self.settings.world)
         try:
-            for actor in self.actors:
-                actor.enter(world, self.stamp_ns)
+            for character in self.characters:
+                character.enter(world.add(character.character), world.balls, self.stamp_ns)
         except Exception:
             world.close()
             raise

@@ -1,4 +1,4 @@
-"""Where a ball that flies straight at a link meets a character. No ROS in here."""
+"""Where a ball that flies straight at a link meets a character."""
 
 from dataclasses import dataclass
 
@@ -36,15 +36,15 @@ class BallAndCharacter:
     def put_character(self, position: FloatArray) -> FloatArray:
         """Put the character into a state (n,), message form; returns the links' centres (l, 3)."""
         self._body.set_state(position, self._still)
-        return np.array(self._body.links.centres())
+        return np.array(self._body.centres())
 
     def put_ball(self, centre: FloatArray) -> FloatArray:
         """Put the ball somewhere (3,), m; returns how far (l,) it is from the links' surfaces, m.
 
         Negative: inside of a link; infinite: the link has no surface.
         """
-        self._world.balls.place(centre)
-        return self._world.balls.gaps(self._body.links)
+        self._world.balls.place(0, centre)
+        return self._body.gaps(self._world.balls.numbers[0])
 
 
 def find_impact(

@@ -1,6 +1,7 @@
 """The physics world: PyBullet behind one class; the only place that steps the engine."""
 
 import tempfile
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,8 +9,7 @@ from pathlib import Path
 from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.body import Body
-from sim_node.physics.contacts import TouchedLinks, read_contacts
+from sim_node.physics.body import Body, Touch, TouchedLinks
 from sim_node.physics.projectiles import Projectiles
 
 _STATE_FILE = "state.bullet"  # the engine writes to files alone
@@ -25,14 +25,14 @@ class WorldSettings:
     link_friction: float = 0.5  # of every link
     solver_iterations: int = 10
     ground: bool = True  # the plane z = 0
-    terrain: UrdfOptions | None = None  # what else stays there
+    terrain: UrdfOptions | None = None  # a fixed body beside the plane
 
 
 class World:
     """The ground and the characters on it, and what is thrown at them, in a private engine.
 
-    `save` and `restore` keep the engine's contact caches, so that what follows a restored state
-    is what followed the saved one, to the bit; setting positions and velocities alone is not.
+    `to_bytes` and `from_bytes` keep the engine's contact caches, so that what follows a restored
+    state is what followed the saved one, to the bit; setting positions and velocities alone is not.
     Restore right after a step: the engine keeps an effort that was applied but not stepped yet.
     """
 
@@ -44,7 +44,7 @@ class World:
         """
         self._client = connect()
         self._link_friction = settings.link_friction
-        pybullet.setGravity(0.0, 0.0, -settings.gravity, physicsClientId=self._client)
+        self.set_gravity(settings.gravity)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=settings.step_s,
             numSolverIterations=settings.solver_iterations,
@@ -62,7 +62,6 @@ class World:
         if settings.terrain is not None:
             self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
         self.balls = Projectiles(self._client, settings.link_friction)
-        self._saved: dict[int, tuple[ProjectileThrow, ...]] = {}  # the balls of each saved state
 
     def __enter__(self) -> "World":
         return self
@@ -78,40 +77,45 @@ class World:
         """Put a character into the world, at the pose of its URDF."""
         return Body(self._client, character, self._link_friction)
 
+    def set_gravity(self, gravity: float) -> None:
+        """Set gravity in m/s^2 along -z."""
+        pybullet.setGravity(0.0, 0.0, -gravity, physicsClientId=self._client)
+
     def step(self) -> None:
         """Advance by one engine step; efforts last one step and are to be applied again."""
         pybullet.stepSimulation(physicsClientId=self._client)
 
     def touched_links(self) -> TouchedLinks:
-        """What touched in the last step."""
-        return read_contacts(self._client)
+        """The contacts of the last engine step, each on both bodies, in opposite directions.
 
-    def save(self) -> int:
-        """Keep the whole state in memory; returns its number for `restore`."""
-        number = int(pybullet.saveState(physicsClientId=self._client))
-        self._saved[number] = self.balls.throws
-        return number
-
-    def restore(self, saved: int) -> None:
-        """Return to a saved state, exactly."""
-        self.balls.have(self._saved.get(saved, self.balls.throws))
-        pybullet.restoreState(stateId=saved, physicsClientId=self._client)
-
-    def forget(self, saved: int) -> None:
-        """Give back the memory of a saved state; it cannot be restored any more."""
-        pybullet.removeState(saved, physicsClientId=self._client)
-        del self._saved[saved]
+        Points are where the surfaces were when the step began: the engine looks for contacts first,
+        and moves last. On each body it is that body's own surface; the two are apart by the depth
+        at which the bodies are in each other.
+        """
+        touched = defaultdict[int, list[Touch]](list)
+        # of all bodies: asked for those of one, the engine lets it come first in each, and then
+        # turns the normal round but not the friction
+        for contact in pybullet.getContactPoints(physicsClientId=self._client):
+            _, body, body_b, link, link_b, at, at_b, normal, distance, f, f1, a, f2, b = contact
+            if distance > 0.0 and f == 0.0:
+                continue  # near enough to be watched by the engine, but apart
+            x = f * normal[0] + f1 * a[0] + f2 * b[0]  # written out: at each tick, of each
+            y = f * normal[1] + f1 * a[1] + f2 * b[1]
+            z = f * normal[2] + f1 * a[2] + f2 * b[2]
+            touched[body].append(Touch(link, (x, y, z), at))
+            touched[body_b].append(Touch(link_b, (-x, -y, -z), at_b))
+        return touched
 
     def to_bytes(self) -> bytes:
-        """The whole state for a world of the same making with the same balls, anywhere."""
+        """The whole state, for any world of equal settings, characters and balls."""
         with tempfile.TemporaryDirectory() as directory:
             file = Path(directory) / _STATE_FILE
             pybullet.saveBullet(str(file), physicsClientId=self._client)
             return file.read_bytes()
 
     def from_bytes(self, state: bytes, throws: Sequence[ProjectileThrow] = ()) -> None:
-        """Take over a state from `to_bytes`, exactly, in which these balls were."""
-        self.balls.have(throws)
+        """Restore a state of `to_bytes`, exactly, in which there were the balls of `throws`."""
+        self.balls.replace(throws)
         with tempfile.TemporaryDirectory() as directory:
             file = Path(directory) / _STATE_FILE
             file.write_bytes(state)

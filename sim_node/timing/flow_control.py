@@ -1,4 +1,4 @@
-"""When the simulator waits for subscribers that are behind. No ROS in here."""
+"""When the simulator waits for subscribers that are behind."""
 
 import math
 from collections.abc import Callable
@@ -9,12 +9,15 @@ from dataclasses import dataclass
 class FlowControl:
     """Holds the simulation until its subscribers have acknowledged what was published.
 
-    A publisher keeps the last few thousand messages for who is slow; a subscriber whose process
-    stands still for longer than those last loses some. Waiting costs wall time only, so in lockstep
-    it alters nothing. Who does not acknowledge in time is not waited for again until it has.
+    A publisher keeps its last few thousand messages; a subscriber whose process stands still for
+    longer than those last loses some. Waiting costs wall time only, so in lockstep it alters
+    nothing; in real time it is not `active`. A subscriber that does not acknowledge in time is not
+    waited for again until it has.
     """
 
     acknowledged: Callable[[float], bool]  # whether all have all, or get it within so many s
+    log: Callable[[str], None]
+    active: bool = True
     every_ticks: int = 1000  # between questions; a publisher keeps the last 5000 messages
     longest: float = 30.0  # s of wall time
     turn: float = 0.02  # s of it between looks at everything else
@@ -24,7 +27,7 @@ class FlowControl:
 
     def holds(self, tick: int, now: float) -> bool:
         """Whether the tick may not begin yet; `now` in s of wall time."""
-        if tick - self._last_tick < self.every_ticks:
+        if not self.active or tick - self._last_tick < self.every_ticks:
             return False
         if self.acknowledged(0.0 if self._has_given_up else self.turn):
             self._has_given_up = False
@@ -33,15 +36,9 @@ class FlowControl:
             if now < self._gives_up_at:
                 return True
             self._has_given_up = True
+            self.log(
+                f"a subscriber has not acknowledged the states within {self.longest:g} s; it is "
+                "not waited for any more, and may lose some"
+            )
         self._last_tick, self._gives_up_at = tick, math.inf
         return False
-
-    @property
-    def complaint(self) -> str | None:
-        """What to say of a subscriber that is not waited for; None while there is none."""
-        if not self._has_given_up:
-            return None
-        return (
-            f"a subscriber has not acknowledged the states within {self.longest:g} s; it is not "
-            "waited for any more, and may lose some"
-        )

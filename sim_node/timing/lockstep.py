@@ -1,8 +1,6 @@
-"""The lockstep barrier: the tick goes on when every required degree of freedom has a command.
+"""The lockstep barrier: a tick ends when every required degree of freedom has a command."""
 
-No ROS and no engine in here: a state machine over stamps, names and numbers.
-"""
-
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,43 +15,77 @@ _REMEMBERED = 1000  # ticks
 
 
 class CommandStatus(Enum):
-    """What the barrier made of a command."""
+    """The verdict on a command."""
 
     ACCEPTED = "accepted"
-    DUPLICATE = "duplicate"  # repeats what it has already
+    DUPLICATE = "duplicate"  # repeats one that was accepted
     CONFLICT = "conflict"  # differs from another for the same state
     STALE = "stale"  # answers an earlier state, and comes too late
     FUTURE = "future"  # answers a state that was never published
     REJECTED = "rejected"  # malformed; nothing of it is taken
 
 
+class CommandCollector(ABC):
+    """Checks and counts commands; a subclass decides which of them make the effort of a tick."""
+
+    def __init__(self, dof_names: Sequence[str], allowed: BoolArray) -> None:
+        """Only entries that are `allowed` (n,) may be commanded."""
+        self._dof_names = tuple(dof_names)
+        self._allowed = allowed
+        self.stamp_ns = 0
+        self.conflict: str | None = None  # the first entry of the tick's last conflict
+        self.counts: Counter[CommandStatus] = Counter()
+
+    def submit(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
+        """Take a command: `effort` (m,) for the entries `indices` (m,), answering `stamp_ns`.
+
+        Raises:
+            CommandError: the lengths differ, a number is not finite, or an entry may not be
+                commanded; nothing of the command is taken.
+        """
+        self._check(indices, effort)
+        status = self._take(stamp_ns, indices, effort)
+        self.counts[status] += 1
+        return status
+
+    @abstractmethod
+    def _take(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
+        """Take a command that is well-formed, or not; which, its status says."""
+
+    def _check(self, indices: IntArray, effort: FloatArray) -> None:
+        if len(indices) != len(effort):
+            raise CommandError(f"{len(indices)} names but {len(effort)} efforts")
+        if len(indices) == 0:
+            raise CommandError("an empty command")
+        if not np.isfinite(effort).all():
+            worst = int(np.argmin(np.isfinite(effort)))
+            name = self._dof_names[indices[worst]]
+            raise CommandError(f"effort of '{name}' is {effort[worst]}; it must be finite")
+        if not self._allowed[indices].all():
+            name = self._dof_names[indices[int(np.argmin(self._allowed[indices]))]]
+            hint = "; root_assistance of controller_node is on" if name.startswith("root_") else ""
+            raise CommandError(f"'{name}' is not among the commanded joints{hint}")
+
+
 @dataclass
 class _Tick:
-    """What was commanded at one tick."""
+    """The commands of one tick."""
 
     given: BoolArray  # (n,)
     effort: FloatArray  # (n,)
 
-    def conflict(self, indices: IntArray, effort: FloatArray) -> IntArray:
-        """Those of the entries that have another command already."""
-        conflicting: IntArray = indices[self.given[indices] & (self.effort[indices] != effort)]
-        return conflicting
 
-
-class LockstepBarrier:
+class LockstepBarrier(CommandCollector):
     """Collects the commands that answer one state, until they cover all required entries.
 
-    `required` (n,) is both what must be commanded and what may be. Several senders may share it.
+    The entries that may be commanded are those that must be. Several senders may share them.
     The ticks before are remembered for a while: a second sender of the same entries that is a
     little slower than the first is one too many, and not only late.
     """
 
     def __init__(self, dof_names: Sequence[str], required: BoolArray) -> None:
-        self._dof_names = tuple(dof_names)
-        self._required = required
+        super().__init__(dof_names, required)
         self._past: dict[int, _Tick] = {}  # by stamp, the oldest first
-        self.stamp_ns = 0
-        self.counts: Counter[CommandStatus] = Counter()
         self._begin()
 
     def begin_tick(self, stamp_ns: int) -> None:
@@ -67,20 +99,16 @@ class LockstepBarrier:
         self._begin()
 
     def clear(self) -> None:
-        """Forget the commands of the episode before."""
+        """Discard the commands of the episode before."""
         self._past.clear()
         self._begin()
 
     def _begin(self) -> None:
-        self._tick = _Tick(np.zeros_like(self._required), np.zeros(len(self._required)))
-        self._filled = np.zeros_like(self._required)  # (n,) what nobody commanded
-        self._missing = int(np.count_nonzero(self._required))
-        self.conflict: str | None = None  # the first entry of the last conflict
-
-    @property
-    def complete(self) -> bool:
+        self._tick = _Tick(np.zeros_like(self._allowed), np.zeros(len(self._allowed)))
+        self._filled = np.zeros_like(self._allowed)  # (n,) without a command of a sender
+        self.complete = not self._allowed.any()
         """Whether every required entry has its command."""
-        return self._missing == 0
+        self.conflict = None
 
     @property
     def effort(self) -> FloatArray:
@@ -90,67 +118,37 @@ class LockstepBarrier:
     @property
     def missing(self) -> list[str]:
         """Names of the required entries that still lack a command."""
-        lacking = self._required & ~self._tick.given
-        return [name for name, lacks in zip(self._dof_names, lacking, strict=True) if lacks]
-
-    def submit(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
-        """Take a command: `effort` (m,) for the entries `indices` (m,), answering `stamp_ns`.
-
-        Raises:
-            CommandError: the lengths differ, a number is not finite, or an entry may not be
-                commanded; nothing of the command is taken.
-        """
-        check_command(self._dof_names, self._required, indices, effort)
-        verdict = self._judge(stamp_ns, indices, effort)
-        self.counts[verdict] += 1
-        if verdict is CommandStatus.ACCEPTED:
-            self._tick.effort[indices] = effort
-            self._tick.given[indices] = True
-            self._missing = int(np.count_nonzero(self._required & ~self._tick.given))
-        return verdict
-
-    def count_rejected(self) -> None:
-        """Count a command that was refused, here or before it could be offered."""
-        self.counts[CommandStatus.REJECTED] += 1
+        return [self._dof_names[entry] for entry in np.flatnonzero(self._lacking)]
 
     def fill_missing(self, effort: FloatArray) -> None:
         """Complete the tick with the entries of `effort` (n,) wherever a command is missing."""
-        self._filled = self._required & ~self._tick.given
-        self._tick.effort[self._filled] = effort[self._filled]
-        self._tick.given |= self._filled
-        self._missing = 0
+        lacking = self._lacking
+        self._filled |= lacking
+        self._tick.effort[lacking] = effort[lacking]
+        self._tick.given |= lacking
+        self.complete = True
 
-    def _judge(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
+    @property
+    def _lacking(self) -> BoolArray:
+        lacking: BoolArray = self._allowed & ~self._tick.given
+        return lacking
+
+    def _take(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
         if stamp_ns > self.stamp_ns:
             return CommandStatus.FUTURE
         tick = self._tick if stamp_ns == self.stamp_ns else self._past.get(stamp_ns)
         if tick is None:
             return CommandStatus.STALE
-        conflict = tick.conflict(indices, effort)
-        if len(conflict):
-            self.conflict = self._dof_names[conflict[0]]
+        given = tick.given[indices]
+        differs = given & (tick.effort[indices] != effort)
+        if differs.any():
+            self.conflict = self._dof_names[indices[int(np.argmax(differs))]]
             return CommandStatus.CONFLICT
         if tick is not self._tick:
             return CommandStatus.STALE
-        return CommandStatus.DUPLICATE if tick.given[indices].all() else CommandStatus.ACCEPTED
-
-
-def check_command(
-    dof_names: Sequence[str], allowed: BoolArray, indices: IntArray, effort: FloatArray
-) -> None:
-    """Raise CommandError unless a command is whole, finite, and for entries that may be commanded.
-
-    `effort` (m,) is for the entries `indices` (m,); `allowed` is (n,).
-    """
-    if len(indices) != len(effort):
-        raise CommandError(f"{len(indices)} names but {len(effort)} efforts")
-    if len(indices) == 0:
-        raise CommandError("an empty command")
-    if not np.isfinite(effort).all():
-        worst = int(np.argmin(np.isfinite(effort)))
-        name = dof_names[indices[worst]]
-        raise CommandError(f"effort of '{name}' is {effort[worst]}; it must be finite")
-    if not allowed[indices].all():
-        name = dof_names[indices[int(np.argmin(allowed[indices]))]]
-        hint = "; root_assistance of controller_node is on" if name.startswith("root_") else ""
-        raise CommandError(f"'{name}' is not among the commanded joints{hint}")
+        if given.all():
+            return CommandStatus.DUPLICATE
+        tick.effort[indices] = effort
+        tick.given[indices] = True
+        self.complete = not self._lacking.any()
+        return CommandStatus.ACCEPTED

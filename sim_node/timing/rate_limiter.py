@@ -1,4 +1,4 @@
-"""When ticks are due by the wall clock, and how late they were. No ROS in here."""
+"""When ticks are due by the wall clock, how late they begin, and how long they take."""
 
 import math
 
@@ -14,11 +14,14 @@ class RateLimiter:
         self.period = period
         self.missed = 0  # ticks that began after the next one was due
         self._due_at = -math.inf
+        self._last: float | None = None  # when the last tick began
         self._lateness = Durations()
+        self._durations = Durations()
 
     def restart(self, now: float) -> None:
-        """Begin the schedule: the next tick is due a period from now."""
+        """Begin the schedule: the next tick is due a period from now; time before is left out."""
         self._due_at = now + self.period
+        self._last = None
 
     def change(self, period: float, now: float) -> None:
         """Go on with another period."""
@@ -26,11 +29,14 @@ class RateLimiter:
         self.restart(now)
 
     def wait(self, now: float) -> float:
-        """How long until the next tick is due, s; 0 if it is."""
+        """Time until the next tick is due, s; 0 if it is."""
         return max(self._due_at - now, 0.0) if self.period > 0.0 else 0.0
 
     def tick(self, now: float) -> None:
-        """Say that a tick begins."""
+        """Note that a tick begins."""
+        if self._last is not None:
+            self._durations.add(now - self._last)
+        self._last = now
         if self.period == 0.0:
             return
         late = now - self._due_at
@@ -38,9 +44,12 @@ class RateLimiter:
         self._lateness.add(late)
         self._due_at += self.period
         if late > max(_LONGEST_BACKLOG, self.period):
-            self.restart(now)
+            self._due_at = now + self.period
 
     def summary(self) -> dict[str, float | int]:
-        """Missed deadlines, and percentiles of how late ticks began in microseconds."""
+        """Ticks a second, missed deadlines, and percentiles of durations and lateness in µs."""
+        mean = self._durations.mean()
+        rate = {} if mean is None else {"ticks_per_s": round(1.0 / mean, 1)}
         late = self._lateness.percentiles_us("late", (50, 99, 99.9))
-        return {"missed_deadlines": self.missed} | late if late else {}
+        missed = {"missed_deadlines": self.missed} if late else {}
+        return rate | self._durations.percentiles_us("tick", (50, 99)) | missed | late

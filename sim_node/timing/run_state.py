@@ -1,4 +1,4 @@
-"""Whether the simulation goes on: pause, single steps, faults. No ROS in here."""
+"""Whether the simulation goes on: pause, single steps, faults."""
 
 from msgs_config.errors import CommandError
 
@@ -10,32 +10,27 @@ class RunControl:
         self.paused = False
         self.fault: str | None = None
         self.steps_left = 0
-        self._stuck = False  # the state is of no use any more: only a reset helps
+        self.has_diverged = False  # the state is of no use any more: only a reset helps
 
     @property
     def runs(self) -> bool:
         """Whether ticks go on."""
         return not self.paused or self.steps_left > 0
 
-    @property
-    def has_diverged(self) -> bool:
-        """Whether the simulation diverged."""
-        return self._stuck
-
-    def pause(self, fault: str | None = None, *, stuck: bool = False) -> None:
-        """Stop before the next tick; `stuck` if the state can only be reset."""
+    def pause(self, fault: str | None = None, *, diverged: bool = False) -> None:
+        """Stop before the next tick; `diverged` if the state can only be reset."""
         self.paused, self.steps_left = True, 0
         self.fault = fault or self.fault
-        self._stuck = self._stuck or stuck
+        self.has_diverged = self.has_diverged or diverged
 
     def resume(self) -> None:
-        """Go on. Raises CommandError if the simulation is stuck."""
-        self._check_not_stuck()
+        """Go on. Raises CommandError if the simulation has diverged."""
+        self._check_sound()
         self.paused, self.steps_left, self.fault = False, 0, None
 
     def begin_steps(self, count: int) -> None:
-        """Take some steps, then pause again. Raises CommandError unless paused and not stuck."""
-        self._check_not_stuck()
+        """Take some steps, then pause again. Raises CommandError unless paused and not diverged."""
+        self._check_sound()
         if not self.paused:
             raise CommandError("not paused; ~/step is for a simulation that is")
         if self.steps_left:
@@ -43,7 +38,7 @@ class RunControl:
         self.steps_left, self.fault = count, None
 
     def tick(self) -> bool:
-        """Say that a tick is over; whether it was the last of the steps."""
+        """Count a tick that is over; whether it was the last of the steps."""
         if self.steps_left == 0:
             return False
         self.steps_left -= 1
@@ -51,8 +46,8 @@ class RunControl:
 
     def reset(self) -> None:
         """A new episode begins: no fault is left, and no step. What was paused stays so."""
-        self.steps_left, self.fault, self._stuck = 0, None, False
+        self.steps_left, self.fault, self.has_diverged = 0, None, False
 
-    def _check_not_stuck(self) -> None:
-        if self._stuck:
+    def _check_sound(self) -> None:
+        if self.has_diverged:
             raise CommandError(f"cannot go on, only ~/reset: {self.fault}")

@@ -1,4 +1,4 @@
-"""What is due while the simulator waits for commands, by the wall clock. No ROS in here."""
+"""Events that are due while the simulator waits, by the wall clock."""
 
 import math
 from dataclasses import dataclass
@@ -8,8 +8,8 @@ from enum import Enum
 class WatchdogEvent(Enum):
     """What a long wait calls for."""
 
-    REPUBLISH = "republish"  # somebody may have joined too late for the state
-    EXPLAIN = "explain"  # somebody should hear what is missing
+    REPUBLISH = "republish"  # a late subscriber may have missed the state
+    EXPLAIN = "explain"  # a user should read what is missing
     TIMEOUT = "timeout"  # the wait has been too long
 
 
@@ -17,9 +17,9 @@ class WatchdogEvent(Enum):
 class Watchdog:
     """Times in s of wall time, counted from `restart`; a timeout of 0 never comes."""
 
-    republish_period: float
-    explain_after: float
-    timeout: float
+    republish_period: float = math.inf
+    timeout: float = 0.0
+    explain_after: float = 2.0
     _republish_at: float = math.inf
     _explain_at: float = math.inf
     _timeout_at: float = math.inf

@@ -1,21 +1,20 @@
-"""Real time: commands that are held while the world goes on by the wall clock. No ROS in here."""
+"""Real time: the last commands are held while the world goes on by the wall clock."""
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from sim_node.timing.lockstep import CommandStatus, check_command
+from sim_node.timing.lockstep import CommandCollector, CommandStatus
 
 _NEVER = -1
 
 
-class ZeroOrderHold:
+class ZeroOrderHold(CommandCollector):
     """The last command of each degree of freedom, held until it is too old; then zero.
 
-    Offers the same as `LockstepBarrier`, except that a tick never waits: it is always complete. Of
-    two commands in conflict the later one is taken.
+    A tick never waits: it is always complete. Of two commands in conflict the later one is taken.
+    A command without a stamp answers the last state.
     """
 
     complete = True
@@ -23,16 +22,12 @@ class ZeroOrderHold:
 
     def __init__(self, dof_names: Sequence[str], allowed: BoolArray, timeout_ns: int) -> None:
         """`allowed` (n,) may be commanded; `timeout_ns` is simulated time."""
-        self._dof_names = tuple(dof_names)
-        self._allowed = allowed
+        super().__init__(dof_names, allowed)
         self._effort = np.zeros(len(allowed))
         self._given_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
         self._stamp_of_command_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
         self._oldest_ns = 0  # of the states that a command of this episode can answer
         self.timeout_ns = timeout_ns
-        self.stamp_ns = 0
-        self.conflict: str | None = None  # the first entry of the last conflict
-        self.counts: Counter[CommandStatus] = Counter()
         self.timeouts = 0  # times that a held command became too old
         self._was_held = np.zeros(len(allowed), dtype=np.bool_)
 
@@ -45,7 +40,7 @@ class ZeroOrderHold:
         self._was_held = held
 
     def clear(self) -> None:
-        """Forget all commands, and those on their way: the next tick begins a new episode."""
+        """Discard all commands, and those on their way: the next tick begins a new episode."""
         self._oldest_ns = self.stamp_ns + 1
         self._given_ns[:] = _NEVER
         self._was_held[:] = False
@@ -57,33 +52,9 @@ class ZeroOrderHold:
 
     @property
     def age_ns(self) -> int | None:
-        """How old the oldest command is that is held; None without any."""
+        """Age of the oldest command that is held; None without any."""
         held = self._held
         return int(self.stamp_ns - self._given_ns[held].min()) if held.any() else None
-
-    def submit(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
-        """Take a command: `effort` (m,) for the entries `indices` (m,).
-
-        It answers the state of `stamp_ns`, or whichever is the last one where the stamp is zero.
-
-        Raises:
-            CommandError: the lengths differ, a number is not finite, or an entry may not be
-                commanded; nothing of the command is taken.
-        """
-        check_command(self._dof_names, self._allowed, indices, effort)
-        answered_ns = stamp_ns or self.stamp_ns
-        verdict = self._judge(stamp_ns, answered_ns, indices, effort)
-        self.counts[verdict] += 1
-        if verdict in (CommandStatus.ACCEPTED, CommandStatus.CONFLICT):
-            self._effort[indices] = effort
-            self._given_ns[indices] = answered_ns
-            self._stamp_of_command_ns[indices] = stamp_ns
-            self._was_held[indices] = True
-        return verdict
-
-    def count_rejected(self) -> None:
-        """Count a command that was refused, here or before it could be offered."""
-        self.counts[CommandStatus.REJECTED] += 1
 
     @property
     def _held(self) -> BoolArray:
@@ -91,6 +62,16 @@ class ZeroOrderHold:
             self.stamp_ns - self._given_ns < self.timeout_ns
         )
         return held
+
+    def _take(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
+        answered_ns = stamp_ns or self.stamp_ns
+        status = self._judge(stamp_ns, answered_ns, indices, effort)
+        if status in (CommandStatus.ACCEPTED, CommandStatus.CONFLICT):
+            self._effort[indices] = effort
+            self._given_ns[indices] = answered_ns
+            self._stamp_of_command_ns[indices] = stamp_ns
+            self._was_held[indices] = True
+        return status
 
     def _judge(
         self, stamp_ns: int, answered_ns: int, indices: IntArray, effort: FloatArray

@@ -113,7 +113,7 @@ def test_everything_in_a_file_is_for_one_of_its_nodes(file: str) -> None:
 
 @pytest.mark.parametrize("file", NODES)
 def test_both_sides_agree_on_what_they_must_agree_on(file: str) -> None:
-    parts = load_parameters(given(file, SIMULATOR)).parts
+    parts = load_parameters(given(file, SIMULATOR)).characters
 
     for part, node in zip(parts, controllers(file), strict=True):
         character, values = controller_values(file, node)
@@ -132,7 +132,9 @@ def test_the_file_of_a_motion_holds_no_state(file: str) -> None:
     parameters = given(file, SIMULATOR)
 
     assert not [name for name in parameters if "initial_pos" in name or "initial_vel" in name]
-    assert all(begins_with_reference(part.values) for part in load_parameters(parameters).parts)
+    assert all(
+        begins_with_reference(part.values) for part in load_parameters(parameters).characters
+    )
 
 
 # What they do
@@ -221,33 +223,33 @@ def ends_of(file: str, parts: Sequence[CharacterParameters]) -> dict[str, Ending
         simulation.begin_in(states)
         begin_ns = simulation.stamp_ns
         for tick in range(TICKS + 1):
-            for actor in simulation.actors:
-                hashes[actor.role.name].add(actor.state)
+            for actor in simulation.characters:
+                hashes[actor.setup.name].add(actor.state)
             if tick < TICKS:
                 simulation.step(
                     [
                         np.where(
                             actor.commanded, driver.compute_effort(actor.state, begin_ns)[0], 0.0
                         )
-                        for driver, actor in zip(drivers, simulation.actors, strict=True)
+                        for driver, actor in zip(drivers, simulation.characters, strict=True)
                     ]
                 )
         return {
-            actor.role.name: Ending(actor.state.position, hashes[actor.role.name].hexdigest())
-            for actor in simulation.actors
+            actor.setup.name: Ending(actor.state.position, hashes[actor.setup.name].hexdigest())
+            for actor in simulation.characters
         }
 
 
 @cache
 def ends_of_two() -> dict[str, Ending]:
     return ends_of(
-        "two_humanoids.yaml", load_parameters(given("two_humanoids.yaml", SIMULATOR)).parts
+        "two_humanoids.yaml", load_parameters(given("two_humanoids.yaml", SIMULATOR)).characters
     )
 
 
 def test_two_humanoids_push_each_other() -> None:
     file = "two_humanoids.yaml"
-    parts = load_parameters(given(file, SIMULATOR)).parts
+    parts = load_parameters(given(file, SIMULATOR)).characters
 
     together = ends_of_two()
     alone = {part.name: ends_of(file, [part])[part.name] for part in parts}
@@ -274,7 +276,7 @@ def record(processes: Processes, folder: Path, file: str, order: Sequence[str]) 
     recorder.send(signal.SIGINT)
     assert recorder.wait(LONG) == 0
     assert complaints(started.values()) == []
-    return {part.name: hash_in(folder / "run" / part.name) for part in cast.parts}
+    return {part.name: hash_in(folder / "run" / part.name) for part in cast.characters}
 
 
 def hash_in(directory: Path) -> str:

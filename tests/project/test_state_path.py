@@ -29,7 +29,7 @@ HOME = {
 NO_STATES = {  # figures of runs and of wall time, which nothing is simulated from
     "actuated_characters/metrics/run_metrics.py",
     "msgs_config/runtime/durations.py",
-    "sim_node/timing/tick_times.py",
+    "sim_node/timing/rate_limiter.py",
 }
 ELEMENTARY = re.compile(
     "sinc?|cos|tan|sinh|cosh|tanh|arc(sin|cos|tan|tan2|sinh|cosh|tanh)|asinh?|acosh?|atanh?|atan2|"

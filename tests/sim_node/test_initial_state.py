@@ -18,6 +18,7 @@ from msgs_config.parameters import resolve
 from sim_node.initial_state import check_state
 from sim_node.parameters import load_parameters
 from sim_node.physics.simulation import Simulation
+from tests.sim_node.conftest import Join
 from tests.support.physics import (
     EVERY_CHARACTER,
     character,
@@ -111,7 +112,7 @@ def test_one_character_may_ask_while_another_is_given_its_state() -> None:
         "two.initial_position": [0.2],
     }
 
-    one, two = load_parameters(given).parts
+    one, two = load_parameters(given).characters
 
     assert one.values["initial_state"] == "reference"
     assert two.values["initial_state"] == "given"
@@ -124,11 +125,11 @@ def test_values_of_one_character_leave_those_of_others() -> None:
 
     changed = cast.with_values({"two": {"initial_position": [0.75]}})
 
-    assert [part.values["initial_position"] for part in changed.parts] == [[0.5], [0.75]]
+    assert [part.values["initial_position"] for part in changed.characters] == [[0.5], [0.75]]
     assert changed.values["one.initial_position"] == [0.5]
     assert changed.values["two.initial_position"] == [0.75]
     assert changed.values.keys() == cast.values.keys()
-    assert cast.parts[1].values["initial_position"] == [0.5]
+    assert cast.characters[1].values["initial_position"] == [0.5]
 
 
 # The simulation
@@ -138,8 +139,8 @@ def bits_after(run: Simulation, ticks: int = 60) -> list[bytes]:
     """Every bit of the states of all actors, from now on."""
     states = []
     for _ in range(ticks):
-        states += [a.state.position.tobytes() + a.state.velocity.tobytes() for a in run.actors]
-        run.step([np.zeros(actor.layout.size) for actor in run.actors])
+        states += [a.state.position.tobytes() + a.state.velocity.tobytes() for a in run.characters]
+        run.step([np.zeros(actor.layout.size) for actor in run.characters])
     return states
 
 
@@ -214,11 +215,11 @@ def begins_in(state: JointState) -> tuple[list[float], list[float]]:
 
 
 def test_the_simulator_begins_where_it_is_told_and_tells_all_of_it(
-    processes: Processes, client: SimulatorClient, context: Context
+    processes: Processes, client: SimulatorClient, join: Join
 ) -> None:
     simulator = asking(processes)
     line = wait_for_line(client, simulator, "waiting")
-    assert "nobody publishes on 'controller_node/initial_state'" in line
+    assert "'controller_node/initial_state' has no publisher" in line
     assert not client.states.messages and not client.configuration.messages
 
     client.speak(SAID).publish(pendulum_state())
@@ -228,23 +229,11 @@ def test_the_simulator_begins_where_it_is_told_and_tells_all_of_it(
     said = ["reference", [THIRD], [-THIRD]]
     values = client.get_parameters(topics.SIM_NODE, names)
     assert [values[0], *map(list, values[1:])] == said
-    late = SimulatorClient(context, "late")
+    late = join("late")
     late.spin_until(lambda: late.configuration.messages, "the configuration")
     parameters = json.loads(late.configuration.last.data)["parameters"]
     assert [parameters[name] for name in names] == said
-    late.close()
     assert simulator.stderr.count("waiting for the initial state") == 1
-
-
-def test_a_state_that_is_there_already_is_taken_without_a_word(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    client.speak(SAID).publish(pendulum_state())
-
-    simulator = asking(processes)
-
-    assert begins_in(client.first_state()) == ([THIRD], [-THIRD])
-    assert simulator.stderr == ""
 
 
 def test_entries_are_matched_by_name(processes: Processes, client: SimulatorClient) -> None:
@@ -263,10 +252,15 @@ def test_entries_are_matched_by_name(processes: Processes, client: SimulatorClie
     assert parameters["initial_velocity"] == velocity.tolist()
 
 
-def test_a_reset_begins_in_the_same_state(processes: Processes, client: SimulatorClient) -> None:
+def test_a_state_that_is_there_already_is_taken_without_a_word_and_again_after_a_reset(
+    processes: Processes, client: SimulatorClient
+) -> None:
     client.speak(SAID).publish(pendulum_state())
-    asking(processes)
-    state = client.answer(client.first_state(), ANSWERED)
+    simulator = asking(processes)
+    first = client.first_state()
+    assert begins_in(first) == ([THIRD], [-THIRD])
+    assert simulator.stderr == ""
+    state = client.answer(first, ANSWERED)
 
     client.reset()
 
@@ -305,7 +299,7 @@ def test_what_cannot_be_is_rejected_each_in_a_line_and_the_next_one_taken(
 @pytest.mark.parametrize(
     ("message", "timeout", "expected"),
     [
-        (None, 0.5, "nobody publishes on 'controller_node/initial_state'"),
+        (None, 0.5, "'controller_node/initial_state' has no publisher"),
         (pendulum_state(np.inf), 4.0, "'hinge' is at inf"),  # time enough to be heard
     ],
     ids=["nothing", "something wrong"],
@@ -329,16 +323,6 @@ def test_without_a_state_in_time_it_ends_with_what_is_missing_and_the_remedy(
     assert expected in line
     assert "start controller_node" in line and "'initial_state' to given" in line
     assert not client.states.messages and not client.configuration.messages
-
-
-def test_it_ends_at_once_if_a_state_is_given_as_well(processes: Processes) -> None:
-    simulator = asking(processes, initial_position=[0.1])
-
-    assert simulator.wait() == 1
-    assert simulator.stderr.splitlines() == [
-        "error: parameter 'initial_position' is given, and 'initial_state' is reference; leave out "
-        "'initial_position', or set 'initial_state' to given"
-    ]
 
 
 def test_a_signal_ends_the_wait(processes: Processes, client: SimulatorClient) -> None:
@@ -388,7 +372,7 @@ def test_while_several_controllers_say_a_state_none_counts(
 
 
 def test_each_of_several_characters_is_told_by_its_own_controller(
-    processes: Processes, client: SimulatorClient, context: Context
+    processes: Processes, client: SimulatorClient, join: Join
 ) -> None:
     given: dict[str, object] = {"characters": ["one", "two", "three"], "character": "pendulum"}
     simulator = processes.simulator(
@@ -398,12 +382,10 @@ def test_each_of_several_characters_is_told_by_its_own_controller(
     assert "'one/controller_node/initial_state'" in line
     assert "'two/controller_node/initial_state'" in line
     assert "three" not in line
-    first = [SimulatorClient(context, f"at_{name}", name) for name in ("one", "two", "three")]
+    first = [join(f"at_{name}", name) for name in ("one", "two", "three")]
     client.speak(SAID.under("two")).publish(pendulum_state(0.2))
     client.speak(SAID.under("one")).publish(pendulum_state(0.1))
 
     states = [begins_in(each.first_state()) for each in first]
 
     assert states == [([0.1], [-THIRD]), ([0.2], [-THIRD]), ([0.5], [0.0])]
-    for each in first:
-        each.close()

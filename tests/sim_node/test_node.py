@@ -7,7 +7,6 @@ import signal
 from typing import Any
 
 import pytest
-from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
@@ -15,6 +14,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.messages import topics
 from sim_node.parameters import PARAMETERS, character_parameters
+from tests.sim_node.conftest import Join
 from tests.support.ros import Processes, SimulatorClient, joint_state, stamp_ns, tick_of, wait_until
 
 TICK_NS = 10**9 // 240
@@ -85,33 +85,19 @@ def test_the_configuration_holds_all_that_a_run_depends_on(
 
 
 def test_who_comes_late_hears_configuration_and_episode_too(
-    processes: Processes, client: SimulatorClient, context: Context
+    processes: Processes, client: SimulatorClient, join: Join
 ) -> None:
     processes.simulator(republish_period=SOON)
     client.answer(client.first_state(), {})
     client.spin_until(lambda: client.configuration.messages, "configuration")
 
-    late = SimulatorClient(context, "late")
-    try:
-        late.spin_until(lambda: late.configuration.messages and late.episodes.messages, "both")
-        assert late.configuration.raw == client.configuration.raw
-        assert stamp_ns(late.episodes.last) == TICK_NS
-    finally:
-        late.close()
+    late = join("late")
+    late.spin_until(lambda: late.configuration.messages and late.episodes.messages, "both")
+    assert late.configuration.raw == client.configuration.raw
+    assert stamp_ns(late.episodes.last) == TICK_NS
 
 
 # Lockstep
-
-
-def test_the_character_waits_for_the_first_command_and_says_the_same_meanwhile(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    processes.simulator("humanoid", republish_period=SOON)
-
-    client.first_state()
-    wait_for_repeats(client, 5)
-
-    assert len(set(client.states.raw)) == 1
 
 
 def test_the_next_state_comes_only_when_every_motor_has_its_command(
@@ -119,6 +105,8 @@ def test_the_next_state_comes_only_when_every_motor_has_its_command(
 ) -> None:
     processes.simulator("humanoid", republish_period=SOON)
     state = client.first_state()
+    wait_for_repeats(client)
+    assert len(set(client.states.raw)) == 1
 
     for tick in range(1, 4):
         client.command(stamp_ns(state), all_but_left_elbow(state, 0.5))
@@ -129,68 +117,6 @@ def test_the_next_state_comes_only_when_every_motor_has_its_command(
 
         applied = {name: effort for name, effort in efforts_of(state).items() if effort}
         assert applied == all_but_left_elbow(state, 0.5) | {"left_elbow": 0.25}
-
-
-def test_two_publishers_complete_a_tick_together(
-    processes: Processes, client: SimulatorClient, context: Context
-) -> None:
-    processes.simulator("humanoid")
-    other = SimulatorClient(context, "other")
-    try:
-        state = client.first_state()
-        other.first_state()
-
-        for tick in range(1, 6):
-            client.command(stamp_ns(state), all_but_left_elbow(state, 1.0 * tick))
-            other.command(stamp_ns(state), {"left_elbow": -0.5 * tick})
-            state = client.state(tick + 1)
-
-            applied = {name: effort for name, effort in efforts_of(state).items() if effort}
-            expected = all_but_left_elbow(state, 1.0 * tick) | {"left_elbow": -0.5 * tick}
-            assert applied == expected
-    finally:
-        other.close()
-
-
-def test_the_effort_in_a_state_is_what_was_applied_before_it(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    processes.simulator("humanoid")
-    state = client.first_state()
-
-    for torque in (5.0, -3.0, 0.1):
-        state = client.answer(state, {"right_knee": torque, "chest_y": 2.0 * torque})
-
-        applied = {name: effort for name, effort in efforts_of(state).items() if effort}
-        assert applied == {"right_knee": torque, "chest_y": 2.0 * torque}
-
-
-def test_an_effort_beyond_the_limit_is_clipped_and_a_ball_joints_keeps_its_direction(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    processes.simulator("humanoid")
-    state = client.first_state()
-
-    state = client.answer(state, {"right_knee": -1000.0, "chest_x": 300.0, "chest_z": -400.0})
-
-    effort = efforts_of(state)
-    assert effort["right_knee"] == pytest.approx(-150.0)
-    chest = [effort[f"chest_{axis}"] for axis in "xyz"]
-    assert chest == pytest.approx([120.0, 0.0, -160.0])  # of length 200
-
-
-def test_a_delayed_command_is_applied_that_many_ticks_later(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    processes.simulator(command_delay_ticks=2)
-    state = client.first_state()
-
-    applied = []
-    for torque in (1.0, 2.0, 3.0, 4.0):
-        state = client.answer(state, {"hinge": torque})
-        applied.append(efforts_of(state)["hinge"])
-
-    assert applied == [0.0, 0.0, 1.0, 2.0]
 
 
 def test_a_controller_that_comes_late_is_not_too_late(
@@ -238,31 +164,28 @@ def test_old_and_future_stamps_are_counted_and_dropped(
 
 
 def test_two_different_commands_pause_it_and_name_the_joint_and_the_senders(
-    processes: Processes, client: SimulatorClient, context: Context
+    processes: Processes, client: SimulatorClient, join: Join
 ) -> None:
     processes.simulator("humanoid")
-    intruder = SimulatorClient(context, "intruder")
-    try:
-        state = client.first_state()
-        intruder.first_state()
-        conflicts = itertools.count(1)
+    intruder = join("intruder")
+    state = client.first_state()
+    intruder.first_state()
+    conflicts = itertools.count(1)
 
-        def provoke() -> str:
-            for sender, effort in ((client, 1.0), (intruder, 2.0)):
-                sender.command(stamp_ns(state), {"left_elbow": effort})
-            status = client.reported(paused=True, conflict=next(conflicts), tick=1)
-            assert status.level == status.ERROR
-            assert "'left_elbow'" in status.message
-            assert client.pause(False).success
-            return str(status.message)
+    def provoke() -> str:
+        for sender, effort in ((client, 1.0), (intruder, 2.0)):
+            sender.command(stamp_ns(state), {"left_elbow": effort})
+        status = client.reported(paused=True, conflict=next(conflicts), tick=1)
+        assert status.level == status.ERROR
+        assert "'left_elbow'" in status.message
+        assert client.pause(False).success
+        return str(status.message)
 
-        # a node hears of publishers a little before it hears of their names
-        wait_until(
-            lambda: {"/intruder", "/test_client"} <= set(re.split(r"[ ,;]+", provoke())),
-            "the names of the senders",
-        )
-    finally:
-        intruder.close()
+    # a node hears of publishers a little before it hears of their names
+    wait_until(
+        lambda: {"/intruder", "/test_client"} <= set(re.split(r"[ ,;]+", provoke())),
+        "the names of the senders",
+    )
 
 
 def test_after_a_conflict_it_goes_on_when_it_is_told_to_and_asks_again(
@@ -470,22 +393,6 @@ def test_a_divergence_aborts_and_names_the_joint(
     assert "the limit is 10" in error
 
 
-def test_after_a_divergence_it_refuses_to_go_on(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    processes.simulator(speed_limit=0.1, max_ticks=5)
-    state = client.first_state()
-
-    client.command(stamp_ns(state), {"hinge": 100.0})
-
-    status = client.reported(paused=True)
-    assert status.level == status.ERROR
-    assert "'hinge'" in status.message
-    response = client.pause(False)
-    assert not response.success
-    assert "'hinge'" in response.message
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_promptly_and_well_while_somebody_listens(
     processes: Processes, client: SimulatorClient, number: signal.Signals
@@ -506,6 +413,10 @@ WRONG: dict[str, tuple[dict[str, Any], list[str]]] = {
     "character": ({"character": "centaur"}, ["centaur", "humanoid"]),
     "name": ({"max_tick": 3}, ["'max_tick'", "max_ticks"]),
     "joint": ({"commanded_joints": ["hinge", "tail"]}, ["'tail'", "hinge"]),
+    "both": (
+        {"initial_state": "reference", "initial_position": [0.1]},
+        ["'initial_position' is given, and 'initial_state' is reference", "to given"],
+    ),
     "length": ({"initial_position": [0.0, 1.0]}, ["'initial_position'", "2 entries", "hinge"]),
 }
 

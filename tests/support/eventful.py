@@ -82,7 +82,7 @@ def eventful_run(
     now = START_NS
     with Simulation([role], make_settings(plan.simulator)) as simulation:
         simulation.watches_contacts = True
-        (actor,) = simulation.actors
+        (actor,) = simulation.characters
         episode_ns = actor.state.stamp_ns
         run.states.append(actor.state)
         run.log_times_ns.append(now)

@@ -19,7 +19,8 @@ from msgs_config.messages.projectiles import BallStates, ball_names
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays
-from sim_node.parameters import make_character_setup, make_settings, push_ticks
+from sim_node.node_settings import make_node_settings
+from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
@@ -78,7 +79,7 @@ class _Run:
         with Simulation([role], make_settings(plan.simulator)) as simulation:
             simulation.watches_contacts = self._case.contacts or controller.needs_contacts
             balls = self._throw_schedule(simulation)
-            schedule, (actor,) = self._schedule(simulation), simulation.actors
+            schedule, (actor,) = self._schedule(simulation), simulation.characters
             episode_ns = actor.state.stamp_ns
             self._states.append(actor.state)
             for _ in range(plan.ticks):
@@ -114,7 +115,7 @@ class _Run:
                 arrays.wrenches,
                 arrays.points,
                 first_tick=simulation.clock.first_tick_from(push.stamp_ns),
-                ticks=push_ticks(self._plan.simulator),
+                ticks=make_node_settings(self._plan.simulator).push_ticks,
             )
         return schedule
 

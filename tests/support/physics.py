@@ -63,6 +63,21 @@ def without_self_collision(name_or_path: str) -> Character:
     return replace(whole, loading=replace(whole.loading, self_collision=False))
 
 
+def box_character(
+    folder: Path, size: str, mass: float = 2.0, *, fixed: bool = False, name: str = "box"
+) -> Character:
+    """A box of a mass in kg and edges in m, about its link's origin, as files in a folder."""
+    inertia = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+    (folder / f"{name}.urdf").write_text(
+        f'<robot name="{name}"><link name="box"><inertial><mass value="{mass}"/>{inertia}'
+        f'</inertial><collision><geometry><box size="{size}"/></geometry></collision></link>'
+        "</robot>"
+    )
+    file = folder / f"{name}.yaml"
+    file.write_text(f"urdf: {name}.urdf\nfixed_base: {str(fixed).lower()}\ninertia: file\n")
+    return load_character(str(file))
+
+
 def random_state(whole: Character, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """A position (n,) within the limits and a velocity (n,), high above the ground."""
     layout = whole.layout
@@ -127,9 +142,9 @@ class LoneWorld(World):
 class LoneSimulation(Simulation):
     """A simulation of one actor."""
 
-    def __init__(self, role: CharacterSetup, settings: SimulationSettings) -> None:
-        super().__init__([role], settings)
-        (self.actor,) = self.actors
+    def __init__(self, setup: CharacterSetup, settings: SimulationSettings) -> None:
+        super().__init__([setup], settings)
+        (self.actor,) = self.characters
         self.layout = self.actor.layout
 
     @property
@@ -274,9 +289,12 @@ def simulation(name: str, **given: object) -> LoneSimulation:
 
 def joint_simulation(given: Mapping[str, object]) -> Simulation:
     """A simulation of several characters, with the parameters given."""
-    cast = for_simulator.load_parameters(given)
-    roles = [for_simulator.make_character_setup(p.character, p.values, p.name) for p in cast.parts]
-    return Simulation(roles, for_simulator.make_settings(cast.values))
+    loaded = for_simulator.load_parameters(given)
+    setups = [
+        for_simulator.make_character_setup(each.character, each.values, each.name)
+        for each in loaded.characters
+    ]
+    return Simulation(setups, for_simulator.make_settings(loaded.values))
 
 
 def controller(name: str, **given: object) -> Controller:

@@ -103,7 +103,7 @@ def run(
     }
     with joint_simulation(settings) as simulation:
         simulation.watches_contacts = True
-        actor, ball = simulation.actors
+        actor, ball = simulation.characters
         episode_ns = actor.state.stamp_ns
         positions, velocities = [actor.state.position], [actor.state.velocity]
         efforts, references, contacts, balls = [], [], [], []
@@ -141,7 +141,7 @@ def run(
 
 def _throw(simulation: Simulation, throw: ProjectileThrow) -> None:
     """Put the ball beside the link, on its way to it; it flies with the link's own root."""
-    actor, ball = simulation.actors
+    actor, ball = simulation.characters
     origins, turns = actor.link_frames()
     index = LINKS.index(throw.link)
     middle = np.array(HUMANOID.links[index].inertial_pose.position)

@@ -45,7 +45,7 @@ class PosedCharacter:
             count = len(self.shapes)
             return np.full((count, 3), np.nan), np.full((count, 4), np.nan)
         self._body.set_state(position, self._still)
-        return self._body.links.frames()
+        return self._body.link_frames()
 
     def outline(self, origins: FloatArray, turns_xyzw: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Spheres around all that is seen of it: centres (m, 3), radii (m,), in m.

@@ -76,7 +76,7 @@ def states_without_ros(plan: Plan, pushes: Sequence[ExternalWrench]) -> list[Sta
     controller = make_controller(plan.character, plan.reference, plan.controller)
     role = make_character_setup(plan.character, plan.simulator)
     with Simulation([role], make_settings(plan.simulator)) as run:
-        (actor,) = run.actors
+        (actor,) = run.characters
         states = [actor.state]
         for _ in range(plan.ticks):
             effort, _ = controller.compute_effort(states[-1], states[0].stamp_ns)

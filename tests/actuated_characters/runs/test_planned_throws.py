@@ -65,7 +65,7 @@ def first_hit(plan: Plan, planned: PlannedThrow) -> tuple[int, tuple[str, ...], 
 
     def watch(run: Simulation) -> None:
         watch_states(states, run)
-        balls = run._world.balls._numbers
+        balls = run._world.balls.numbers
         if balls and (links := _touching(run, balls[0])):
             found.append((run.tick, links))
 
@@ -82,7 +82,7 @@ def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
     """The links of the character that a ball pushes, by the engine's own list."""
     from msgs_config.character.bullet import pybullet
 
-    body = run.actors[0]._body
+    body = run.characters[0]._body
     points = pybullet.getContactPoints(ball, body._body, physicsClientId=body._client)
     rows = {number: row for row, number in enumerate(body.links._numbers)}
     return tuple(LINKS[rows[point[4]]] for point in points)

@@ -20,7 +20,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.joint_state import read_frame_id, split_stamp
 from msgs_config.messages.session import is_session
 from msgs_config.runtime.polling import DirectSubscription
-from tests.sim_node.interface.test_inbox import mutants
+from tests.sim_node.interface.test_hostile_messages import mutants
 from tests.support.ros import Client, Processes, joint_state, wait_until, wrench_message
 from tests.support.runs import summary_of
 

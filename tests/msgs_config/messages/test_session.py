@@ -11,6 +11,7 @@ from msgs_config.messages.session import (
     SILENT,
     SILENT_AND_ALONE,
     ForeignSessions,
+    OwnSession,
     SessionBinding,
     episode_session,
     episode_text,
@@ -238,3 +239,20 @@ def test_any_number_of_foreign_sessions_is_counted_but_few_are_named() -> None:
     assert len(said) == 9
     assert "no more are named" in said[-1]
     assert foreign.counts["episode"] == 1000
+
+
+def test_messages_of_another_session_are_rejected_counted_and_named_once() -> None:
+    lines: list[str] = []
+    own = OwnSession("/sim_node#0a", lines.append)
+
+    verdicts = [
+        own.rejects("push", frame_id)
+        for frame_id in ("/sim_node#0a", "", "world", "/other#0b", "/other#0b", "/third#0c")
+    ]
+
+    assert verdicts == [False, False, False, True, True, True]
+    assert own.counts == {"push": 3}
+    assert [line.split(";")[0] for line in lines] == [
+        f"rejected 'push': its session is {other}, this node's is /sim_node#0a"
+        for other in ("/other#0b", "/third#0c")
+    ]

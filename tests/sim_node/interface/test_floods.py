@@ -3,12 +3,12 @@
 import signal
 
 import pytest
-from rclpy.context import Context
 from rclpy.serialization import serialize_message
 
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.runtime.once_logger import MOST_LOGGED
+from tests.sim_node.conftest import Join
 from tests.support.ros import (
     ControllerClient,
     Processes,
@@ -50,51 +50,25 @@ def test_a_flood_while_it_waits_takes_a_bounded_memory(
     assert_quiet(simulator)
 
 
-def test_two_controllers_of_one_joint_stop_lockstep_and_both_are_named(
-    processes: Processes, context: Context
-) -> None:
-    watcher = SimulatorClient(context, "watcher")
-    try:
-        simulator = processes.simulator(initial_position=[0.0], wait_for_subscribers=3)
-        for name, stiffness in (("one", 50.0), ("other", 80.0)):
-            given = ["character:=pendulum", f"gains.hinge.p:={stiffness}"]
-            arguments = [part for one in given for part in ("-p", one)]
-            module = ["-m", "controller_node.main", "--ros-args", "-r", f"__node:={name}"]
-            processes.python(*module, *arguments)
-        status = watcher.reported(paused=True)
-
-        assert status.level == status.ERROR
-        assert "'hinge'" in status.message
-        assert {"/one", "/other"} <= set(status.message.replace(",", "").split())
-        assert simulator.exit_code is None
-    finally:
-        watcher.close()
-
-
 def test_two_controllers_of_one_joint_in_real_time_are_told_once_and_the_last_counts(
-    processes: Processes, client: SimulatorClient, context: Context
+    processes: Processes, client: SimulatorClient, join: Join
 ) -> None:
-    intruder = SimulatorClient(context, "intruder")
-    try:
-        simulator = processes.simulator(
-            mode="realtime", real_time_factor=0.25, wait_for_subscribers=2
-        )
-        client.first_state()
-        intruder.first_state()
+    intruder = join("intruder")
+    simulator = processes.simulator(mode="realtime", real_time_factor=0.25, wait_for_subscribers=2)
+    client.first_state()
+    intruder.first_state()
 
-        while len(client.states.by_tick()) < 60:
-            state = client.state(tick_of(client.states.last) + 1)
-            client.command(stamp_ns(state), {"hinge": 1.0})
-            intruder.command(stamp_ns(state), {"hinge": 2.0})
+    while len(client.states.by_tick()) < 60:
+        state = client.state(tick_of(client.states.last) + 1)
+        client.command(stamp_ns(state), {"hinge": 1.0})
+        intruder.command(stamp_ns(state), {"hinge": 2.0})
 
-        applied = {sum(state.effort) for state in client.states.messages}
-        assert {1.0, 2.0} >= applied - {0.0}
-        assert applied & {1.0, 2.0}
-        wait_until(lambda: "two different commands" in simulator.stderr, "the warning")
-        assert simulator.stderr.count("two different commands for 'hinge'") == 1
-        assert "/intruder" in simulator.stderr and "/test_client" in simulator.stderr
-    finally:
-        intruder.close()
+    applied = {sum(state.effort) for state in client.states.messages}
+    assert {1.0, 2.0} >= applied - {0.0}
+    assert applied & {1.0, 2.0}
+    wait_until(lambda: "two different commands" in simulator.stderr, "the warning")
+    assert simulator.stderr.count("two different commands for 'hinge'") == 1
+    assert "/intruder" in simulator.stderr and "/test_client" in simulator.stderr
 
 
 def test_commands_at_ten_times_the_rate_change_nothing_in_lockstep(

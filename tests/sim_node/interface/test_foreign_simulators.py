@@ -183,7 +183,6 @@ def in_session(text: str, session: str) -> String:
 def test_a_configuration_of_another_simulator_does_not_end_a_running_controller(
     processes: Processes, simulator: ControllerClient, case: str
 ) -> None:
-    # Arrange
     measure, name, given = REFUSED_SIMULATORS[case]
     reports = simulator.listen(topics.DIAGNOSTICS)
     node = processes.controller("pendulum", **SINE)
@@ -192,10 +191,9 @@ def test_a_configuration_of_another_simulator_does_not_end_a_running_controller(
     simulator.spin_until(configurations.get_subscription_count, "a controller that listens")
     text = description(name, measure(), **given)
 
-    # Act
     configurations.publish(in_session(text, OTHER))
 
-    # Assert: it is noticed, and the bound simulator's own one does end it
+    # it is noticed, and the bound simulator's own one does end it
     reported(simulator, reports, foreign_configurations=1)
     assert list(simulator.ask(state(2)).effort) == expected(state(2), 1)
     configurations.publish(in_session(text, OWN))
@@ -243,7 +241,6 @@ def test_a_configuration_that_comes_after_the_first_state_does_not_end_the_contr
 def test_contacts_of_another_simulator_are_no_hit(
     processes: Processes, simulator: ControllerClient
 ) -> None:
-    # Arrange
     humanoid, modes = character("humanoid"), simulator.listen(topics.MODE.of("controller_node"))
     contacts = simulator.speak(topics.CONTACTS)
     processes.controller("humanoid", behaviour="reactive")
@@ -266,7 +263,6 @@ def test_contacts_of_another_simulator_are_no_hit(
         stamps = {stamp_ns(torques) for torques in simulator.torques.messages}
         return CLOCK.stamp_ns(tick) in stamps
 
-    # Act
     for tick in range(1, 8):
 
         def send(tick: int = tick) -> None:
@@ -277,7 +273,6 @@ def test_contacts_of_another_simulator_are_no_hit(
 
         simulator.spin_sending(send, lambda tick=tick: answered(tick), "an answer")
 
-    # Assert
     assert [json.loads(message.data)["mode"] for message in modes.messages] == ["TRACK"]
 
 

@@ -2,12 +2,9 @@
 
 import itertools
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from rclpy.context import Context
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker
 
@@ -16,6 +13,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import ShapeType
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
+from tests.sim_node.conftest import Join
 from tests.support.physics import FLOATING_TURNED_FRAMES, character, simulation
 from tests.support.ros import Inbox, Processes, SimulatorClient, stamp_ns, tick_of, wrench_message
 
@@ -165,19 +163,6 @@ def test_contacts_carry_the_whole_wrench_on_each_link(
     assert largest > 1.0
 
 
-def test_contacts_come_at_every_tick_also_where_nothing_touches(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    contacts = client.listen(topics.CONTACTS)
-    processes.simulator(FLOATING_TURNED_FRAMES, wait_for_subscribers=1)
-
-    client.drive(client.first_state(), 20, np.random.default_rng(1))
-    client.spin_until(lambda: 21 in contacts.ticks(), "contacts")
-
-    assert set(contacts.ticks()) >= set(range(10, 22))
-    assert not any(message.joint_names or message.wrench for message in contacts.messages)
-
-
 def test_a_tick_is_published_in_the_order_clock_contacts_pushes_state(
     processes: Processes, client: SimulatorClient
 ) -> None:
@@ -315,15 +300,6 @@ def test_the_diagnostics_say_how_it_goes(processes: Processes, client: Simulator
 # Several characters
 
 
-@contextmanager
-def beside(context: Context, name: str) -> Iterator[SimulatorClient]:
-    other = SimulatorClient(context, f"beside_{name}", below=name)
-    try:
-        yield other
-    finally:
-        other.close()
-
-
 def two(**parameters: object) -> dict[str, object]:
     """Parameters of a simulator of a humanoid on the left and a pendulum on the right."""
     return {
@@ -337,38 +313,38 @@ def two(**parameters: object) -> dict[str, object]:
 
 
 def test_several_characters_have_topics_of_their_own_and_one_barrier_and_clock(
-    processes: Processes, context: Context
+    processes: Processes, join: Join
 ) -> None:
-    with beside(context, "left") as left, beside(context, "right") as right:
-        processes.node(topics.SIM_NODE, **two(republish_period=SOON))
-        first_left, first_right = left.first_state(), right.first_state()
+    left, right = join("at_left", "left"), join("at_right", "right")
+    processes.node(topics.SIM_NODE, **two(republish_period=SOON))
+    first_left, first_right = left.first_state(), right.first_state()
 
-        state = first_left
-        for tick in range(1, 6):
-            motors = [name for name in state.name if not name.startswith("root_")]
-            left.command(stamp_ns(state), dict.fromkeys(motors, 0.5))
-            enough = len(left.states) + 3  # republished: it waits for the other
-            left.spin_until(lambda enough=enough: len(left.states) >= enough, "repeated states")
-            assert tick_of(left.states.last) == tick
-            right.command(stamp_ns(state), {"hinge": -0.25})
-            state = left.state(tick + 1)
-            assert stamp_ns(right.state(tick + 1)) == stamp_ns(state)
+    state = first_left
+    for tick in range(1, 6):
+        motors = [name for name in state.name if not name.startswith("root_")]
+        left.command(stamp_ns(state), dict.fromkeys(motors, 0.5))
+        enough = len(left.states) + 3  # republished: it waits for the other
+        left.spin_until(lambda enough=enough: len(left.states) >= enough, "repeated states")
+        assert tick_of(left.states.last) == tick
+        right.command(stamp_ns(state), {"hinge": -0.25})
+        state = left.state(tick + 1)
+        assert stamp_ns(right.state(tick + 1)) == stamp_ns(state)
 
-        assert tuple(first_left.name) == character("humanoid").layout.dof_names
-        assert list(first_right.name) == ["hinge"]
-        assert list(right.state(6).effort) == [-0.25]
-        assert set(left.state(6).effort) == {0.0, 0.5}
-        clock = [(m.clock.sec, m.clock.nanosec) for m in left.clock.messages]
-        assert len(clock) == len(set(clock))  # not one a character
-        assert len(left.node.get_publishers_info_by_topic("/clock")) == 1
-        for one, name, whole in ((left, "left", "humanoid"), (right, "right", "pendulum")):
-            one.spin_until(lambda one=one: one.configuration.messages, "configuration")
-            content = json.loads(one.configuration.last.data)
-            assert content["character"] == whole
-            assert len(content["parameters"]["initial_position"]) == len(one.states.last.name)
-            assert stamp_ns(one.episodes.last) == CLOCK.stamp_ns(1)
-            status = one.spin_until(lambda one=one, name=name: _status(one, name), "its report")
-            assert status.level == status.OK
+    assert tuple(first_left.name) == character("humanoid").layout.dof_names
+    assert list(first_right.name) == ["hinge"]
+    assert list(right.state(6).effort) == [-0.25]
+    assert set(left.state(6).effort) == {0.0, 0.5}
+    clock = [(m.clock.sec, m.clock.nanosec) for m in left.clock.messages]
+    assert len(clock) == len(set(clock))  # not one a character
+    assert len(left.node.get_publishers_info_by_topic("/clock")) == 1
+    for one, name, whole in ((left, "left", "humanoid"), (right, "right", "pendulum")):
+        one.spin_until(lambda one=one: one.configuration.messages, "configuration")
+        content = json.loads(one.configuration.last.data)
+        assert content["character"] == whole
+        assert len(content["parameters"]["initial_position"]) == len(one.states.last.name)
+        assert stamp_ns(one.episodes.last) == CLOCK.stamp_ns(1)
+        status = one.spin_until(lambda one=one, name=name: _status(one, name), "its report")
+        assert status.level == status.OK
 
 
 def _status(client: SimulatorClient, name: str) -> object:
@@ -377,31 +353,31 @@ def _status(client: SimulatorClient, name: str) -> object:
 
 
 def test_each_of_several_characters_is_pushed_shown_and_driven_by_its_own(
-    processes: Processes, context: Context
+    processes: Processes, join: Join
 ) -> None:
-    with beside(context, "left") as left, beside(context, "right") as right:
-        applied = left.listen(topics.APPLIED_WRENCH.under("left"))
-        others = right.listen(topics.APPLIED_WRENCH.under("right"))
-        odometry = right.listen(topics.ODOM.under("right"))
-        simulator = processes.node(
-            topics.SIM_NODE, **two(max_ticks=120, wait_for_subscribers=2, wrench_duration=0.0)
-        )
-        left.spin_until(left.wrenches.get_subscription_count, "a simulator that listens")
-        left.wrenches.publish(wrench_message(CLOCK.stamp_ns(60), [("chest", [1.0] * 6)]))
+    left, right = join("at_left", "left"), join("at_right", "right")
+    applied = left.listen(topics.APPLIED_WRENCH.under("left"))
+    others = right.listen(topics.APPLIED_WRENCH.under("right"))
+    odometry = right.listen(topics.ODOM.under("right"))
+    simulator = processes.node(
+        topics.SIM_NODE, **two(max_ticks=120, wait_for_subscribers=2, wrench_duration=0.0)
+    )
+    left.spin_until(left.wrenches.get_subscription_count, "a simulator that listens")
+    left.wrenches.publish(wrench_message(CLOCK.stamp_ns(60), [("chest", [1.0] * 6)]))
 
-        processes.controller("humanoid", namespace="left", root_assistance=False)
-        processes.controller("pendulum", namespace="right", placement=[2.0, 0.0, 0.0, 0.0])
+    processes.controller("humanoid", namespace="left", root_assistance=False)
+    processes.controller("pendulum", namespace="right", placement=[2.0, 0.0, 0.0, 0.0])
 
-        left.spin_until(lambda: 121 in left.states.ticks(), "the last state")
-        right.spin_until(lambda: 121 in right.states.ticks(), "the last state")
-        assert simulator.wait() == 0
-        left.spin_until(lambda: 121 in applied.ticks(), "the pushes")
-        right.spin_until(lambda: 121 in others.ticks(), "the pushes")
-        right.spin_until(lambda: odometry.messages, "odometry")
-        assert [tick_of(m) for m in applied.messages if m.joint_names] == [61]
-        assert not any(m.joint_names for m in others.messages)
-        assert odometry.last.child_frame_id == f"right/{character('pendulum').links[0].name}"
-        assert odometry.last.pose.pose.position.x == pytest.approx(2.0)
+    left.spin_until(lambda: 121 in left.states.ticks(), "the last state")
+    right.spin_until(lambda: 121 in right.states.ticks(), "the last state")
+    assert simulator.wait() == 0
+    left.spin_until(lambda: 121 in applied.ticks(), "the pushes")
+    right.spin_until(lambda: 121 in others.ticks(), "the pushes")
+    right.spin_until(lambda: odometry.messages, "odometry")
+    assert [tick_of(m) for m in applied.messages if m.joint_names] == [61]
+    assert not any(m.joint_names for m in others.messages)
+    assert odometry.last.child_frame_id == f"right/{character('pendulum').links[0].name}"
+    assert odometry.last.pose.pose.position.x == pytest.approx(2.0)
 
 
 # Nobody's listening changes anything

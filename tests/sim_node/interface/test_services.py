@@ -270,11 +270,12 @@ def test_a_reset_helps_after_a_divergence(processes: Processes, client: Simulato
     processes.simulator(speed_limit=0.1)
     client.command(stamp_ns(client.first_state()), {"hinge": 100.0})
     until_reported(client, paused=True)
-    stepped = response_of(client, client.step())
+    stepped, resumed = response_of(client, client.step()), client.pause(False)
 
     response = client.reset()
 
-    assert (stepped[0], "'hinge'" in stepped[1]) == (False, True)
+    for success, message in (stepped, (resumed.success, resumed.message)):
+        assert not success and "'hinge'" in message
     assert response.success
     assert "paused" in response.message
     until_reported(client, paused=True, episode=2, tick=2)

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 
 import numpy as np
-from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
-from sensor_msgs.msg import JointState, MultiDOFJointState
+from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker
 
 from msgs_config.arrays import FloatArray
@@ -15,6 +14,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.projectiles import decode_balls
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius
 from sim_node.physics.throws import MOST_BALLS
+from tests.sim_node.conftest import Join
 from tests.support.physics import character, joint_simulation, simulation
 from tests.support.ros import (
     PATIENCE,
@@ -101,7 +101,7 @@ def test_a_throw_begins_at_its_tick_and_does_what_it_does_without_ros(
     where, states = motions(thrown), client.states.by_tick()
     assert sorted(where) == list(range(11, 62))
     with simulation("humanoid") as run:
-        (actor,) = run.actors
+        (actor,) = run.characters
         for tick in range(1, 61):
             run.step([np.zeros(run.layout.size)], None, {10: [AT_CHEST], 20: [FAR]}.get(tick, ()))
             assert list(states[tick + 1].position) == actor.state.position.tolist()
@@ -114,20 +114,17 @@ def test_a_throw_begins_at_its_tick_and_does_what_it_does_without_ros(
 def test_balls_are_shown_where_they_are_until_a_reset(
     processes: Processes, client: SimulatorClient
 ) -> None:
-    # Arrange
     throws, shown = client.speak(topics.THROW), client.listen(topics.VISUALIZATION)
     _, thrown = hear(client)
     processes.simulator("pendulum", display_rate=240.0, wait_for_subscribers=1)
     send(client, throws, throw_message(CLOCK.stamp_ns(3), AT_CHEST))
 
-    # Act
     state = client.drive(client.first_state(), 9, np.random.default_rng(1))
     client.spin_until(lambda: markers_at(shown, tick_of(state)), "the last markers")
     client.spin_until(lambda: tick_of(state) in thrown.ticks(), "the last place of the ball")
     client.reset()
     again = client.spin_until(lambda: markers_at(shown, tick_of(state) + 1), "the next episode")
 
-    # Assert
     before, last = markers_at(shown, 2), markers_at(shown, tick_of(state))
     *body, ball = last
     assert [m.id for m in before] == [m.id for m in body]
@@ -145,34 +142,6 @@ def markers_at(shown: Inbox, tick: int) -> list[Marker]:
     """The markers of a tick; none if they are not there."""
     found = [m.markers for m in shown.messages if tick_of(m.markers[0]) == tick]
     return list(found[-1]) if found else []
-
-
-def test_a_ball_is_felt_like_any_other_contact_and_a_reset_removes_it(
-    processes: Processes, client: SimulatorClient
-) -> None:
-    throws, contacts = client.speak(topics.THROW), client.listen(topics.CONTACTS)
-    _, thrown = hear(client)
-    processes.simulator("humanoid", gravity=0.0, terrain="none", wait_for_subscribers=1)
-    state = client.first_state()
-    above = float(state.position[2]) + 0.2
-    ball = ProjectileThrow(2.0, 0.1, (0.4, 0.0, above), (-8.0, 0.0, 0.0))
-    send(client, throws, throw_message(0, ball))
-    pushed: list[MultiDOFJointState] = []
-
-    while not pushed:
-        state = client.answer(state, {})
-        last = client.states.last
-        client.spin_until(lambda last=last: tick_of(last) in contacts.ticks(), "its contacts")
-        pushed = [message for message in contacts.messages if message.joint_names]
-        assert tick_of(state) < 100
-    client.reset()
-    after = client.state(tick_of(state) + 1)
-    following = client.answer(after, {})
-
-    force = pushed[0].wrench[0].force
-    assert force.x < -1000.0  # about 16 N s in a tick
-    assert max(thrown.ticks()) <= tick_of(state)
-    assert not any(following.velocity)  # nothing has hit it again
 
 
 REFUSED: dict[str, tuple[JointState | bytes, str]] = {
@@ -216,34 +185,28 @@ def test_a_wrong_throw_is_refused_whole_and_the_reason_said_once_and_counted(
     assert len(warnings) <= len(reasons)
 
 
-def test_the_balls_of_a_world_of_several_are_nobodys(
-    processes: Processes, context: Context
-) -> None:
+def test_the_balls_of_a_world_of_several_are_nobodys(processes: Processes, join: Join) -> None:
     placed = [0.0, 3.0, 0.0, 0.0]
     given = {"characters": ["left", "right"], "left.placement": placed}
-    clients = [SimulatorClient(context, f"at_{name}", name) for name in ("left", "right")]
-    try:
-        throws, (_, thrown) = clients[0].speak(topics.THROW), hear(clients[0])
-        processes.simulator(
-            "humanoid", characters=["left", "right"], left__placement=placed, wait_for_subscribers=1
-        )
-        send(clients[0], throws, throw_message(CLOCK.stamp_ns(3), AT_CHEST))
-        states = [client.first_state() for client in clients]
-        for _ in range(19):
-            for client, state in zip(clients, states, strict=True):
-                client.command(stamp_ns(state), dict.fromkeys(state.name[6:], 0.0))
-            states = [client.state(tick_of(states[0]) + 1) for client in clients]
-        clients[0].spin_until(lambda: 20 in thrown.ticks(), "the last place of the ball")
-    finally:
-        for client in clients:
-            client.close()
+    clients = [join(f"at_{name}", name) for name in ("left", "right")]
+    throws, (_, thrown) = clients[0].speak(topics.THROW), hear(clients[0])
+    processes.simulator(
+        "humanoid", characters=["left", "right"], left__placement=placed, wait_for_subscribers=1
+    )
+    send(clients[0], throws, throw_message(CLOCK.stamp_ns(3), AT_CHEST))
+    states = [client.first_state() for client in clients]
+    for _ in range(19):
+        for client, state in zip(clients, states, strict=True):
+            client.command(stamp_ns(state), dict.fromkeys(state.name[6:], 0.0))
+        states = [client.state(tick_of(states[0]) + 1) for client in clients]
+    clients[0].spin_until(lambda: 20 in thrown.ticks(), "the last place of the ball")
 
     nothing = np.zeros(character("humanoid").layout.size)
     with joint_simulation({"character": "humanoid", **given}) as run:
         for tick in range(1, 20):
             run.step([nothing, nothing], None, [AT_CHEST] if tick == 3 else ())
         assert motions(thrown)[20].tobytes() == run.ball_motion().tobytes()
-        for state, actor in zip(states, run.actors, strict=True):
+        for state, actor in zip(states, run.characters, strict=True):
             assert list(state.position) == actor.state.position.tolist()
     assert run.balls == (AT_CHEST,)
 

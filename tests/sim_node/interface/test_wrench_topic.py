@@ -6,18 +6,16 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import MultiDOFJointState
 
-from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from sim_node.physics.wrenches import ExternalWrench
-from tests.support.physics import DATA, character, simulation
+from tests.support.physics import character, simulation
 from tests.support.ros import Inbox, Processes, SimulatorClient, tick_of, wrench_message
 
 SESSION = "/sim_node#000000000001"  # of two runs that are compared byte by byte
 CLOCK = TickClock(240)
 THREE_TICKS = 3.0 / 240.0  # s
-FREE_BOX = str(DATA / "free_box.yaml")
 
 Told = list[tuple[str, tuple[float, ...], tuple[float, ...]]]
 
@@ -167,35 +165,6 @@ def test_several_links_are_pushed_at_once_where_the_message_says(
         for link, wrench, point in zip(links, wrenches, points, strict=True)
     ]
     assert_as_without_ros(client, "humanoid", 29, acts)
-
-
-OFF_CENTRE = (0.0, 0.3, 0.0)  # m
-
-
-@pytest.mark.parametrize("point", [None, OFF_CENTRE], ids=["the centre of mass", "beside it"])
-def test_a_push_does_to_a_free_body_what_mechanics_says(
-    processes: Processes, client: SimulatorClient, point: tuple[float, ...] | None
-) -> None:
-    start = np.array([0.0, 0.0, 3.0, 0.0, 0.0, np.pi / 2.0])  # its x axis is the world's y
-    processes.simulator(
-        FREE_BOX,
-        gravity=0.0,
-        wrench_duration=1.0 / 240.0,
-        initial_position=start.tolist(),
-        mode="realtime",  # nothing of it can be commanded
-        wait_for_subscribers=1,
-    )
-    client.first_state()
-
-    wrench = (4.0, 2.0, 0.0, 0.0, 0.0, 5.0)
-    client.wrenches.publish(wrench_message(0, [("box", wrench)], [point] if point else []))
-    state = client.spin_until(lambda: any(client.states.last.velocity) and client.states.last, "it")
-
-    impulse = np.array(wrench[:3]) / 240.0
-    arm = np.array((-0.3, 0.0, 0.0)) if point else np.zeros(3)  # in the world
-    spin: FloatArray = np.array(wrench[3:]) / 240.0 + np.cross(arm, impulse)
-    np.testing.assert_allclose(state.velocity[:3], impulse / 2.0, atol=1e-9)  # it has 2 kg
-    np.testing.assert_allclose(state.velocity[5], spin[2] / 0.25, atol=1e-9)
 
 
 # What is not taken

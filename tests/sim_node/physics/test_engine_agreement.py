@@ -97,23 +97,19 @@ def test_both_engines_accelerate_alike_under_efforts_on_every_degree_of_freedom(
 
 def test_links_without_inertia_are_point_masses_to_both(tmp_path: Path) -> None:
     """As in the quadruped that the engine ships; files with impossible inertia become so too."""
-    # Arrange
     urdf = "package://pybullet_data/laikago/laikago_toes.urdf"
     (tmp_path / "laikago.yaml").write_text(f"urdf: {urdf}\ninertia: file\n")
     for world, model, rng in random_scenes(str(tmp_path / "laikago.yaml")):
         effort = rng.uniform(-20.0, 20.0, len(model.bias_force()))
 
-        # Act
         measured = acceleration(world, effort)
 
-        # Assert
         predicted = np.linalg.solve(model.mass_matrix(), effort - model.bias_force())
         assert np.abs(measured - predicted).max() < 1e-6 * np.abs(predicted).max()
 
 
 @every_character
 def test_both_engines_weigh_the_character_alike_under_another_gravity(name: str) -> None:
-    # Arrange
     whole = without_self_collision(name)
     model = DynamicsModel(whole, gravity=1.62)
     rng = np.random.default_rng(2)
@@ -121,9 +117,7 @@ def test_both_engines_weigh_the_character_alike_under_another_gravity(name: str)
         position, velocity = free_random_state(world.body, whole, rng)
         model.update(position, velocity)
 
-        # Act
         measured = acceleration(world, damping(whole, world))
 
-    # Assert
     predicted = np.linalg.solve(model.mass_matrix(), -model.bias_force())
     assert np.abs(measured - predicted).max() <= 1e-6 * np.abs(predicted).max()

@@ -8,7 +8,7 @@ from actuated_characters.runs.plan import make_plan
 from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import read_clip
 from msgs_config.arrays import FloatArray
-from msgs_config.character.model import Character, Placement
+from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
 from msgs_config.shared_parameters import placed
@@ -39,13 +39,10 @@ def test_no_placement_is_the_character_itself(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["humanoid", *FIXED])
 def test_every_link_of_the_rest_pose_is_moved_and_turned(name: str) -> None:
-    # Arrange
     origins, turns = rest_frames(character(name))
 
-    # Act
     moved_origins, moved_turns = rest_frames(elsewhere(name))
 
-    # Assert
     np.testing.assert_allclose(moved_origins, moved(origins), atol=1e-9)
     about_z = np.array([0.0, 0.0, np.sin(0.35), np.cos(0.35)])
     expected = rotations.multiply(about_z, turns)
@@ -60,14 +57,11 @@ def rest_frames(whole: Character) -> tuple[FloatArray, FloatArray]:
 
 @pytest.mark.parametrize("clip", ["spin", "getup_faceup"])
 def test_a_clip_is_moved_at_all_times_with_its_velocities(clip: str) -> None:
-    # Arrange
     at_origin = ClipReference(character("humanoid").layout, read_clip(character("humanoid"), clip))
     whole = elsewhere("humanoid")
 
-    # Act
     there = ClipReference(whole.layout, read_clip(whole, clip))
 
-    # Assert
     for time in np.linspace(0.0, 12.0, 40):
         state, same = there.sample(float(time)), at_origin.sample(float(time))
         place = same.configuration.position[:3]
@@ -83,11 +77,9 @@ def test_a_clip_is_moved_at_all_times_with_its_velocities(clip: str) -> None:
 
 def test_both_sides_are_placed_by_one_setting_and_the_motion_is_the_same_moved() -> None:
     """Until rounding, which contacts amplify, has grown."""
-    # Arrange
     flat = [*ELSEWHERE[:2], 0.0, ELSEWHERE[3]]
     clip = {"reference": "clip", "clip": "walk"}
 
-    # Act
     plan = make_plan("humanoid", 0.05, clip, {}, {"placement": flat})
     here = make_plan("humanoid", 0.05, clip, {}, {})
     roots = [
@@ -95,7 +87,6 @@ def test_both_sides_are_placed_by_one_setting_and_the_motion_is_the_same_moved()
         for each in (here, plan)
     ]
 
-    # Assert
     assert plan.simulator["placement"] == plan.controller["placement"] == flat
     np.testing.assert_allclose(roots[1], moved(roots[0]) - [0.0, 0.0, ELSEWHERE[2]], atol=1e-4)
 
@@ -114,13 +105,3 @@ def test_a_fixed_arm_keeps_its_answer_wherever_it_stands() -> None:
     run.close()
 
     np.testing.assert_allclose(there, here, atol=1e-9)
-
-
-@pytest.mark.parametrize("value", [[], [1.0], [0.0] * 5, [0.0, 0.0, 0.0, np.nan], 3.0, ["a"] * 4])
-def test_a_placement_that_is_not_four_numbers_is_refused(value: object) -> None:
-    with pytest.raises(ConfigurationError, match="'placement'"):
-        placed(character("lift"), {"placement": value})
-
-
-def test_a_placement_is_kept_by_the_character() -> None:
-    assert elsewhere("humanoid").placement == Placement(*ELSEWHERE)

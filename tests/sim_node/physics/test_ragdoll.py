@@ -141,15 +141,13 @@ def test_a_dropped_ragdoll_gains_no_energy_and_comes_to_rest_within_its_limits(s
 
 
 def test_as_a_behaviour_it_has_no_effort_and_falls() -> None:
-    # Arrange
     given = {"reference": "clip", "clip": "walk"}
     own = {"behaviour": "ragdoll", "law": "computed_torque", "balance.enabled": True}
     plan = make_plan("humanoid", 1.0, given, {}, own)
 
-    # Act
     ticks = list(ticks_in_process(plan))
 
-    # Assert: that it has no effort although a law and balance are given
+    # that it has no effort although a law and balance are given
     assert "root" not in plan.simulator.texts("commanded_joints")
     assert all(not np.any(tick.following.effort) for tick in ticks)
     assert ticks[-1].following.position[2] < 0.5

@@ -47,7 +47,7 @@ def fresh(plan: Plan) -> Simulation:
 def advance(plan: Plan, simulation: Simulation, ticks: int, noise: float = 0.0) -> FloatArray:
     """Advance under control with some noise (N m); what the states and efforts were (ticks, 3n)."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    (actor,), rng = simulation.actors, np.random.default_rng(3)
+    (actor,), rng = simulation.characters, np.random.default_rng(3)
     episode_ns, rows = simulation.clock.stamp_ns(1), []
     for _ in range(ticks):
         effort, _ = controller.compute_effort(actor.state, episode_ns)
@@ -65,16 +65,16 @@ def test_a_simulation_returns_to_what_it_saved(
     plan: Plan, simulation: Simulation, ticks: int
 ) -> None:
     advance(plan, simulation, ticks)
-    saved, stamp = simulation.save(), simulation.stamp_ns
-    counts = simulation.actors[0].saturated_ticks.copy()
+    saved, stamp = simulation.snapshot(), simulation.stamp_ns
+    counts = simulation.characters[0].saturated_ticks.copy()
     followed = advance(plan, simulation, TICKS)
     advance(plan, simulation, TICKS, noise=1.0)
 
     for _ in range(2):
-        simulation.restore(saved)
+        simulation.load_snapshot(saved)
 
-        assert simulation.stamp_ns == stamp == simulation.actors[0].state.stamp_ns
-        np.testing.assert_array_equal(simulation.actors[0].saturated_ticks, counts)
+        assert simulation.stamp_ns == stamp == simulation.characters[0].state.stamp_ns
+        np.testing.assert_array_equal(simulation.characters[0].saturated_ticks, counts)
         assert advance(plan, simulation, TICKS).tobytes() == followed.tobytes()
 
 
@@ -92,15 +92,3 @@ def test_another_simulation_goes_on_from_a_snapshot(
 
         assert other.tick == 91
         assert advance(plan, other, TICKS).tobytes() == followed.tobytes()
-
-
-def test_what_is_forgotten_cannot_be_restored(plan: Plan, simulation: Simulation) -> None:
-    kept, saved = simulation.save(), simulation.save()
-    followed = advance(plan, simulation, 3)
-
-    simulation.forget(saved)
-
-    simulation.restore(kept)
-    assert advance(plan, simulation, 3).tobytes() == followed.tobytes()
-    with pytest.raises(Exception, match="restore"):
-        simulation.restore(saved)

@@ -19,7 +19,14 @@ from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import MOST_BALLS, ThrowQueue
 from sim_node.physics.world import WorldSettings
-from tests.support.physics import DATA, LoneWorld, character, joint_simulation, momentum, simulation
+from tests.support.physics import (
+    DATA,
+    LoneWorld,
+    box_character,
+    character,
+    momentum,
+    simulation,
+)
 
 FREE_BOX = str(DATA / "free_box.yaml")
 RATE = 240
@@ -46,26 +53,14 @@ def in_bytes(rows: Sequence[FloatArray]) -> bytes:
     return b"".join(row.tobytes() for row in rows)
 
 
-def _box(folder: Path, name: str, size: str, fixed: bool) -> str:
-    """A character that is a box of 2 kg, as a file."""
-    inertia = '<inertia ixx="0.03" iyy="0.04" izz="0.05" ixy="0" ixz="0" iyz="0"/>'
-    (folder / f"{name}.urdf").write_text(
-        f'<robot name="{name}"><link name="box"><inertial><mass value="2"/>{inertia}</inertial>'
-        f'<collision><geometry><box size="{size}"/></geometry></collision></link></robot>'
-    )
-    file = folder / f"{name}.yaml"
-    file.write_text(f"urdf: {name}.urdf\nfixed_base: {str(fixed).lower()}\ninertia: file\n")
-    return str(file)
-
-
 @pytest.fixture
 def block(tmp_path: Path) -> str:
-    return _box(tmp_path, "block", "0.2 0.3 0.2", fixed=False)
+    return str(box_character(tmp_path, "0.2 0.3 0.2").file)
 
 
 @pytest.fixture
 def wall(tmp_path: Path) -> str:
-    return _box(tmp_path, "wall", "0.2 4 4", fixed=True)
+    return str(box_character(tmp_path, "0.2 4 4", fixed=True).file)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +82,7 @@ def walked(
 ) -> tuple[list[FloatArray], list[bool]]:
     """States (2 n + 13 m,), with those of the balls; whether a ball touched in each tick."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    (actor,) = simulation.actors
+    (actor,) = simulation.characters
     rows, hits = [], []
     for _ in range(ticks):
         effort, _ = controller.compute_effort(actor.state, simulation.clock.stamp_ns(1))
@@ -103,7 +98,7 @@ def walked(
 
 def _a_ball_touches(simulation: Simulation) -> bool:
     touched = simulation._world.touched_links()
-    return any(number in touched for number in simulation._world.balls._numbers)
+    return any(number in touched for number in simulation._world.balls.numbers)
 
 
 # Flight
@@ -154,10 +149,10 @@ def test_momentum_is_conserved_through_an_impact_on_a_free_body(block: str) -> N
         totals, turning = [], 0.0
         for _ in range(200):
             run.step([np.zeros(6)])
-            its = np.concatenate(momentum(run.actors[0]._body, run.actors[0].character))
+            its = np.concatenate(momentum(run.characters[0]._body, run.characters[0].character))
             totals.append(its + np.concatenate(ball_momentum(throw, run.ball_motion()[0])))
             turning = float(np.linalg.norm(its[3:]))
-            contacts = run.actors[0].contacts
+            contacts = run.characters[0].contacts
             assert contacts is not None
             impulse += STEP * contacts.wrenches[0, :3]
 
@@ -199,7 +194,7 @@ def test_the_impulse_on_what_cannot_move_is_all_that_the_ball_has(wall: str) -> 
         impulse = np.zeros(3)
         for _ in range(RATE):
             run.step([np.zeros(0)])
-            contacts = run.actors[0].contacts
+            contacts = run.characters[0].contacts
             assert contacts is not None
             impulse += STEP * contacts.wrenches[0, :3]
         left = run.ball_motion()[0]
@@ -251,24 +246,6 @@ def test_the_same_throws_lead_to_the_same_states(walk: Plan) -> None:
     assert in_bytes(one) == in_bytes(other)
 
 
-def test_far_away_two_characters_are_hit_as_if_each_were_alone() -> None:
-    given: dict[str, object] = {
-        "characters": ["one", "other"],
-        "other.placement": [0.0, 9.0, 0.0, 0.0],
-    }
-    hit = ProjectileThrow(2.0, 0.1, (1.0, 0.02, 1.1), (-8.0, 0.0, 0.0))
-    nothing = np.zeros(character("humanoid").layout.size)
-
-    with joint_simulation(given) as run, simulation("humanoid") as alone:
-        for _ in range(80):
-            run.step([nothing, nothing], None, [hit] if run.tick == 5 else ())
-            alone.step([nothing], None, [hit] if alone.tick == 5 else ())
-
-        one, other = run.actors
-        assert one.state.position.tobytes() == alone.state.position.tobytes()
-        assert not np.allclose(one.state.velocity, other.state.velocity, atol=0.1)
-
-
 # Balls whose time is over
 
 
@@ -279,7 +256,7 @@ def with_lifetime(plan: Plan, seconds: float) -> Plan:
 def test_after_its_lifetime_a_ball_lies_far_away() -> None:
     lying = ProjectileThrow(4.0, 0.1, (0.0, 0.0, 0.1), (0.0, 0.0, 0.0))
     with simulation(FREE_BOX, ball_lifetime=0.5, initial_position=[9.0, 9.0, 1.0, 0, 0, 0]) as run:
-        nothing = np.zeros(run.actors[0].character.layout.size)
+        nothing = np.zeros(run.characters[0].character.layout.size)
         places = []
         for tick in range(200):
             run.step([nothing], None, [[lying, AT_CHEST], [FAR]][tick] if tick < 2 else ())
@@ -302,7 +279,7 @@ def test_what_stood_against_a_ball_falls_when_it_is_taken_away(block: str) -> No
         heights = []
         for tick in range(180):
             run.step([np.zeros(6)], None, [under] if not tick else ())
-            heights.append(float(run.actors[0].state.position[2]))
+            heights.append(float(run.characters[0].state.position[2]))
 
     assert heights[55] == pytest.approx(0.3, abs=0.01)
     assert heights[-1] == pytest.approx(0.1, abs=0.01)
@@ -320,10 +297,10 @@ def test_a_saved_state_is_restored_whatever_was_thrown_since(
 
     with fresh(with_lifetime(walk, lifetime)) as run:
         walked(walk, run, ticks, throws)
-        early = run.save()
+        early = run.snapshot()
         followed = in_bytes(walked(walk, run, 80, throws)[0])
         walked(walk, run, 20, {tick: [FAR] for tick in range(run.tick, run.tick + 20, 3)})
-        late = run.save()
+        late = run.snapshot()
         later = in_bytes(walked(walk, run, 20)[0])
 
         for saved, expected, count in (
@@ -331,7 +308,7 @@ def test_a_saved_state_is_restored_whatever_was_thrown_since(
             (late, later, 20),
             (early, followed, 80),
         ):
-            run.restore(saved)
+            run.load_snapshot(saved)
             assert in_bytes(walked(walk, run, count, throws)[0]) == expected
 
 

@@ -14,39 +14,13 @@ def control() -> RunControl:
     return RunControl()
 
 
-def paused(fault: str | None = None, *, stuck: bool = False) -> RunControl:
+def paused(fault: str | None = None, *, diverged: bool = False) -> RunControl:
     control = RunControl()
-    control.pause(fault, stuck=stuck)
+    control.pause(fault, diverged=diverged)
     return control
 
 
 # Pausing
-
-
-def test_at_first_it_runs_without_a_fault(control: RunControl) -> None:
-    assert control.runs
-    assert not control.paused
-    assert not control.has_diverged
-    assert control.fault is None
-    assert control.steps_left == 0
-
-
-def test_a_pause_stops_it_and_resuming_lets_it_go_on(control: RunControl) -> None:
-    control.pause()
-    assert not control.runs
-    assert control.paused
-    assert control.fault is None
-
-    control.resume()
-    assert control.runs
-    assert not control.paused
-
-
-def test_resuming_what_runs_changes_nothing(control: RunControl) -> None:
-    control.resume()
-
-    assert control.runs
-    assert control.fault is None
 
 
 def test_a_fault_is_remembered_until_it_goes_on() -> None:
@@ -60,12 +34,6 @@ def test_a_fault_is_remembered_until_it_goes_on() -> None:
 
     control.resume()
     assert control.fault is None
-
-
-def test_a_tick_while_it_runs_is_no_step(control: RunControl) -> None:
-    assert not control.tick()
-    assert control.steps_left == 0
-    assert control.runs
 
 
 # Steps
@@ -112,41 +80,11 @@ def test_steps_are_refused_while_others_are_not_done() -> None:
     assert control.steps_left == 2
 
 
-def test_steps_can_follow_steps() -> None:
-    control = paused()
-    for _ in range(3):
-        control.begin_steps(1)
-        assert control.tick()
-
-
-@pytest.mark.parametrize("fault", [None, "a conflict"])
-def test_a_pause_ends_the_steps(fault: str | None) -> None:
-    control = paused()
-    control.begin_steps(3)
-
-    control.pause(fault)
-
-    assert not control.runs
-    assert control.steps_left == 0
-    assert control.fault == fault
-
-
-def test_resuming_ends_the_steps_and_runs_on() -> None:
-    control = paused()
-    control.begin_steps(3)
-
-    control.resume()
-
-    assert not control.paused
-    assert control.steps_left == 0
-    assert [control.tick() for _ in range(4)] == [False] * 4
-
-
 # Stuck
 
 
-def test_what_is_stuck_neither_goes_on_nor_takes_a_step_and_says_why() -> None:
-    control = paused("diverged at tick 7", stuck=True)
+def test_a_diverged_simulation_neither_goes_on_nor_takes_a_step_and_says_why() -> None:
+    control = paused("diverged at tick 7", diverged=True)
     assert control.has_diverged
 
     for go_on in (control.resume, lambda: control.begin_steps(1)):
@@ -157,8 +95,8 @@ def test_what_is_stuck_neither_goes_on_nor_takes_a_step_and_says_why() -> None:
     assert control.fault == "diverged at tick 7"
 
 
-def test_a_pause_by_hand_does_not_loosen_what_is_stuck() -> None:
-    control = paused("diverged at tick 7", stuck=True)
+def test_a_pause_by_hand_does_not_loosen_a_divergence() -> None:
+    control = paused("diverged at tick 7", diverged=True)
 
     control.pause()
 
@@ -167,22 +105,11 @@ def test_a_pause_by_hand_does_not_loosen_what_is_stuck() -> None:
         control.resume()
 
 
-def test_a_divergence_during_steps_is_stuck_too() -> None:
-    control = paused()
-    control.begin_steps(3)
-
-    control.pause("diverged at tick 7", stuck=True)
-
-    assert not control.runs
-    with pytest.raises(CommandError):
-        control.begin_steps(1)
-
-
 # Reset
 
 
-def test_a_reset_loosens_what_was_stuck_and_leaves_it_paused() -> None:
-    control = paused("diverged at tick 7", stuck=True)
+def test_a_reset_ends_a_divergence_and_leaves_it_paused() -> None:
+    control = paused("diverged at tick 7", diverged=True)
 
     control.reset()
 
@@ -193,28 +120,11 @@ def test_a_reset_loosens_what_was_stuck_and_leaves_it_paused() -> None:
     assert control.runs
 
 
-def test_a_reset_ends_the_steps() -> None:
-    control = paused()
-    control.begin_steps(3)
-
-    control.reset()
-
-    assert not control.runs
-    assert control.steps_left == 0
-    control.begin_steps(1)  # a new episode's
-
-
-def test_what_runs_goes_on_through_a_reset(control: RunControl) -> None:
-    control.reset()
-
-    assert control.runs
-
-
 # Everything at once
 
 
 class AnyCalls(RuleBasedStateMachine):
-    """All calls in any order keep it in one of four conditions: runs, paused, steps, stuck."""
+    """All calls in any order keep it in one of four conditions: runs, paused, steps, diverged."""
 
     @initialize()
     def begin(self) -> None:
@@ -222,15 +132,15 @@ class AnyCalls(RuleBasedStateMachine):
         self.condition = "runs"
         self.left = 0
 
-    @rule(stuck=st.booleans())
-    def pause(self, stuck: bool) -> None:
-        self.control.pause("a fault" if stuck else None, stuck=stuck)
-        self.condition = "stuck" if stuck or self.condition == "stuck" else "paused"
+    @rule(diverged=st.booleans())
+    def pause(self, diverged: bool) -> None:
+        self.control.pause("a fault" if diverged else None, diverged=diverged)
+        self.condition = "diverged" if diverged or self.condition == "diverged" else "paused"
         self.left = 0
 
     @rule()
     def resume(self) -> None:
-        if self.condition == "stuck":
+        if self.condition == "diverged":
             with pytest.raises(CommandError):
                 self.control.resume()
             return
@@ -265,9 +175,9 @@ class AnyCalls(RuleBasedStateMachine):
     def it_is_as_the_rules_say(self) -> None:
         assert self.control.runs == (self.condition in ("runs", "steps"))
         assert self.control.paused == (self.condition != "runs")
-        assert self.control.has_diverged == (self.condition == "stuck")
+        assert self.control.has_diverged == (self.condition == "diverged")
         assert self.control.steps_left == self.left
-        if self.condition == "stuck":
+        if self.condition == "diverged":
             assert self.control.fault
 
 

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.errors import CommandError
 from sim_node.timing.lockstep import CommandStatus
 from sim_node.timing.zero_order_hold import ZeroOrderHold
 
@@ -47,14 +46,6 @@ def state_of(hold: ZeroOrderHold) -> tuple[object, ...]:
 # Held, and for how long
 
 
-def test_without_a_command_the_effort_is_zero_and_no_tick_waits(hold: ZeroOrderHold) -> None:
-    assert hold.complete
-    assert list(hold.missing) == []
-    assert hold.age_ns is None
-    assert hold.conflict is None
-    np.testing.assert_array_equal(hold.effort, np.zeros(6))
-
-
 def test_a_command_is_held_until_it_is_as_old_as_the_timeout_and_then_zero(
     hold: ZeroOrderHold,
 ) -> None:
@@ -68,49 +59,6 @@ def test_a_command_is_held_until_it_is_as_old_as_the_timeout_and_then_zero(
 
     assert efforts == [[4.0, -5.0]] * 5 + [[0.0, 0.0]] * 3
     assert ages == [tick * TICK_NS for tick in range(5)] + [None] * 3
-
-
-def test_a_command_is_as_old_as_the_state_that_it_answers(hold: ZeroOrderHold) -> None:
-    assert submit(hold, {4: 4.0}, FIRST - 3 * TICK_NS) is CommandStatus.ACCEPTED
-
-    assert hold.age_ns == 3 * TICK_NS
-    hold.begin_tick(FIRST + TICK_NS)
-    assert hold.effort[4] == 4.0
-    hold.begin_tick(FIRST + 2 * TICK_NS)
-    assert hold.effort[4] == 0.0
-
-
-def test_each_degree_of_freedom_ages_by_itself(hold: ZeroOrderHold) -> None:
-    submit(hold, {1: 1.0, 2: 2.0, 3: 3.0})
-    hold.begin_tick(FIRST + 3 * TICK_NS)
-    submit(hold, {4: 4.0}, FIRST + 3 * TICK_NS)
-
-    assert hold.age_ns == 3 * TICK_NS  # the oldest that is held
-    hold.begin_tick(FIRST + 5 * TICK_NS)
-    np.testing.assert_array_equal(hold.effort, [0.0, 0.0, 0.0, 0.0, 4.0, 0.0])
-    assert hold.age_ns == 2 * TICK_NS
-    hold.begin_tick(FIRST + 8 * TICK_NS)
-    np.testing.assert_array_equal(hold.effort, np.zeros(6))
-
-
-def test_a_newer_command_replaces_the_one_that_is_held(hold: ZeroOrderHold) -> None:
-    submit(hold, {4: 4.0, 5: 5.0})
-    hold.begin_tick(FIRST + TICK_NS)
-
-    assert submit(hold, {4: -4.0}, FIRST + TICK_NS) is CommandStatus.ACCEPTED
-
-    np.testing.assert_array_equal(hold.effort[4:], [-4.0, 5.0])
-    assert hold.conflict is None
-
-
-def test_a_command_that_comes_again_and_again_is_held_for_ever(hold: ZeroOrderHold) -> None:
-    for tick in range(50):
-        hold.begin_tick(FIRST + tick * TICK_NS)
-        if tick % 4 == 0:
-            submit(hold, {4: 4.0}, FIRST + tick * TICK_NS)
-
-        assert hold.effort[4] == 4.0
-    assert hold.timeouts == 0
 
 
 def test_a_timeout_is_counted_once_however_long_it_lasts_and_however_many_it_hits(
@@ -161,35 +109,6 @@ def test_the_longest_timeout_that_can_be_set_is_one_too() -> None:
 # Stamps
 
 
-def test_an_unset_stamp_answers_the_last_state(hold: ZeroOrderHold) -> None:
-    assert submit(hold, {4: 4.0}, 0) is CommandStatus.ACCEPTED
-    assert hold.age_ns == 0
-
-    hold.begin_tick(FIRST + TICK_NS)
-
-    assert submit(hold, {5: 5.0}, 0) is CommandStatus.ACCEPTED
-    np.testing.assert_array_equal(hold.effort[4:], [4.0, 5.0])
-    assert hold.age_ns == TICK_NS
-
-
-def test_of_several_unset_stamps_in_a_tick_the_last_counts_and_none_conflicts(
-    hold: ZeroOrderHold,
-) -> None:
-    verdicts = [submit(hold, {4: effort}, 0) for effort in (1.0, 2.0, 2.0, 3.0)]
-
-    assert verdicts == [CommandStatus.ACCEPTED] * 4
-    assert hold.effort[4] == 3.0
-    assert hold.conflict is None
-
-
-@pytest.mark.parametrize("late", [5 * TICK_NS, 6 * TICK_NS, FIRST - 1])
-def test_an_answer_older_than_the_timeout_is_stale(hold: ZeroOrderHold, late: int) -> None:
-    before = state_of(hold)
-
-    assert submit(hold, {4: 4.0}, FIRST - late) is CommandStatus.STALE
-    assert state_of(hold) == before
-
-
 @pytest.mark.parametrize("stamp_ns", [-1, -TICK_NS, -(2**31) * 10**9])
 @pytest.mark.parametrize("first", [TICK_NS, FIRST])
 def test_a_stamp_before_the_beginning_of_time_is_stale(stamp_ns: int, first: int) -> None:
@@ -199,52 +118,7 @@ def test_a_stamp_before_the_beginning_of_time_is_stale(stamp_ns: int, first: int
     np.testing.assert_array_equal(hold.effort, np.zeros(6))
 
 
-def test_an_answer_overtaken_by_a_newer_one_is_stale(hold: ZeroOrderHold) -> None:
-    submit(hold, {4: 4.0})
-    before = state_of(hold)
-
-    assert submit(hold, {4: 9.0}, FIRST - TICK_NS) is CommandStatus.STALE
-    assert submit(hold, {4: 9.0, 5: 9.0}, FIRST - TICK_NS) is CommandStatus.STALE  # none of it
-    assert state_of(hold) == before
-    assert submit(hold, {5: 5.0}, FIRST - TICK_NS) is CommandStatus.ACCEPTED  # nobody overtook this
-
-
-@pytest.mark.parametrize("early", [1, TICK_NS, 2**62])
-def test_an_answer_to_a_state_that_never_was_is_dropped(hold: ZeroOrderHold, early: int) -> None:
-    before = state_of(hold)
-
-    assert submit(hold, {4: 4.0}, FIRST + early) is CommandStatus.FUTURE
-    assert state_of(hold) == before
-
-
 # Repetition and conflict
-
-
-def test_an_exact_repeat_is_a_duplicate_and_changes_nothing(hold: ZeroOrderHold) -> None:
-    submit(hold, {4: 4.0, 5: 5.0})
-    before = state_of(hold)
-
-    assert submit(hold, {4: 4.0, 5: 5.0}) is CommandStatus.DUPLICATE
-    assert submit(hold, {5: 5.0}) is CommandStatus.DUPLICATE
-    assert state_of(hold) == before
-    assert hold.conflict is None
-
-
-def test_a_repeat_in_a_later_tick_is_a_duplicate_too_and_makes_it_no_younger(
-    hold: ZeroOrderHold,
-) -> None:
-    submit(hold, {4: 4.0})
-    hold.begin_tick(FIRST + 2 * TICK_NS)
-
-    assert submit(hold, {4: 4.0}, FIRST) is CommandStatus.DUPLICATE
-    assert hold.age_ns == 2 * TICK_NS
-
-
-def test_a_command_that_repeats_a_part_and_adds_another_is_taken(hold: ZeroOrderHold) -> None:
-    submit(hold, {4: 4.0})
-
-    assert submit(hold, {4: 4.0, 5: 5.0}) is CommandStatus.ACCEPTED
-    np.testing.assert_array_equal(hold.effort[4:], [4.0, 5.0])
 
 
 def test_of_two_commands_that_answer_one_state_the_last_counts_and_the_entry_is_named(
@@ -258,122 +132,6 @@ def test_of_two_commands_that_answer_one_state_the_last_counts_and_the_entry_is_
     assert hold.conflict == "left_knee"
     np.testing.assert_array_equal(hold.effort, [0.0, 1.0, 2.0, 3.0, 4.0, -5.0])
     assert submit(hold, {5: -5.0}) is CommandStatus.DUPLICATE
-
-
-def test_a_conflict_with_a_command_of_an_earlier_tick_is_one_too(hold: ZeroOrderHold) -> None:
-    submit(hold, {4: 4.0})
-    hold.begin_tick(FIRST + TICK_NS)
-
-    assert submit(hold, {4: 9.0}, FIRST) is CommandStatus.CONFLICT
-    assert hold.conflict == "right_knee"
-
-
-def test_the_next_tick_knows_nothing_of_the_conflict(hold: ZeroOrderHold) -> None:
-    submit(hold, {4: 4.0})
-    submit(hold, {4: 5.0})
-
-    hold.begin_tick(FIRST + TICK_NS)
-
-    assert hold.conflict is None
-    assert hold.effort[4] == 5.0
-
-
-@pytest.mark.parametrize("first", [0.0, -0.0])
-def test_a_zero_of_the_other_sign_is_a_repeat(hold: ZeroOrderHold, first: float) -> None:
-    submit(hold, {4: first})
-
-    assert submit(hold, {4: -first}) is CommandStatus.DUPLICATE
-
-
-# Refused
-
-
-@pytest.mark.parametrize(
-    ("indices", "effort", "why"),
-    [
-        ([4, 5], [4.0, np.nan], "'left_knee' is nan"),
-        ([4, 5], [np.inf, 5.0], "'right_knee' is inf"),
-        ([4, 0], [4.0, 1.0], "'root_x' is not among the commanded joints"),
-        ([4, 5], [4.0], "2 names but 1 efforts"),
-        ([4, 5], [], "2 names but 0 efforts"),
-        ([], [], "empty"),
-    ],
-)
-@pytest.mark.parametrize("stamp_ns", [0, FIRST - TICK_NS, FIRST, FIRST + 1])
-def test_a_refused_command_changes_nothing(
-    hold: ZeroOrderHold, indices: list[int], effort: list[float], why: str, stamp_ns: int
-) -> None:
-    submit(hold, {4: 1.0}, FIRST - 2 * TICK_NS)
-    before, counts = state_of(hold), hold.counts.copy()
-
-    with pytest.raises(CommandError, match=why):
-        hold.submit(stamp_ns, np.array(indices, dtype=np.intp), np.array(effort))
-
-    assert state_of(hold) == before
-    assert hold.counts == counts
-    assert hold.conflict is None
-
-
-# Episodes
-
-
-def test_a_new_episode_knows_no_command_of_the_one_before(hold: ZeroOrderHold) -> None:
-    submit(hold, {4: 4.0})
-
-    hold.clear()
-    hold.begin_tick(FIRST + TICK_NS)
-
-    assert hold.age_ns is None
-    np.testing.assert_array_equal(hold.effort, np.zeros(6))
-    assert hold.timeouts == 0  # forgotten, not too old
-
-
-@pytest.mark.parametrize("effort", [4.0, 5.0])
-@pytest.mark.parametrize("late", range(4))
-def test_an_answer_to_a_state_of_the_episode_before_is_stale(
-    hold: ZeroOrderHold, effort: float, late: int
-) -> None:
-    submit(hold, {4: 4.0})
-
-    hold.clear()
-    hold.begin_tick(FIRST + TICK_NS)
-    verdict = submit(hold, {4: effort}, FIRST - late * TICK_NS)
-
-    assert verdict is CommandStatus.STALE
-    np.testing.assert_array_equal(hold.effort, np.zeros(6))
-    assert hold.conflict is None
-
-
-@pytest.mark.parametrize("stamp_ns", [0, FIRST + TICK_NS])
-def test_the_first_state_of_an_episode_can_be_answered(hold: ZeroOrderHold, stamp_ns: int) -> None:
-    hold.clear()
-    hold.begin_tick(FIRST + TICK_NS)
-
-    assert submit(hold, {4: 4.0}, stamp_ns) is CommandStatus.ACCEPTED
-    assert hold.effort[4] == 4.0
-
-
-# Whose arrays they are
-
-
-def test_the_effort_of_a_tick_outlives_it(hold: ZeroOrderHold) -> None:
-    submit(hold, {4: 4.0})
-    kept = hold.effort
-
-    hold.begin_tick(FIRST + TICK_NS)
-    submit(hold, {4: -4.0}, FIRST + TICK_NS)
-
-    assert kept[4] == 4.0
-
-
-def test_a_sender_cannot_change_its_command_afterwards(hold: ZeroOrderHold) -> None:
-    indices, effort = as_arrays({4: 4.0, 5: 5.0})
-    hold.submit(FIRST, indices, effort)
-
-    effort[:] = 99.0
-    indices[:] = 1
-
-    np.testing.assert_array_equal(hold.effort, [0.0, 0.0, 0.0, 0.0, 4.0, 5.0])
 
 
 # Everything at once, against the rules in plain Python

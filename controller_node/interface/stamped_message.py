@@ -1,0 +1,42 @@
+"""Decodes messages that count from a stamp on, and rejects those whose stamp cannot be."""
+
+from typing import Any
+
+from builtin_interfaces.msg import Duration, Time
+
+from msgs_config.errors import MotionError
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.joint_state import decode
+
+_LARGEST = 2**25  # bytes of a message
+_LATEST_NS = 10**15  # after now
+
+
+def decode_stamped(raw: bytes, message_type: type, what: str, state_ns: int) -> tuple[Any, int]:
+    """A message with a header, and the stamp in ns that it counts from; without one the state's.
+
+    Raises:
+        MessageError: the bytes are no such message.
+        MotionError: it is too long, or its stamp is over or too late; begins with `what`.
+    """
+    if len(raw) > _LARGEST:
+        raise MotionError(f"{what}: it has {len(raw)} bytes; it must have {_LARGEST} or fewer")
+    message = decode(raw, message_type)
+    stamp = message.header.stamp
+    start_ns = nanoseconds(stamp) or state_ns
+    if start_ns < state_ns:
+        raise MotionError(
+            f"{what}: it begins at {start_ns} ns, which is over; it must be {state_ns} ns or "
+            "later, or 0 for at once"
+        )
+    if start_ns > state_ns + _LATEST_NS or stamp.nanosec >= 10**9:
+        raise MotionError(
+            f"{what}: its stamp is {stamp.sec} s and {stamp.nanosec} ns; it must be a time, and "
+            "within 1e6 s"
+        )
+    return message, start_ns
+
+
+def nanoseconds(time: Time | Duration) -> int:
+    """A time of a message in ns."""
+    return int(time.sec) * NANOSECONDS_PER_SECOND + int(time.nanosec)

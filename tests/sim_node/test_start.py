@@ -1,0 +1,55 @@
+"""What the simulator's start costs: how often a URDF is parsed, and loaded into an engine."""
+
+import shutil
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from msgs_config import files
+from msgs_config.character.bullet import pybullet
+from msgs_config.character.robot_description import robot_description
+from msgs_config.messages import configuration
+from sim_node.parameters import load_parameters, make_character_setup, make_settings
+from sim_node.physics.probe import probe_engine
+from sim_node.physics.simulation import Simulation
+from tests.support.physics import DATA
+
+
+@pytest.fixture
+def counts(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+    """How often a function was called, by its name."""
+    found = Counter[str]()
+
+    def counted(owner: object, name: str) -> None:
+        real: Callable[..., Any] = getattr(owner, name)
+
+        def call(*arguments: object, **options: object) -> object:
+            found[name] += 1
+            return real(*arguments, **options)
+
+        monkeypatch.setattr(owner, name, call)
+
+    counted(files, "parse_xml")
+    counted(pybullet, "loadURDF")
+    return found
+
+
+def test_a_urdf_is_parsed_once_and_loaded_to_be_read_probed_and_simulated(
+    tmp_path: Path, counts: Counter[str]
+) -> None:
+    for name in ("damped.yaml", "turned_frames.urdf"):
+        shutil.copy(DATA / name, tmp_path)
+    file = tmp_path / "damped.yaml"
+
+    (loaded,) = load_parameters({"character": str(file)}).characters
+    sample, inverse_mass = probe_engine(loaded.character, 9.81)
+    setup = make_character_setup(loaded.character, loaded.values, inverse_mass=inverse_mass)
+    with Simulation([setup], make_settings(loaded.values)):
+        robot_description(loaded.character)
+        configuration.describe(loaded.character, loaded.values, probe=sample)
+
+    assert inverse_mass.any()
+    assert counts == {"parse_xml": 1, "loadURDF": 3}
