@@ -32,14 +32,14 @@ LONGEST_ARROW = 0.4  # of the extent of the characters
 
 _SMALLEST, _LARGEST = 16, 4096  # pixels along an edge of a picture
 _MOST_PIXELS = 2**26  # of a strip
-_TILE_HEIGHT = 400  # pixels, where nothing else is said
-_NARROWEST, _WIDEST = 0.5, 1.6  # width over height, where nothing else is said
-_COLUMNS = 8  # at the most, where nothing else is said
+_TILE_HEIGHT = 400  # pixels, by default
+_NARROWEST, _WIDEST = 0.5, 1.6  # width over height, by default
+_COLUMNS = 8  # at the most, by default
 _GAP = 3  # pixels between pictures
 _WHITE = 255
 
 Progress = Callable[[int], None]
-"""Is told the number of pictures so far."""
+"""Called with the number of pictures so far."""
 
 
 def strip(

@@ -104,19 +104,13 @@ class CameraPose:
         width, height = size
         if not len(seen.radii):
             return Box(0, 0, 0, 0)
-        across, upwards, back = self.axes() @ (seen.centres - self.eye()).T
-        nearest, farthest = -back - seen.radii, -back + seen.radii
+        in_axes = self.axes() @ (seen.centres - self.eye()).T
+        nearest, farthest = -in_axes[2] - seen.radii, -in_axes[2] + seen.radii
         if nearest.min() <= 0.0:
             return Box(0, height, 0, width)
-
-        def edges(middle: FloatArray) -> tuple[float, float]:
-            low, high = ((middle + side) / self.pixel(height) for side in (-seen.radii, seen.radii))
-            return (
-                float(np.minimum(low / nearest, low / farthest).min()) - 0.5,
-                float(np.maximum(high / nearest, high / farthest).max()) + 0.5,
-            )
-
-        (left, right), (low, high) = edges(across), edges(upwards)
+        sides = np.array([in_axes[:2] - seen.radii, in_axes[:2] + seen.radii]) / self.pixel(height)
+        reach = np.concatenate((sides / nearest, sides / farthest))  # (4, 2, m), in pixels
+        (left, low), (right, high) = reach.min(axis=(0, 2)) - 0.5, reach.max(axis=(0, 2)) + 0.5
         return Box(
             min(max(floor(0.5 * height - high), 0), height),
             min(max(ceil(0.5 * height - low), 0), height),

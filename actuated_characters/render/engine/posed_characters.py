@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
-from actuated_characters.render.engine.camera_pose import CameraPose, Spheres
-from actuated_characters.render.engine.surfaces import HEAD_WIDTH
+from actuated_characters.render.engine.camera_pose import Spheres
 from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -15,7 +14,6 @@ from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 
 _BELOW_GROUND = 0.1  # of its height, that a character may reach below the ground
-_ARROW_RADIUS = 0.005  # of the view's distance
 
 Frames: TypeAlias = tuple[FloatArray, FloatArray]
 """Origins (links, 3) in m and orientations xyzw (links, 4) of link frames in the world."""
@@ -30,21 +28,6 @@ class LinkForce:
     arrow: FloatArray  # (3,) along the force in the world, of length one for the longest arrow
 
 
-class Arrow(NamedTuple):
-    """An arrow in the world, as thick as suits a view."""
-
-    tail: FloatArray  # (3,), m
-    tip: FloatArray  # (3,), m
-
-    def radius(self, view: CameraPose) -> float:
-        """Of its shaft, m."""
-        return _ARROW_RADIUS * view.distance
-
-    def spheres(self, view: CameraPose) -> Spheres:
-        """Spheres around it."""
-        return Spheres(np.array(self), np.full(2, HEAD_WIDTH * self.radius(view)))
-
-
 class PosedCharacters:
     """The shapes of several characters, and where they are.
 
@@ -57,11 +40,14 @@ class PosedCharacters:
         self._models = [DynamicsModel(character) for character in characters]
         self._ends = np.cumsum([character.layout.size for character in characters])
         self.shapes = [shapes for each in characters for shapes in drawn_shapes(each)]
-        # of each link in its frame: its origin, and spheres around its shapes
-        origin = Spheres(np.zeros((1, 3)), np.zeros(1))
-        around = [Spheres.joined([origin, *map(outline, shapes)]) for shapes in self.shapes]
-        self._spheres = Spheres.joined(around)
-        self._links = np.repeat(np.arange(len(around)), [len(each.radii) for each in around])
+        none = Spheres(np.empty((0, 3)), np.empty(0))
+        self._around = [Spheres.joined([none, *map(outline, own)]) for own in self.shapes]
+        # of all links in their frames: spheres around the shapes, and the origins
+        count = len(self.shapes)
+        origins = Spheres(np.zeros((count, 3)), np.zeros(count))
+        self._spheres = Spheres.joined([*self._around, origins])
+        numbers = np.repeat(np.arange(count), [len(each.radii) for each in self._around])
+        self._links = np.concatenate((numbers, np.arange(count)))
 
     def frames(self, position: FloatArray) -> Frames:
         """Where the link frames are at a position (n,), message form.
@@ -77,29 +63,21 @@ class PosedCharacters:
             turns_xyzw.append(turn_xyzw if known else np.full_like(turn_xyzw, np.nan))
         return np.concatenate(origins), np.concatenate(turns_xyzw)
 
-    def spheres(self, frames: Frames, link: int | None = None) -> Spheres:
-        """Spheres around all that is seen, or around one link; none where the frames are NaN."""
+    def spheres(self, frames: Frames) -> Spheres:
+        """Spheres around all that is seen; none where the frames are NaN."""
         origins, turns_xyzw = frames[0][self._links], frames[1][self._links]
         there = np.isfinite(origins[:, 0])
-        if link is not None:
-            there &= self._links == link
         local, radii = self._spheres.centres[there], self._spheres.radii[there]
         return Spheres(origins[there] + rotations.rotate(turns_xyzw[there], local), radii)
 
     def stand_on_ground(self) -> bool:
         """Whether all are above the ground, none hanging through it as a pendulum does."""
-        rest = np.concatenate([character.rest_position for character in self._characters])
-        origins, turns_xyzw = self.frames(rest)
-        first = 0
-        for character in self._characters:
-            links = slice(first, first + len(character.links))
-            first = links.stop
-            if character.layout.has_floating_base:  # goes where it can
-                continue
-            alone = np.full_like(origins, np.nan)
-            alone[links] = origins[links]
-            lowest, highest = self.spheres((alone, turns_xyzw)).bounds(np.eye(3))
-            if lowest[2] < -_BELOW_GROUND * (highest[2] - lowest[2]):
+        for number, character in enumerate(self._characters):
+            rest = [np.full(each.layout.size, np.nan) for each in self._characters]
+            rest[number] = np.array(character.rest_position)
+            lowest, highest = self.spheres(self.frames(np.concatenate(rest))).bounds(np.eye(3))
+            below = lowest[2] < -_BELOW_GROUND * (highest[2] - lowest[2])
+            if below and not character.layout.has_floating_base:  # which goes where it can
                 return False
         return True
 
@@ -134,20 +112,20 @@ class PosedCharacters:
         for position, (x, y), acting in zip(positions, ways.tolist(), forces, strict=True):
             if acting:
                 frames = self.frames(position)
-                own = [self.arrow(force, frames, longest).tail for force in acting]
+                own = [self.arrow(force, frames, longest)[0] for force in acting]
                 tails.append(np.array(own) - (x, y, 0.0))
         points = np.concatenate(tails)
         return Spheres(points, np.zeros(len(points)))
 
-    def arrow(self, force: LinkForce, frames: Frames, longest: float) -> Arrow:
-        """The arrow whose tip is where its line enters what is seen of the link."""
+    def arrow(self, force: LinkForce, frames: Frames, longest: float) -> FloatArray:
+        """Tail and tip (2, 3), m, world; the tip is where it enters what is seen of the link."""
         origin, turn_xyzw = frames[0][force.link], frames[1][force.link]
+        local, radii = self._around[force.link]
         at = origin + rotations.rotate(turn_xyzw, force.point)
         direction = force.arrow / np.linalg.norm(force.arrow)
-        link = self.spheres(frames, force.link)
-        back = float(np.max((at - link.centres) @ direction + link.radii, initial=0.0))
-        tip = at - back * direction
-        return Arrow(tip - longest * force.arrow, tip)
+        outside = (at - origin - rotations.rotate(turn_xyzw, local)) @ direction + radii
+        tip = at - float(np.max(outside, initial=0.0)) * direction
+        return np.array((tip - longest * force.arrow, tip))
 
 
 def root_path(characters: Sequence[Character], positions: FloatArray) -> FloatArray:

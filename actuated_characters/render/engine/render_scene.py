@@ -10,7 +10,7 @@ import numpy as np
 
 from actuated_characters.render.engine.camera_pose import Box, CameraPose, Size
 from actuated_characters.render.engine.ground import Samples
-from actuated_characters.render.engine.posed_characters import Arrow, Frames
+from actuated_characters.render.engine.posed_characters import Frames
 from actuated_characters.render.engine.surfaces import Surface, arrow_surface, round_surface
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
@@ -103,14 +103,12 @@ class RenderScene:
         for (_, body), ball in zip(self._balls, balls, strict=True):
             self._put(body, ball[:3])
 
-    def show_arrows(self, arrows: Sequence[Arrow], view: CameraPose) -> None:
-        """Show these arrows, too, none of length zero."""
-        for arrow in arrows:
-            along = arrow.tip - arrow.tail
-            length = float(np.linalg.norm(along))
-            surface = _triangles(arrow_surface(length, arrow.radius(view)))
-            body = self._add_body(pybullet.GEOM_MESH, _ARROW_COLOR, **surface)
-            self._put(body, arrow.tail, _turn_from_z(along / length))
+    def show_arrows(self, arrows: Iterable[FloatArray], radius: float) -> None:
+        """Show these arrows, too, none of length zero: tail and tip (2, 3); shafts' radius; m."""
+        for tail, tip in arrows:
+            length = float(np.linalg.norm(tip - tail))
+            body = self._add_body(_ARROW_COLOR, **_triangles(arrow_surface(length, radius)))
+            self._put(body, tail, _turn_from_z((tip - tail) / length))
             self._arrows.append(body)
 
     def draw(self, view: CameraPose, size: Size, box: Box) -> Drawing:
@@ -155,29 +153,24 @@ class RenderScene:
 
     def _add_shape(self, shape: Shape) -> int:
         """A shape as a body at the origin."""
-        geometry = pybullet.GEOM_MESH
         measures: dict[str, object]
         if shape.type is ShapeType.BOX:
-            geometry = pybullet.GEOM_BOX
             measures = {"halfExtents": [0.5 * edge for edge in shape.size]}
         elif shape.type is ShapeType.MESH:
             measures = {"fileName": shape.mesh, "meshScale": shape.size}
         else:
             measures = _triangles(round_surface(shape))
+        measures["visualFramePosition"] = shape.pose.position
+        measures["visualFrameOrientation"] = shape.pose.orientation_xyzw
         try:
-            return self._add_body(
-                geometry,
-                shape.color_rgba,
-                visualFramePosition=shape.pose.position,
-                visualFrameOrientation=shape.pose.orientation_xyzw,
-                **measures,
-            )
+            return self._add_body(shape.color_rgba, **measures)
         except pybullet.error as error:
             raise CharacterError(f"cannot draw {shape.mesh or f'a {shape.type.value}'}") from error
 
-    def _add_body(self, geometry: int, color: Quadruple, **measures: object) -> int:
+    def _add_body(self, color: Quadruple, **measures: object) -> int:
+        kind = pybullet.GEOM_BOX if "halfExtents" in measures else pybullet.GEOM_MESH
         seen = pybullet.createVisualShape(
-            geometry, rgbaColor=color, **measures, physicsClientId=self._client
+            kind, rgbaColor=color, **measures, physicsClientId=self._client
         )
         return int(pybullet.createMultiBody(0.0, -1, seen, physicsClientId=self._client))
 

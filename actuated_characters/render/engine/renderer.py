@@ -14,6 +14,7 @@ from actuated_characters.render.engine.camera_pose import (
 from actuated_characters.render.engine.compositor import Compositor, Picture
 from actuated_characters.render.engine.posed_characters import Frames, LinkForce, PosedCharacters
 from actuated_characters.render.engine.render_scene import RenderScene
+from actuated_characters.render.engine.surfaces import HEAD_WIDTH
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character, UrdfOptions, Vector
 
@@ -25,7 +26,7 @@ _NO_BALLS = np.zeros((0, 4))
 _MOST_DRAWN = 2**23  # samples of a picture; each takes some 40 bytes, and more while it is drawn
 _GHOST_COLOR, _GHOST_OPACITY = (0.25, 0.85, 0.45, 1.0), 0.45
 _MARK_COLOR = (0.55, 0.15, 0.75, 1.0)
-_HIDDEN_ARROW_OPACITY = 0.55
+_ARROW_RADIUS, _HIDDEN_ARROW_OPACITY = 0.005, 0.55  # of the view's distance; and where hidden
 
 
 @dataclass(frozen=True)
@@ -102,10 +103,12 @@ class Renderer:
             box = view.box(self.posed.spheres(ghosts), size)
             layers.draw_over(self._scene, box, _GHOST_OPACITY)
         if frame.forces:
-            arrows = [self.posed.arrow(force, frames, frame.arrow_length) for force in frame.forces]
+            arrows = [self.posed.arrow(each, frames, frame.arrow_length) for each in frame.forces]
+            radius = _ARROW_RADIUS * view.distance
             self._scene.clear()
-            self._scene.show_arrows(arrows, view)
-            box = view.box(Spheres.joined(arrow.spheres(view) for arrow in arrows), size)
+            self._scene.show_arrows(arrows, radius)
+            ends = np.concatenate(arrows)
+            box = view.box(Spheres(ends, np.full(len(ends), HEAD_WIDTH * radius)), size)
             layers.draw_over(self._scene, box, 1.0, _HIDDEN_ARROW_OPACITY)
         return layers.picture()
 

@@ -118,7 +118,7 @@ def _vertices(mesh: Path) -> FloatArray:
 
 
 def _solid(shapes: tuple[Shape, ...]) -> list[Shape]:
-    """Without those of no size, which the engine refuses and nobody sees."""
+    """Without those of no size, which the engine refuses and no picture shows."""
     return [shape for shape in shapes if shape.type is ShapeType.MESH or min(shape.size) > 0.0]
 
 
