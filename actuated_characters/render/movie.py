@@ -130,13 +130,13 @@ class Movie:
 
     def _with_views(self, frames: Sequence[FrameSpec]) -> list[FrameSpec]:
         """The frames with their views, the places of their ghosts and the length of arrows."""
-        scene, heading, posed = (
-            self._scene,
-            _heading(self._scene),
-            PosedCharacters(self._scene.characters),
+        scene, heading = self._scene, _heading(self._scene)
+        posed = PosedCharacters(scene.characters)
+        path, some = (
+            camera_path(scene)[self._rows],
+            slice(None, None, ceil(len(self) / _MOST_FRAMED)),
         )
-        path = camera_path(scene)[self._rows]
-        ways, some = path - path[0], slice(None, None, ceil(len(self) / _MOST_FRAMED))
+        ways = path - path[0]
         like, offset = CameraPose(yaw=heading + _YAW, pitch=_PITCH), (0.0, 0.0, 0.0)
         bodies = posed.outline(scene.position[self._rows[some]], ways[some])
         width, height, _ = extents(bodies, like).tolist()

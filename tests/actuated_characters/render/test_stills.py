@@ -270,22 +270,25 @@ def test_render_writes_a_film_into_the_runs_directory(
     (run / "video.mp4").unlink()
 
 
-def test_a_film_that_is_interrupted_leaves_nothing(
-    run: Path, processes: Processes, tmp_path: Path
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_movie_that_is_interrupted_or_killed_leaves_no_process(
+    run: Path, processes: Processes, tmp_path: Path, number: signal.Signals
 ) -> None:
-    folder = tmp_path / "film"
+    folder = tmp_path / "movie"
     folder.mkdir()
     slow = ("--speed", "0.001", "--size", "96x64", "--workers", "2")
-    process = processes.command("render", str(run), "--output", str(folder / "film.mp4"), *slow)
-    wait_until(lambda: any(folder.iterdir()), "a film that is being written")
+    process = processes.command("render", str(run), "--output", str(folder / "movie.mp4"), *slow)
+    wait_until(lambda: any(folder.iterdir()), "a movie that is being written")
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
 
-    process.send(signal.SIGINT)
+    process.send(number)
 
-    assert process.wait(20.0) == 130
-    assert process.stderr.splitlines()[-1] == "interrupted"
-    assert "Traceback" not in process.stderr
-    assert not list(folder.iterdir())
+    code = process.wait(20.0)
+    if number is signal.SIGINT:
+        assert code == 130
+        assert process.stderr.splitlines()[-1] == "interrupted"
+        assert "Traceback" not in process.stderr
+        assert not list(folder.iterdir())
     assert len(children) >= 2
     wait_until(lambda: not any(Path(f"/proc/{child}").exists() for child in children), "their end")
 
