@@ -1,4 +1,4 @@
-"""The command `actuated_characters render`: pictures and films of a recorded run."""
+"""The command `actuated_characters render`: pictures and movies of a recorded run."""
 
 import argparse
 import os
@@ -11,121 +11,105 @@ from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # they take a second to import
     from actuated_characters.bags.recording import Recording
-    from actuated_characters.render.engine.render_scene import Size
+    from actuated_characters.render.engine.camera_pose import Size
 
 _COUNT = 8
 _MOST = 10_000  # pictures
 _FPS = 30
 _MOVIE = ".mp4"
 _GHOSTS = ("beside", "over", "none")
+_STRIP_OPTIONS = ("times", "count", "columns")
+_MOVIE_OPTIONS = ("fps", "speed", "contacts", "workers")
 
 
 def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command to those of `actuated_characters`."""
     render = commands.add_parser(
         "render",
-        help="draw pictures or a film of a recorded run",
-        description="Draw a recorded run as pictures side by side, in one PNG file; or, with "
-        "--video or an --output that ends in .mp4, as a film.",
+        help="draw pictures or a movie of a recorded run",
+        description="Draw a recorded run as pictures side by side, in one PNG file; with --video "
+        "or an --output that ends in .mp4, as a movie. Arrows are pushes since the last picture.",
         epilog="examples: actuated_characters render runs/demo --times 0,0.5,1 --ghost over; "
         "actuated_characters render runs/demo --video --speed 0.25 --from 1 --to 3",
     )
     render.set_defaults(command=_render)
-    render.add_argument("run", type=Path, metavar="RUN", help="a run's directory, or a bag")
-    render.add_argument("--video", action="store_true", help="a film (RUN/video.mp4)")
-    render.add_argument(
-        "--output", type=Path, metavar="FILE", help="where to write it (RUN/strip.png)"
-    )
-    render.add_argument(
-        "--character", metavar="NAME", help="draw this one alone of several, such as left"
-    )
-    render.add_argument(
+    add = render.add_argument
+    add("run", type=Path, metavar="RUN", help="a run's directory, or a bag")
+    add("--video", action="store_true", help="a movie (RUN/video.mp4)")
+    add("--output", type=Path, metavar="FILE", help="where to write it (RUN/strip.png)")
+    add("--character", metavar="NAME", help="draw this one alone of several, such as left")
+    add("--from", type=float, metavar="S", dest="start", help="begin there, s (0)")
+    add("--to", type=float, metavar="S", dest="end", help="end there, s (the last state)")
+    add(
         "--ghost",
         choices=_GHOSTS,
-        help="where to draw the reference: beside the character (films only; their default), "
+        help="where to draw the reference: beside the character (movies only; their default), "
         "over it, where it really is, or not at all (the strip's default)",
     )
-    render.add_argument("--reference", action="store_true", help="the same as --ghost over")
-    render.add_argument(
-        "--size", metavar="WxH", help="pixels of a picture (strip: as suits; film: 960x540)"
-    )
-    _add_strip(render.add_argument_group("strip"))
-    _add_film(render.add_argument_group("film"))
-
-
-def _add_strip(group: "argparse._ArgumentGroup") -> None:
-    group.add_argument("--times", metavar="S,S,...", help="when, in s since the run's first state")
-    group.add_argument(
+    add("--reference", action="store_true", help="the same as --ghost over")
+    add("--size", metavar="WxH", help="pixels of a picture (strip: as suits; movie: 960x540)")
+    add = render.add_argument_group("strip").add_argument
+    add("--times", metavar="S,S,...", help="when, in s since the run's first state")
+    add(
         "--count",
         type=int,
         metavar="N",
-        help=f"so many pictures, evenly from the first state to the last ({_COUNT})",
+        help=f"so many pictures, evenly from first to last ({_COUNT})",
     )
-    group.add_argument("--columns", type=int, metavar="N", help="pictures in a row (all, up to 8)")
-
-
-def _add_film(group: "argparse._ArgumentGroup") -> None:
-    group.add_argument("--fps", type=int, metavar="N", help=f"pictures a second ({_FPS})")
-    group.add_argument(
-        "--speed", type=float, metavar="X", help="simulated seconds a second; 0.25 is slow (1)"
-    )
-    group.add_argument("--from", type=float, metavar="S", dest="start", help="begin there (0)")
-    group.add_argument("--to", type=float, metavar="S", dest="end", help="end there (the last)")
-    group.add_argument(
-        "--contacts", action="store_true", help="mark the links that touch something"
-    )
-    group.add_argument(
-        "--workers", type=int, metavar="N", help="processes that draw (as many as cores)"
-    )
-
-
-_STRIP_OPTIONS = ("times", "count", "columns")
-_FILM_OPTIONS = ("fps", "speed", "start", "end", "contacts", "workers")
-_FLAGS = {"start": "from", "end": "to"}
+    add("--columns", type=int, metavar="N", help="pictures in a row (all, up to 8)")
+    add = render.add_argument_group("movie").add_argument
+    add("--fps", type=int, metavar="N", help=f"pictures a second ({_FPS})")
+    add("--speed", type=float, metavar="X", help="simulated seconds a second; 0.25 is slow (1)")
+    add("--contacts", action="store_true", help="mark the links that touch something")
+    add("--workers", type=int, metavar="N", help="processes that draw (as many as cores)")
 
 
 def _render(options: argparse.Namespace) -> None:
-    is_film = options.video or (
+    is_movie = options.video or (
         options.output is not None and options.output.suffix.lower() == _MOVIE
     )
-    _check(options, is_film)
-    if is_film:
-        _render_film(options)
+    _check(options, is_movie)
+    if is_movie:
+        _render_movie(options)
     else:
         _render_strip(options)
 
 
-def _check(options: argparse.Namespace, is_film: bool) -> None:
-    """What is of the other kind is a mistake, rather than without effect."""
-    for name in _STRIP_OPTIONS if is_film else _FILM_OPTIONS:
+def _check(options: argparse.Namespace, is_movie: bool) -> None:
+    """Reject an option of the other kind, which would be without effect, and contradictions."""
+    for name in _STRIP_OPTIONS if is_movie else _MOVIE_OPTIONS:
         if getattr(options, name) not in (None, False):
-            kind = "a strip's, and this is a film" if is_film else "a film's; add --video"
-            raise ConfigurationError(f"--{_FLAGS.get(name, name)} is {kind}")
-    if options.times is not None and options.count is not None:
-        raise ConfigurationError("--times and --count: give one of the two")
+            kind = "a strip's, and this is a movie" if is_movie else "a movie's; add --video"
+            raise ConfigurationError(f"--{name} is {kind}")
+    part = {"--count": options.count, "--from": options.start, "--to": options.end}
+    for name, value in part.items():
+        if options.times is not None and value is not None:
+            raise ConfigurationError(f"--times and {name}: give one of the two")
     if options.reference and options.ghost not in (None, "over"):
         raise ConfigurationError(f"--reference is --ghost over; --ghost is {options.ghost}")
+    if options.ghost == "beside" and not is_movie:
+        raise ConfigurationError("--ghost beside is a movie's; a strip has it over, or none")
 
 
 def _render_strip(options: argparse.Namespace) -> None:
-    count = _COUNT if options.count is None else options.count
-    if count > _MOST:
-        raise ConfigurationError(f"--count is {count}; it must be {_MOST} or less")
-    if options.ghost == "beside":
-        raise ConfigurationError("--ghost beside is a film's; a strip has it over, or none")
-    times = count if options.times is None else _times(options.times)
+    times = _COUNT if options.count is None else options.count
+    if times > _MOST:
+        raise ConfigurationError(f"--count is {times}; it must be {_MOST} or less")
+    if options.times is not None:
+        times = _times(options.times)
     size = None if options.size is None else _size(options.size)
     from actuated_characters.render.stills import save_png, strip
     from actuated_characters.runs.run_directory import STRIP
 
-    output = options.output or _place(options.run) / STRIP
     recordings = _read(options)
-    _check_output(output, ".png")
+    output = _output(options, STRIP)
     count = times if isinstance(times, int) else len(times)
     with progress_bar(recordings[0].character.name, count, "pictures") as bar:
         picture = strip(
             recordings,
             times,
+            start=options.start or 0.0,
+            end=options.end,
             columns=options.columns,
             ghost=options.reference or options.ghost == "over",
             size=size,
@@ -135,15 +119,13 @@ def _render_strip(options: argparse.Namespace) -> None:
     print(output)
 
 
-def _render_film(options: argparse.Namespace) -> None:
+def _render_movie(options: argparse.Namespace) -> None:
     size = None if options.size is None else _size(options.size)
     ghost = "over" if options.reference else options.ghost
     from actuated_characters.render.movie import MOVIE_SIZE, GhostPlace, Movie, MovieSettings
     from actuated_characters.render.video import check_video
     from actuated_characters.runs.run_directory import VIDEO
 
-    output = options.output or _place(options.run) / VIDEO
-    _check_output(output, _MOVIE)
     settings = MovieSettings(
         fps=_FPS if options.fps is None else options.fps,
         speed=1.0 if options.speed is None else options.speed,
@@ -155,15 +137,12 @@ def _render_film(options: argparse.Namespace) -> None:
         workers=options.workers,
     )
     check_video(settings.size, settings.fps)
-    movie = Movie(_read(options), settings)
+    recordings = _read(options)
+    output = _output(options, VIDEO)
+    movie = Movie(recordings, settings)
     with progress_bar(output.name, len(movie), "pictures") as bar:
         movie.save(output, lambda done: bar.update(bar.task_ids[0], completed=done))
     print(output)
-
-
-def _place(run: Path) -> Path:
-    """Where pictures of it go: a bag may be a file, too."""
-    return run if run.is_dir() else run.parent
 
 
 def _read(options: argparse.Namespace) -> "tuple[Recording, ...]":
@@ -191,8 +170,11 @@ def _size(text: str) -> "Size":
     return int(match[1]), int(match[2])
 
 
-def _check_output(output: Path, suffix: str) -> None:
-    """What would be a pity to find out after all the work."""
+def _output(options: argparse.Namespace, name: str) -> Path:
+    """The file to write, by default beside a run's bag; checked before all the work."""
+    folder = options.run if options.run.is_dir() else options.run.parent  # a bag may be a file
+    output: Path = options.output or folder / name
+    suffix = Path(name).suffix
     if output.suffix.lower() != suffix:
         raise ConfigurationError(f"--output {output}: it must be a {suffix} file")
     if output.is_dir() or not output.absolute().parent.is_dir():
@@ -200,3 +182,4 @@ def _check_output(output: Path, suffix: str) -> None:
         raise ConfigurationError(f"--output {output}: {reason}")
     if not os.access(output if output.exists() else output.absolute().parent, os.W_OK):
         raise ConfigurationError(f"--output {output}: no permission to write there")
+    return output

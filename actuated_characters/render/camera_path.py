@@ -1,25 +1,10 @@
-"""How a camera follows a root: its path along the ground, made smooth. Pure functions."""
-
-from collections.abc import Sequence
-from itertools import pairwise
+"""How a camera follows a root: its path along the ground, made smooth."""
 
 import numpy as np
 
 from msgs_config.arrays import FloatArray
 
 _PASSES = 3  # means of means: nearly a Gaussian, and no corner
-
-
-def followed_path(path: FloatArray, first_rows: Sequence[int], reach: int) -> FloatArray:
-    """A smooth path (t, 2) that is near to a root's; it jumps where an episode begins.
-
-    Args:
-        path: Where the root is (t, 2).
-        first_rows: Those of the episodes, in order, the first of them 0.
-        reach: How many rows before and after one count for it.
-    """
-    ends = [*first_rows, len(path)]
-    return np.concatenate([smoothed(path[a:b], reach) for a, b in pairwise(ends)])
 
 
 def smoothed(path: FloatArray, reach: int) -> FloatArray:

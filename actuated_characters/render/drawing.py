@@ -1,24 +1,22 @@
-"""Draws the pictures of a film, in several processes: the same ones however many there are."""
+"""Draws the pictures of a movie, in several processes: the same ones however many there are."""
 
 import multiprocessing
+import os
 import signal
-from collections.abc import Generator, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
 
-import numpy as np
+from actuated_characters.render.engine.camera_pose import Size
+from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
+from msgs_config.character.model import Character, UrdfOptions
+from msgs_config.errors import RunError
 
-from actuated_characters.render.captions import write_on
-from actuated_characters.render.engine.camera_pose import CameraPose
-from actuated_characters.render.engine.render_scene import Size
-from actuated_characters.render.engine.renderer import LinkForce, Picture, Renderer
-from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.model import Character, UrdfOptions, Vector
-from msgs_config.errors import ActuatedCharactersError, RunError
-
-_AHEAD = 2  # shots that a process has, so that it never waits for the next one
-_WAIT = 5.0  # s for a process to end that was told to
+_AHEAD = 2  # frames that wait for each process, so that it never waits for the next one
 
 
 @dataclass(frozen=True)
@@ -28,34 +26,24 @@ class SceneSettings:
     characters: tuple[Character, ...]
     ground: bool
     terrain: UrdfOptions | None
-    ghost_offset: Vector  # m, world: how far from its place a ghost is drawn
     size: Size
+    write: Callable[[Picture, str], Picture]  # adds a caption
 
-
-@dataclass(frozen=True)
-class FrameSpec:
-    """One picture of characters of n degrees of freedom and l links in all."""
-
-    position: FloatArray  # (n,), message form
-    ghost: FloatArray | None  # (n,), NaN for a character that has none
-    forces: tuple[LinkForce, ...]
-    touching: BoolArray | None  # (l,): the links that are marked
-    balls: FloatArray  # (m, 4): centres and radii, m in the world
-    view: CameraPose
-    caption: str  # none if empty
+    def renderer(self) -> Renderer:
+        """Start an engine for it."""
+        return Renderer(self.characters, ground=self.ground, terrain=self.terrain)
 
 
 def draw(
-    stage: SceneSettings, shots: Sequence[FrameSpec], workers: int
+    settings: SceneSettings, frames: Sequence[FrameSpec], workers: int = 1
 ) -> Generator[Picture, None, None]:
     """The pictures (h, w, 3) one after another, as they are asked for.
 
-    Process k of m draws each m-th picture from the k-th on. Close the iterator to end the processes
-    before the last picture.
+    Close the iterator to end the processes before the last picture.
 
     Args:
-        stage: What stays.
-        shots: What changes.
+        settings: What stays.
+        frames: What changes.
         workers: How many processes; with one it is this one.
 
     Raises:
@@ -63,83 +51,72 @@ def draw(
         RunError: a process ended.
     """
     if workers <= 1:
-        yield from _pictures(stage, shots)
+        with settings.renderer() as renderer:
+            for frame in frames:
+                yield _picture(settings, renderer, frame)
         return
-    with ExitStack() as ending:
-        pipes = [ending.enter_context(_process()) for _ in range(min(workers, len(shots)))]
-        # a layout remembers what it has looked up, and cannot be sent; it is rebuilt when needed
-        sent = replace(stage, characters=tuple(replace(each) for each in stage.characters))
-        for pipe in pipes:
-            _send(pipe, sent)
-        for number in range(len(shots) + _AHEAD * len(pipes)):
-            if number >= _AHEAD * len(pipes):
-                done = number - _AHEAD * len(pipes)
-                yield _received(pipes[done % len(pipes)])
-            if number < len(shots):
-                _send(pipes[number % len(pipes)], shots[number])
+    with _processes(settings, min(workers, len(frames))) as pool:
+        drawn: deque[Future[Picture]] = deque()
+        try:
+            for frame in frames:
+                with _interrupts_blocked():  # which a process that is started here inherits
+                    drawn.append(pool.submit(_draw_in_process, frame))
+                if len(drawn) >= _AHEAD * workers:
+                    yield drawn.popleft().result()
+            while drawn:
+                yield drawn.popleft().result()
+        except BrokenProcessPool as error:
+            raise RunError("a process that draws pictures ended before they were done") from error
 
 
-def _pictures(stage: SceneSettings, shots: Iterable[FrameSpec]) -> Iterator[Picture]:
-    with Renderer(stage.characters, ground=stage.ground, terrain=stage.terrain) as camera:
-        for shot in shots:
-            picture = camera.picture(
-                shot.position,
-                ghost=shot.ghost,
-                ghost_offset=stage.ghost_offset,
-                forces=shot.forces,
-                touching=shot.touching,
-                balls=shot.balls,
-                view=shot.view,
-                size=stage.size,
-            )
-            yield write_on(picture, shot.caption) if shot.caption else picture
+def _picture(settings: SceneSettings, renderer: Renderer, frame: FrameSpec) -> Picture:
+    picture = renderer.picture(frame, settings.size)
+    return settings.write(picture, frame.caption) if frame.caption else picture
 
 
 @contextmanager
-def _process() -> Iterator[Connection]:
-    """A process that draws, and what it is talked to by: a set, and shots one after another."""
+def _processes(settings: SceneSettings, workers: int) -> Generator[ProcessPoolExecutor, None, None]:
+    """Processes that draw; they end with the context, or with this process."""
+    # a layout remembers what it has looked up, and cannot be sent; it is rebuilt when needed
+    sent = replace(settings, characters=tuple(replace(each) for each in settings.characters))
     context = multiprocessing.get_context("spawn")  # an engine does not survive a fork
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_draw_each, args=(theirs,), daemon=True)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C is ours
+    pool = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(sent,))
     try:
-        process.start()
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _interrupts_blocked() -> Generator[None, None, None]:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    try:
-        theirs.close()
-        yield ours
-    finally:
-        ours.close()
-        process.terminate()
-        process.join(_WAIT)
-        if process.is_alive():
-            process.kill()
-            process.join()
-        process.close()
 
 
-def _draw_each(pipe: Connection) -> None:
-    """Answer each shot by its picture, or by an error, until nobody is there any more."""
-    with suppress(EOFError, ConnectionError):
-        try:
-            for picture in _pictures(pipe.recv(), iter(pipe.recv, None)):
-                pipe.send(picture)
-        except ActuatedCharactersError as error:
-            pipe.send(error)
+# In a process that draws
+
+_settings: SceneSettings
+_renderer: Renderer | None = None
 
 
-def _send(pipe: Connection, content: SceneSettings | FrameSpec) -> None:
-    # what the other side has to say of its end is read, not this
-    with suppress(ConnectionError):
-        pipe.send(content)
+def _begin(settings: SceneSettings) -> None:
+    global _settings
+    _settings = settings
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _received(connection: Connection) -> Picture:
-    try:
-        received = connection.recv()
-    except (EOFError, ConnectionError) as error:
-        raise RunError("a process that draws pictures ended before they were done") from error
-    if isinstance(received, ActuatedCharactersError):
-        raise received
-    return np.asarray(received, dtype=np.uint8)
+def _end_with_parent() -> None:
+    """End when the parent is killed, which ends nothing by itself."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _draw_in_process(frame: FrameSpec) -> Picture:
+    global _renderer
+    _renderer = _renderer or _settings.renderer()
+    return _picture(_settings, _renderer, frame)

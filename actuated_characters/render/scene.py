@@ -1,26 +1,35 @@
 """What there is to be seen of a recording: the characters of one world, state by state."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from actuated_characters.bags.recording import Recording
-from msgs_config.arrays import FloatArray, IntArray
+from actuated_characters.bags.recording import Recording, Wrenches
+from actuated_characters.render.engine.posed_characters import LinkForce
+from actuated_characters.render.engine.renderer import FrameSpec
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.model import Character, UrdfOptions
-from msgs_config.errors import RecordingError
+from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import PLANE
 
 _RADIUS = 0.1  # m, of a ball of which it was not recorded
 _ROUNDING = 1e-9  # s: two distances are as good as equal
+_SHORTEST = 0.25  # of the longest arrow: the shortest one
+_OF_STATES = (
+    *("stamps_ns", "published_ns", "position", "velocity"),
+    *("reference_position", "reference_velocity", "balls", "commands"),
+)
+_OF_TICKS = ("effort", "contacts", "applied_wrench", "throws")
 
 
 @dataclass(frozen=True)
 class Scene:
     """The characters of one world over t ticks; n degrees of freedom in all.
 
-    Arrays have those of one character after those of another.
+    Arrays have those of one character after those of another, and so it is with the links (l).
     """
 
     recordings: tuple[Recording, ...]  # of the same ticks
@@ -65,16 +74,83 @@ class Scene:
         """Rows of the first states of episodes; the first row is one."""
         return self.recordings[0].episode_rows
 
-    def balls(self, row: int) -> FloatArray:
-        """Centres and radii (m, 4) of the balls that are there in a state, m."""
+    def frames(
+        self, rows: IntArray, captions: Sequence[str], *, ghosts: bool, contacts: bool = False
+    ) -> list[FrameSpec]:
+        """What pictures of some states (p,) show, without their views; captions (p,).
+
+        With the references as ghosts if wanted, and with the links marked that touched something.
+        Pushes and contacts are those of the ticks since the state before, and of the one that led
+        to the first state. Of a link its strongest push is shown. The recording's strongest push
+        has the longest arrow, and none has less than a part of it.
+        """
+        return [
+            FrameSpec(
+                self.position[row],
+                ghost=self.reference[row] if ghosts else None,
+                forces=self._forces(*ticks),
+                touching=self._touching(*ticks) if contacts else None,
+                balls=self._balls(row),
+                caption=caption,
+            )
+            for row, ticks, caption in zip(rows.tolist(), _ticks(rows), captions, strict=True)
+        ]
+
+    def _balls(self, row: int) -> FloatArray | None:
+        """Centres and radii (m, 4) of the balls that are there in a state, m; None: no balls."""
         recording = self.recordings[0]
-        said = recording.balls[row] if recording.balls else None
-        if said is None:
-            return np.zeros((0, 4))
+        states = recording.balls[row] if recording.balls else None
+        if states is None:
+            return None
         first = int(self.episode_rows[np.searchsorted(self.episode_rows, row, side="right") - 1])
         thrown = [throw for each in recording.throws[first:row] for throw in each]
-        radii = [throw.radius for throw in thrown] + [_RADIUS] * len(said.names)
-        return np.column_stack((said.motion[:, :3], radii[: len(said.names)]))
+        radii = [throw.radius for throw in thrown] + [_RADIUS] * len(states.names)
+        return np.column_stack((states.motion[:, :3], radii[: len(states.names)]))
+
+    def _touching(self, begin: int, end: int) -> BoolArray:
+        """Which links (l,) touched something in ticks from one to before another."""
+        touched = np.zeros(len(self._centres), dtype=np.bool_)
+        for links, acting in self._acting("contacts", begin, end):
+            touched[[links[name] for name in acting.links if name in links]] = True
+        return touched
+
+    def _forces(self, begin: int, end: int) -> tuple[LinkForce, ...]:
+        strongest: dict[int, tuple[float, LinkForce]] = {}
+        for links, acting in self._acting("applied_wrench", begin, end):
+            for number, norm in enumerate(_norms(acting).tolist()):
+                link = links.get(acting.links[number])
+                if link is None or norm == 0.0 or norm <= strongest.get(link, (0.0,))[0]:
+                    continue
+                share = _SHORTEST + (1.0 - _SHORTEST) * norm / self._strongest
+                has_points = len(acting.points) > 0
+                point = acting.points[number] if has_points else self._centres[link]
+                arrow = acting.wrenches[number, :3] * (share / norm)
+                strongest[link] = norm, LinkForce(link, point, arrow)
+        return tuple(force for _, force in strongest.values())
+
+    def _acting(
+        self, what: str, begin: int, end: int | None
+    ) -> Iterator[tuple[dict[str, int], WrenchArrays]]:
+        """Contacts or pushes in ticks from one to before another, and links by their names."""
+        first = 0
+        for recording in self.recordings:
+            names = [link.name for link in recording.character.links]
+            links = {name: first + row for row, name in enumerate(names)}
+            wrenches: Wrenches = getattr(recording, what)
+            yield from ((links, acting) for acting in wrenches[begin:end] if acting is not None)
+            first += len(names)
+
+    @cached_property
+    def _strongest(self) -> float:
+        """Norm of the strongest push, N."""
+        every = self._acting("applied_wrench", 0, None)
+        return max(float(_norms(acting).max(initial=0.0)) for _, acting in every)
+
+    @cached_property
+    def _centres(self) -> FloatArray:
+        """Centres of mass (l, 3) of the links in their frames, m."""
+        links = [link for character in self.characters for link in character.links]
+        return np.array([link.inertial_pose.position for link in links])
 
 
 def make_scene(recordings: Sequence[Recording]) -> Scene:
@@ -99,26 +175,25 @@ def make_scene(recordings: Sequence[Recording]) -> Scene:
 
 def _cut(recording: Recording, first_ns: int, last_ns: int) -> Recording:
     """What is seen of a recording, from one stamp to another."""
-    stamps = recording.stamps_ns
-    begin, end = np.searchsorted(stamps, (first_ns, last_ns)).tolist()
-    if (begin, end) == (0, len(stamps) - 1):
-        return recording
-    states, ticks = slice(begin, end + 1), slice(begin, end)
-    return replace(
-        recording,
-        stamps_ns=stamps[states],
-        published_ns=recording.published_ns[states],
-        position=recording.position[states],
-        velocity=recording.velocity[states],
-        effort=recording.effort[ticks],
-        reference_position=recording.reference_position[states],
-        reference_velocity=recording.reference_velocity[states],
-        contacts=recording.contacts[ticks],
-        applied_wrench=recording.applied_wrench[ticks],
-        throws=recording.throws[ticks],
-        balls=recording.balls[states],
-        commands=recording.commands[states],
+    begin, end = np.searchsorted(recording.stamps_ns, (first_ns, last_ns)).tolist()
+    parts = dict.fromkeys(_OF_STATES, slice(begin, end + 1)) | dict.fromkeys(
+        _OF_TICKS, slice(begin, end)
     )
+    return replace(recording, **{name: getattr(recording, name)[p] for name, p in parts.items()})
+
+
+def _ticks(rows: IntArray) -> Iterator[tuple[int, int]]:
+    """First tick, and the one after the last, that led to each of some states (p,)."""
+    before = max(int(rows[0]) - 1, 0)
+    for row in rows.tolist():
+        yield min(before, max(row - 1, 0)), row
+        before = row
+
+
+def _norms(acting: WrenchArrays) -> FloatArray:
+    """Norms (m,) of the forces, N."""
+    norms: FloatArray = np.linalg.norm(acting.wrenches[:, :3], axis=1)
+    return norms
 
 
 def nearest_rows(times: FloatArray, wanted: FloatArray) -> IntArray:
@@ -133,3 +208,18 @@ def nearest_rows(times: FloatArray, wanted: FloatArray) -> IntArray:
     nearer = wanted - times[before] <= times[after] - wanted + _ROUNDING
     rows: IntArray = np.where(nearer, before, after)
     return rows
+
+
+def part_of(times: FloatArray, start: float, end: float | None) -> tuple[float, float]:
+    """A part of states at times (t + 1,), from a start to an end in s, by default the last state's.
+
+    Raises:
+        ConfigurationError: it is empty, or the states do not reach so far.
+    """
+    last = float(times[-1])
+    end = last if end is None else end
+    if not 0.0 <= start <= end <= last:
+        raise ConfigurationError(
+            f"from {start:g} s to {end:g} s is not in the recording: 0 to {last:g} s"
+        )
+    return start, end

@@ -1,6 +1,7 @@
 """Pictures of a recorded run, or of any poses: single ones and strips of several."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -9,32 +10,44 @@ from matplotlib.image import imsave
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.captions import captioned
-from actuated_characters.render.engine.render_scene import Size
-from actuated_characters.render.engine.renderer import Picture, Renderer
-from actuated_characters.render.scene import make_scene, nearest_rows
+from actuated_characters.render.drawing import SceneSettings, draw
+from actuated_characters.render.engine.camera_pose import (
+    CameraPose,
+    Size,
+    Spheres,
+    extents,
+    framing,
+    natural_aspect,
+)
+from actuated_characters.render.engine.posed_characters import PosedCharacters
+from actuated_characters.render.engine.renderer import FrameSpec, Picture
+from actuated_characters.render.scene import Scene, make_scene, nearest_rows, part_of
 from actuated_characters.whole_files import write_whole
-from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, RecordingError
 from sim_node.physics.world import WorldSettings
 
-SMALLEST, LARGEST = 16, 4096  # pixels along an edge of a picture
+LONGEST_ARROW = 0.4  # of the extent of the characters
 
+_SMALLEST, _LARGEST = 16, 4096  # pixels along an edge of a picture
 _MOST_PIXELS = 2**26  # of a strip
-_TILE_HEIGHT = 400  # pixels, where nothing else is said
-_NARROWEST, _WIDEST = 0.5, 1.6  # width over height, where nothing else is said
-_COLUMNS = 8  # at the most, where nothing else is said
+_TILE_HEIGHT = 400  # pixels, by default
+_NARROWEST, _WIDEST = 0.5, 1.6  # width over height, by default
+_COLUMNS = 8  # at the most, by default
 _GAP = 3  # pixels between pictures
 _WHITE = 255
 
 Progress = Callable[[int], None]
-"""Is told the number of pictures so far."""
+"""Called with the number of pictures so far."""
 
 
 def strip(
     recording: Recording | Sequence[Recording],
     times: Sequence[float] | int = 8,
     *,
+    start: float = 0.0,
+    end: float | None = None,
     columns: int | None = None,
     ghost: bool = False,
     labels: bool = True,
@@ -43,9 +56,13 @@ def strip(
 ) -> Picture:
     """Pictures of a run side by side, all of one scale; each follows the root along the ground.
 
+    Arrows are the pushes since the picture before; in the first one, those that led to it.
+
     Args:
         recording: The run, or those of several characters of one world.
-        times: When, s since the first state; or how many pictures, evenly from first to last.
+        times: When, s since the first state; or how many pictures, evenly from start to end.
+        start: The first picture's time in s, where `times` is a number.
+        end: The last one's; None is the last state's.
         columns: Pictures in a row.
         ghost: Draw the reference, too, transparent, wherever there is one.
         labels: Write the time above each picture.
@@ -54,24 +71,16 @@ def strip(
 
     Raises:
         ConfigurationError: the recording does not reach to a time, or a size is not sensible.
-        RecordingError: a ghost is asked for, and there is no reference; or the recordings are of
-            several worlds.
+        RecordingError: there is no reference for a ghost; or the recordings are of several worlds.
     """
     scene = make_scene([recording] if isinstance(recording, Recording) else recording)
-    rows = _rows(scene.times, times)
+    rows = _rows(scene, times, start, end)
     if ghost and not scene.has_reference:
         raise RecordingError("the recording has no reference to draw")
-    return pose_strip(
-        scene.characters,
-        scene.position[rows],
-        [f"{time:.2f} s" for time in scene.times[rows]] if labels else None,
-        ghosts=scene.reference[rows] if ghost else None,
-        balls=[scene.balls(row) for row in rows.tolist()],
-        columns=columns,
-        size=size,
-        world=WorldSettings(ground=scene.ground, terrain=scene.terrain),
-        progress=progress,
-    )
+    captions = [f"{time:.2f} s" if labels else "" for time in scene.times[rows]]
+    frames = scene.frames(rows, captions, ghosts=ghost)
+    world = WorldSettings(ground=scene.ground, terrain=scene.terrain)
+    return _draw_strip(scene.characters, world, frames, columns, size, progress)
 
 
 def pose_strip(
@@ -80,11 +89,9 @@ def pose_strip(
     captions: Sequence[str] | None = None,
     *,
     ghosts: FloatArray | None = None,
-    balls: Sequence[FloatArray] | None = None,
     columns: int | None = None,
     size: Size | None = None,
     world: WorldSettings | None = None,
-    progress: Progress | None = None,
 ) -> Picture:
     """Pictures (h, w, 3) of a character side by side, all of one scale.
 
@@ -93,45 +100,70 @@ def pose_strip(
         positions: Where it is in each picture (p, n), message form.
         captions: What stands above each picture (p,).
         ghosts: Where its transparent copy is in each picture (p, n); NaN draws none.
-        balls: Centres and radii (m, 4) of the balls in each picture (p,), m in the world.
         columns: Pictures in a row; by default all, up to 8.
         size: Width and height of each picture in pixels; by default as suits the poses.
         world: Says what there is besides; by default the plane z = 0.
-        progress: Is called after each picture.
 
     Raises:
         ConfigurationError: there are no positions, or a size is not sensible.
         CharacterError: a file of the character cannot be used.
     """
     positions = np.atleast_2d(positions)
-    count = len(positions)
+    captions = [""] * len(positions) if captions is None else captions
+    if len(captions) != len(positions):
+        raise ConfigurationError(f"{len(captions)} captions for {len(positions)} pictures")
+    transparent = [None] * len(positions) if ghosts is None else np.atleast_2d(ghosts)
+    each = zip(positions, transparent, captions, strict=True)
+    frames = [
+        FrameSpec(position, ghost=ghost, caption=caption) for position, ghost, caption in each
+    ]
+    characters = (character,) if isinstance(character, Character) else tuple(character)
+    return _draw_strip(characters, world or WorldSettings(), frames, columns, size)
+
+
+def _draw_strip(
+    characters: tuple[Character, ...],
+    world: WorldSettings,
+    frames: Sequence[FrameSpec],
+    columns: int | None,
+    size: Size | None,
+    progress: Progress | None = None,
+) -> Picture:
+    """The strip of some frames, which have no views yet."""
+    count = len(frames)
     if not count or (columns is not None and columns < 1):
         raise ConfigurationError(f"{count} pictures in rows of {columns}; both must be 1 or more")
-    if captions is not None and len(captions) != count:
-        raise ConfigurationError(f"{len(captions)} captions for {count} pictures")
-    world = world or WorldSettings()
-    with Renderer(character, ground=world.ground, terrain=world.terrain) as camera:
-        no_ghosts = np.full_like(positions, np.nan)
-        ghosts = no_ghosts if ghosts is None else np.atleast_2d(ghosts)
-        is_known = np.isfinite(ghosts)
-        has_ghost: BoolArray = np.logical_or.reduce(is_known, axis=1)
-        seen = np.concatenate((positions, ghosts[np.logical_and.reduce(is_known, axis=1)]))
-        size = _natural_size(camera, seen) if size is None else size
-        check_size(size, count)
-        view = camera.view(seen, size=size)
-        tiles = []
-        for row, position in enumerate(positions):
-            picture = camera.picture(
-                position,
-                ghost=ghosts[row] if has_ghost[row] else None,
-                balls=np.zeros((0, 4)) if balls is None else balls[row],
-                view=camera.followed(view, positions[0], position),
-                size=size,
-            )
-            tiles.append(picture if captions is None else captioned(picture, captions[row]))
-            if progress is not None:
-                progress(row + 1)
+    size, frames = _with_views(characters, frames, size)
+    settings = SceneSettings(characters, world.ground, world.terrain, size, captioned)
+    tiles: list[Picture] = []
+    for picture in draw(settings, frames):
+        tiles.append(picture)
+        if progress is not None:
+            progress(len(tiles))
     return _side_by_side(tiles, columns or min(count, _COLUMNS))
+
+
+def _with_views(
+    characters: Sequence[Character], frames: Sequence[FrameSpec], size: Size | None
+) -> tuple[Size, list[FrameSpec]]:
+    """The pictures' size, by default one that suits the poses, and the frames with their views."""
+    posed, like = PosedCharacters(characters), CameraPose()
+    positions = np.array([frame.position for frame in frames])
+    ghosts = [f.ghost for f in frames if f.ghost is not None and np.isfinite(f.ghost).all()]
+    seen = np.concatenate((positions, *(ghost[np.newaxis] for ghost in ghosts)))
+    ways = posed.ways(seen)
+    outline = posed.outline(seen, ways)
+    longest = LONGEST_ARROW * float(extents(outline, like)[:2].max())
+    tails = posed.tails(positions, ways[: len(frames)], [f.forces for f in frames], longest)
+    outline = Spheres.joined((outline, tails))
+    aspect = min(max(natural_aspect(outline, like), _NARROWEST), _WIDEST)
+    size = size or (round(aspect * _TILE_HEIGHT), _TILE_HEIGHT)
+    check_size(size, len(frames))
+    view = framing(outline, size[0] / size[1], like)
+    return size, [
+        replace(frame, view=view.moved(*way), arrow_length=longest)
+        for frame, way in zip(frames, ways.tolist(), strict=False)
+    ]
 
 
 def save_png(picture: Picture, path: Path) -> None:
@@ -145,33 +177,27 @@ def save_png(picture: Picture, path: Path) -> None:
     write_whole(path, content.getvalue())
 
 
-def _rows(known: FloatArray, times: Sequence[float] | int) -> IntArray:
-    """The states (p,) that are nearest to times in s, or evenly from the first to the last."""
-    end = float(known[-1])
+def _rows(scene: Scene, times: Sequence[float] | int, start: float, end: float | None) -> IntArray:
+    """The states (p,) that are nearest to times in s, or evenly from a start to an end."""
+    count = times if isinstance(times, int) else len(times)
+    if count < 1:
+        raise ConfigurationError(f"{count} pictures; it must be 1 or more")
     if isinstance(times, int):
-        if times < 1:
-            raise ConfigurationError(f"{times} pictures; it must be 1 or more")
-        wanted = np.linspace(0.0, end, times)
-    else:
-        wanted = np.array(times, dtype=float)
-    for time in wanted.tolist():
-        if not 0.0 <= time <= end:
-            raise ConfigurationError(f"time {time:g} s is not in the recording: 0 to {end:g} s")
-    return nearest_rows(known, wanted)
-
-
-def _natural_size(camera: Renderer, positions: FloatArray) -> Size:
-    aspect = min(max(camera.aspect(positions), _NARROWEST), _WIDEST)
-    return round(aspect * _TILE_HEIGHT), _TILE_HEIGHT
+        return nearest_rows(scene.times, np.linspace(*part_of(scene.times, start, end), times))
+    last = float(scene.times[-1])
+    for time in times:
+        if not 0.0 <= time <= last:
+            raise ConfigurationError(f"time {time:g} s is not in the recording: 0 to {last:g} s")
+    return nearest_rows(scene.times, np.array(times, dtype=float))
 
 
 def check_size(size: Size, count: int) -> None:
     """Check the size of so many pictures; raises ConfigurationError if it is not sensible."""
     width, height = size
-    if not all(SMALLEST <= edge <= LARGEST for edge in size):
+    if not all(_SMALLEST <= edge <= _LARGEST for edge in size):
         raise ConfigurationError(
             f"size {width}x{height} is not sensible; "
-            f"it must be {SMALLEST}x{SMALLEST} to {LARGEST}x{LARGEST} pixels"
+            f"it must be {_SMALLEST}x{_SMALLEST} to {_LARGEST}x{_LARGEST} pixels"
         )
     if count * width * height > _MOST_PIXELS:
         raise ConfigurationError(

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuated_characters.render.engine.render_scene import Size
+from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.whole_files import replacing
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -78,9 +78,9 @@ def check_video(size: Size, fps: int) -> None:
 
 
 def _add_stream(video: "OutputContainer", size: Size, fps: int) -> "VideoStream":
-    interval = {"g": str(max(1, round(_KEY_FRAME_S * fps)))}
     from av.video.stream import VideoStream
 
+    interval = {"g": str(max(1, round(_KEY_FRAME_S * fps)))}
     stream = video.add_stream(_ENCODER, rate=fps, options=_QUALITY | interval)
     assert isinstance(stream, VideoStream)
     stream.width, stream.height = size

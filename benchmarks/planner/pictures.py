@@ -1,128 +1,105 @@
-"""The pictures of docs/planning.md: `python -m benchmarks.planner.pictures`.
+"""Pictures of planned motion, the reference transparent: `python -m benchmarks.planner.pictures`.
 
-Planned motion over the capture, which is transparent: all clips at some of their moments, and two
-moving pictures, the backflip and a walk that is pushed. It takes a quarter of an hour.
+Those of docs/planning.md, all clips at some of their moments and two moving pictures, and the
+README's. It takes a quarter of an hour; `--only hero.webp` makes one of them.
 """
 
 import argparse
+import subprocess
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
 from rich.console import Console
 from rich.progress import track
 
-from actuated_characters.render.captions import captioned
-from actuated_characters.render.engine.renderer import Picture, Renderer
+from actuated_characters.bags.recording import Recording, read_recording
+from actuated_characters.render.engine.renderer import Picture
+from actuated_characters.render.movie import GhostPlace, Movie, MovieSettings
 from actuated_characters.render.stills import pose_strip
-from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import make_plan
-from actuated_characters.runs.planned_wrenches import parse_pushes_within
 from controller_node.references.files.clip import available_clips, read_clip
-from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
-from msgs_config.character.model import Character
 
 MOMENTS = 8
-TILE, FRAME = (150, 170), (400, 260)  # pixels
+TILE, FRAME, WIDE = (150, 170), (400, 260), (640, 360)  # pixels
 FRAMES_A_SECOND = 20
-PUSHES = ("root:0,300,0@1.5", "root:240,0,0@5.5")  # N, for 0.2 s
-MOVING = {  # file: clip, duration in s, pushes
-    "planned_backflip.webp": ("backflip", 1.75, ()),
-    "planned_pushes.webp": ("walk", 9.5, PUSHES),
+CLIPS = "planned_clips.webp"
+SIDEWAYS, FORWARDS = "root:0,300,0@1.5", "root:240,0,0@5.5"  # N, for 0.2 s
+Runs = list[tuple[str, float, tuple[str, ...]]]
+MOVING: dict[
+    str, tuple[tuple[int, int], Runs]
+] = {  # file: size, and of each run its clip, duration in s and pushes
+    "planned_backflip.webp": (FRAME, [("backflip", 1.75, ())]),
+    "planned_pushes.webp": (FRAME, [("walk", 9.5, (SIDEWAYS, FORWARDS))]),
+    "hero.webp": (WIDE, [("walk", 4.0, (SIDEWAYS,)), ("backflip", 1.75, ())]),
 }
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What was simulated, tick by tick, and where the capture was."""
-
-    character: Character
-    positions: FloatArray  # (ticks, n)
-    references: FloatArray  # (ticks, n)
-    rate: int  # Hz
-
-    def rows(self, frames_a_second: float) -> FloatArray:
-        """Ticks, so many a second."""
-        count = len(self.positions)
-        return (
-            np.arange(0, count, self.rate / frames_a_second).round().astype(int).clip(0, count - 1)
-        )
 
 
 def main() -> int:
     """Simulate, draw and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path("docs/pictures"), help="(%(default)s)")
-    folder = parser.parse_args().folder
-    console, humanoid = Console(), load_character("humanoid")
-    strips = []
-    for clip in track(available_clips(humanoid), "clips", console=console):
-        seen = simulate(clip, float(read_clip(humanoid, clip).times[-1]))
-        rows = np.linspace(0, len(seen.positions) - 1, MOMENTS).round().astype(int)
-        captions = [clip, *[f"{row / seen.rate:.2f} s" for row in rows[1:]]]
-        strips.append(
-            pose_strip(
-                seen.character,
-                seen.positions[rows],
-                captions,
-                ghosts=seen.references[rows],
-                columns=MOMENTS,
-                size=TILE,
-            )
-        )
-    Image.fromarray(np.concatenate(strips)).save(folder / "planned_clips.webp", quality=75)
-    for name, (clip, duration, pushes) in track(MOVING.items(), "films", console=console):
-        film(simulate(clip, duration, pushes), folder / name)
+    parser.add_argument("--only", choices=(CLIPS, *MOVING), help="the picture to make (all)")
+    options = parser.parse_args()
+    console = Console()
+    if options.only in (None, CLIPS):
+        humanoid = load_character("humanoid")
+        clips = track(available_clips(humanoid), "clips", console=console)
+        strips = [
+            draw_strip(clip, simulate(clip, float(read_clip(humanoid, clip).times[-1])))
+            for clip in clips
+        ]
+        Image.fromarray(np.concatenate(strips)).save(options.folder / CLIPS, quality=75)
+    wanted = [name for name in MOVING if options.only in (None, name)]
+    for name in track(wanted, "moving pictures", console=console):
+        size, runs = MOVING[name]
+        pictures = [each for run in runs for each in draw_movie(simulate(*run), size)]
+        write(pictures, options.folder / name)
     return 0
 
 
-def simulate(clip: str, duration: float, pushes: Sequence[str] = ()) -> Seen:
-    """Plan a clip."""
-    motion = {"reference": "clip", "clip": clip}
-    plan = make_plan(
-        "humanoid", duration, motion, {"wrench_duration": 0.2}, {"planner": "predictive"}
-    )
-    ticks = list(ticks_in_process(plan, parse_pushes_within(pushes, plan)))
-    references = [tick.reference.position for tick in ticks if tick.reference is not None]
-    positions = np.array([tick.state.position for tick in ticks])
-    return Seen(plan.character, positions, np.array(references), plan.simulator.integer("rate"))
-
-
-def film(seen: Seen, file: Path) -> None:
-    """Write a moving picture that a page shows as it is."""
-    rows = seen.rows(FRAMES_A_SECOND)
-    pictures = [Image.fromarray(picture) for picture in _frames(seen, rows)]
-    pictures[0].save(
-        file,
-        save_all=True,
-        append_images=pictures[1:],
-        duration=round(1000 / FRAMES_A_SECOND),
-        loop=0,
-        quality=45,
-        method=4,
-    )
-
-
-def _frames(seen: Seen, rows: FloatArray) -> list[Picture]:
-    positions, references = seen.positions[rows], seen.references[rows]
-    with Renderer(seen.character) as camera:
-        view = camera.view(np.concatenate((positions[:1], references[:1])), size=FRAME)
-        return [
-            captioned(
-                camera.picture(
-                    position,
-                    ghost=reference,
-                    view=camera.followed(view, positions[0], position),
-                    size=FRAME,
-                ),
-                f"{row / seen.rate:.2f} s",
-            )
-            for row, position, reference in zip(rows, positions, references, strict=True)
+def simulate(clip: str, duration: float, pushes: tuple[str, ...] = ()) -> Recording:
+    """Plan a clip; returns what was recorded."""
+    with TemporaryDirectory() as folder:
+        command = [
+            sys.executable,
+            "-m",
+            "actuated_characters.cli",
+            "run",
+            "--output",
+            f"{folder}/run",
         ]
+        command += ["--clip", clip, "--duration", f"{duration}", "--planner", "predictive"]
+        command += ["--set", "sim_node.wrench_duration:=0.2"]
+        command += [word for push in pushes for word in ("--push", push)]
+        subprocess.run(command, check=True, capture_output=True)
+        return read_recording(Path(folder) / "run")
+
+
+def draw_strip(clip: str, run: Recording) -> Picture:
+    """A clip at some of its moments, its name above the first."""
+    rows = np.linspace(0, len(run.times) - 2, MOMENTS).round().astype(int)  # the last is unanswered
+    captions = [clip, *[f"{time:.2f} s" for time in run.times[rows[1:]]]]
+    poses, ghosts = run.position[rows], run.reference_position[rows]
+    return pose_strip(run.character, poses, captions, ghosts=ghosts, columns=MOMENTS, size=TILE)
+
+
+def draw_movie(run: Recording, size: tuple[int, int]) -> list[Picture]:
+    """All of a run, its reference where it really is."""
+    end = float(run.times[-2])  # of the last state nothing answers
+    settings = MovieSettings(fps=FRAMES_A_SECOND, end=end, size=size, ghost=GhostPlace.OVER)
+    return list(Movie([run], settings).pictures())
+
+
+def write(pictures: list[Picture], file: Path) -> None:
+    """Write a moving picture that a page shows as it is."""
+    first, *others = map(Image.fromarray, pictures)
+    period_ms = round(1000 / FRAMES_A_SECOND)
+    first.save(
+        file, save_all=True, append_images=others, duration=period_ms, loop=0, quality=45, method=4
+    )
 
 
 if __name__ == "__main__":

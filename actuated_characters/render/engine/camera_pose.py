@@ -1,19 +1,45 @@
-"""Where a camera stands and what it sees: a pinhole camera, and how to place it. No engine."""
+"""A pinhole camera: where it stands, what it sees, and how to place it. No engine."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import atan, ceil, cos, floor, sin, tan
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Vector
 
-_MARGIN = 0.05  # of the outline's extent, that stays free around it
+_MARGIN = 0.05  # of the extent of what is seen, that stays free around it
+
+Size: TypeAlias = tuple[int, int]
+"""Width and height of a picture in pixels."""
+
+
+class Spheres(NamedTuple):
+    """Spheres whose hull holds what is to be seen."""
+
+    centres: FloatArray  # (m, 3), m
+    radii: FloatArray  # (m,), m
+
+    @classmethod
+    def joined(cls, several: Iterable["Spheres"]) -> "Spheres":
+        """All spheres of several."""
+        centres, radii = zip(*several, strict=True)
+        return cls(np.concatenate(centres), np.concatenate(radii))
+
+    def moved(self, offset: FloatArray | Vector) -> "Spheres":
+        """The same spheres, moved by an offset (3,) in m."""
+        return Spheres(self.centres + offset, self.radii)
+
+    def bounds(self, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The lowest and the highest coordinates (3,) along unit vectors (3, 3), by row."""
+        along, reach = self.centres @ axes.T, self.radii[:, np.newaxis]
+        return (along - reach).min(axis=0), (along + reach).max(axis=0)
 
 
 class Box(NamedTuple):
-    """A part of a picture, in pixels from its upper left corner; empty where an end is a begin."""
+    """A part of a picture, in pixels from its upper left corner; false if it is empty."""
 
     top: int
     bottom: int
@@ -21,26 +47,9 @@ class Box(NamedTuple):
     right: int
 
     @property
-    def size(self) -> tuple[int, int]:
-        """Width and height."""
-        return self.right - self.left, self.bottom - self.top
-
-    @property
-    def rows(self) -> slice:
-        """The picture's rows."""
-        return slice(self.top, self.bottom)
-
-    @property
-    def columns(self) -> slice:
-        """The picture's columns."""
-        return slice(self.left, self.right)
-
-    def within(self, whole: "Box") -> tuple[slice, slice]:
-        """Its rows and columns in an array that has those of a part that contains it."""
-        return (
-            slice(self.top - whole.top, self.bottom - whole.top),
-            slice(self.left - whole.left, self.right - whole.left),
-        )
+    def part(self) -> tuple[slice, slice]:
+        """Its rows and columns."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
 
     def times(self, factor: int) -> "Box":
         """The same part of a picture with so many times as many pixels along each edge."""
@@ -75,53 +84,38 @@ class CameraPose:
         position: FloatArray = np.array(self.target) + self.distance * self.axes()[2]
         return position
 
-    def points(self, pixels: IntArray, depth: FloatArray, size: tuple[int, int]) -> FloatArray:
-        """What is seen at pixels (2, m): (3, m) in m, world.
+    def pixel(self, height: int) -> float:
+        """Edge of a pixel per distance along the camera's axis, in a picture of a height."""
+        return 2.0 * tan(0.5 * self.field_of_view) / height
 
-        Rows and columns of a picture of this width and height; how far away it is along the
-        camera's axis (m,), in m.
-        """
-        width, height = size
-        metres = 2.0 * tan(0.5 * self.field_of_view) / height * depth  # a pixel is as large there
-        across = metres * (pixels[1] + 0.5 - 0.5 * width)
-        upwards = metres * (0.5 * height - 0.5 - pixels[0])
-        in_axes = np.array((across, upwards, -depth))
-        points: FloatArray = self.eye()[:, np.newaxis] + self.axes().T @ in_axes
-        return points
-
-    def pixels(self, points: FloatArray, size: tuple[int, int]) -> IntArray:
+    def pixels(self, points: FloatArray, size: Size) -> IntArray:
         """Row and column (2, m), maybe outside, at which points (3, m) are seen; m, world."""
         width, height = size
         across, upwards, back = self.axes() @ (points - self.eye()[:, np.newaxis])
-        scale = -0.5 * height / tan(0.5 * self.field_of_view) / back
+        scale = -1.0 / (self.pixel(height) * back)
         rows, columns = 0.5 * height - scale * upwards, 0.5 * width + scale * across
         return np.floor((rows, columns)).astype(np.intp)
 
-    def box(self, points: FloatArray, radii: FloatArray, size: tuple[int, int]) -> Box:
+    def box(self, seen: Spheres, size: Size) -> Box:
         """The part of a picture in which spheres are seen, with half a pixel around them.
 
-        It is all of it where one is at the camera.
-
-        Args:
-            points: Centres (m, 3) in m, world.
-            radii: Radii (m,) in m.
-            size: Width and height of the picture.
+        It is all of it where one is at the camera, and empty if there is none.
         """
         width, height = size
-        across, upwards, back = self.axes() @ (points - self.eye()).T
-        nearest, farthest = -back - radii, -back + radii
-        if not len(points):
+        if not len(seen.radii):
             return Box(0, 0, 0, 0)
+        in_axes = self.axes() @ (seen.centres - self.eye()).T
+        nearest, farthest = -in_axes[2] - seen.radii, -in_axes[2] + seen.radii
         if nearest.min() <= 0.0:
             return Box(0, height, 0, width)
-        scale = 0.5 * height / tan(0.5 * self.field_of_view)
-        left, right = _reach(across, radii, nearest, farthest)
-        low, high = _reach(upwards, radii, nearest, farthest)
+        sides = np.array([in_axes[:2] - seen.radii, in_axes[:2] + seen.radii]) / self.pixel(height)
+        reach = np.concatenate((sides / nearest, sides / farthest))  # (4, 2, m), in pixels
+        (left, low), (right, high) = reach.min(axis=(0, 2)) - 0.5, reach.max(axis=(0, 2)) + 0.5
         return Box(
-            min(max(floor(0.5 * height - scale * high - 0.5), 0), height),
-            min(max(ceil(0.5 * height - scale * low + 0.5), 0), height),
-            min(max(floor(0.5 * width + scale * left - 0.5), 0), width),
-            min(max(ceil(0.5 * width + scale * right + 0.5), 0), width),
+            min(max(floor(0.5 * height - high), 0), height),
+            min(max(ceil(0.5 * height - low), 0), height),
+            min(max(floor(0.5 * width + left), 0), width),
+            min(max(ceil(0.5 * width + right), 0), width),
         )
 
     def moved(self, x: float, y: float) -> "CameraPose":
@@ -130,60 +124,42 @@ class CameraPose:
         return replace(self, target=(here_x + x, here_y + y, here_z))
 
 
-def framing(points: FloatArray, radii: FloatArray, aspect: float, like: CameraPose) -> CameraPose:
+def framing(seen: Spheres, aspect: float, like: CameraPose) -> CameraPose:
     """The nearest view in which spheres lie in the middle of the picture, whole, with a margin.
 
     A sphere at (x, y, z) of the camera's axes, seen from the distance d, is clear of the picture's
     edge at half an angle a of view if `(d - z) sin a - |x| cos a >= r`.
 
     Args:
-        points: Centres (m, 3) in m, world.
-        radii: Radii (m,) in m.
+        seen: The spheres, in the world.
         aspect: Width of the picture over its height.
         like: Has the directions and the angle.
     """
     axes = like.axes()
-    in_axes = points @ axes.T
-    lowest, highest = _box(in_axes, radii)
+    lowest, highest = seen.bounds(axes)
     margin = _MARGIN * float((highest - lowest).max())
     middle = 0.5 * (lowest + highest)
     half_height = 0.5 * like.field_of_view
     half_width = atan(aspect * tan(half_height))
-    across, along = np.abs(in_axes - middle)[:, :2], (in_axes - middle)[:, 2]
+    from_middle = seen.centres @ axes.T - middle
+    across, along = np.abs(from_middle)[:, :2], from_middle[:, 2]
     needed = [
-        along + (across[:, side] * cos(half) + radii + margin) / sin(half)
+        along + (across[:, side] * cos(half) + seen.radii + margin) / sin(half)
         for side, half in enumerate((half_width, half_height))
     ]
     x, y, z = (middle @ axes).tolist()
     return replace(like, target=(x, y, z), distance=float(np.max(needed)))
 
 
-def extents(points: FloatArray, radii: FloatArray, like: CameraPose) -> FloatArray:
+def extents(seen: Spheres, like: CameraPose) -> FloatArray:
     """How much (3,) of a view's axes spheres take up, m: across, upwards, towards the camera."""
-    lowest, highest = _box(points @ like.axes().T, radii)
+    lowest, highest = seen.bounds(like.axes())
     extent: FloatArray = highest - lowest
     return extent
 
 
-def natural_aspect(points: FloatArray, radii: FloatArray, like: CameraPose) -> float:
+def natural_aspect(seen: Spheres, like: CameraPose) -> float:
     """Width over height of what spheres fill of a picture, with its margin, seen from far away."""
-    extent = extents(points, radii, like)
+    extent = extents(seen, like)
     width, height = (extent[:2] + 2.0 * _MARGIN * extent.max()).tolist()
     return float(width / height)
-
-
-def _reach(
-    middle: FloatArray, radii: FloatArray, nearest: FloatArray, farthest: FloatArray
-) -> tuple[float, float]:
-    """Between which slopes spheres lie that reach from one depth to another."""
-    low, high = middle - radii, middle + radii
-    return (
-        float(np.minimum(low / nearest, low / farthest).min()),
-        float(np.maximum(high / nearest, high / farthest).max()),
-    )
-
-
-def _box(points: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The lowest and the highest coordinates (3,) of spheres."""
-    reach = radii[:, np.newaxis]
-    return (points - reach).min(axis=0), (points + reach).max(axis=0)

@@ -1,16 +1,19 @@
-"""A picture that is being made: the ground, the shadow on it, and over it what stages show."""
+"""A picture in layers: ground and sky, the shadow on the ground, and what a scene shows, in turn.
+
+Scenes are drawn with several samples along each edge of a pixel, of which the picture has the
+mean; what the samples leave free shows what is below.
+"""
 
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuated_characters.render.engine import ground, layers
-from actuated_characters.render.engine.camera_pose import Box, CameraPose, framing
+from actuated_characters.render.engine import ground
+from actuated_characters.render.engine.camera_pose import Box, CameraPose, Size, Spheres, framing
 from actuated_characters.render.engine.ground import Samples
-from actuated_characters.render.engine.layers import Drawing
-from actuated_characters.render.engine.render_scene import LIGHT_VIEW, RenderScene, Size
-from msgs_config.arrays import FloatArray
+from actuated_characters.render.engine.render_scene import LIGHT_VIEW, RenderScene
+from msgs_config.arrays import BoolArray
 
 Picture: TypeAlias = NDArray[np.uint8]
 """Red, green and blue (h, w, 3), rows from top to bottom, columns from left to right."""
@@ -34,63 +37,95 @@ class Compositor:
         width, height = size
         self._view, self._size, self._samples = view, size, samples
         self._fine_size = (width * samples, height * samples)
-        self._has_ground = has_ground
-        self._solid: tuple[Drawing, Box] | None = None
+        self._colors: Samples = np.broadcast_to(ground.BACKGROUND, (height, width, 3)).copy()
+        # of what is solid, of each sample: distance from the camera along its axis, m
+        self._depth = np.full((height * samples, width * samples), np.inf, dtype=np.float32)
         if has_ground:
             self._colors = ground.colors(view, size)
-        else:
-            self._colors = np.broadcast_to(ground.BACKGROUND, (height, width, 3)).copy()
+            rows = np.arange(0.5, height * samples)
+            self._depth[:] = ground.depths(view, height * samples, rows)[:, np.newaxis]
 
     def picture(self) -> Picture:
         """What has been drawn so far."""
         finished: Picture = np.rint(self._colors).astype(np.uint8)
         return finished
 
-    def darken(self, stage: RenderScene, points: FloatArray, radii: FloatArray) -> None:
-        """Darken the ground where the links keep the light off: what is seen from the light.
+    def darken_ground(self, scene: RenderScene, casting: Spheres) -> None:
+        """Darken the ground where what lies in spheres keeps the light off.
 
-        The engine's own shadows darken the ground as a whole. Spheres (m, 3) and (m,) in m are
-        around the links.
+        That is what is seen from the light. The engine's own shadows darken the ground as a whole.
         """
-        light = framing(points, radii, 1.0, LIGHT_VIEW)
-        whole = Box(0, _SHADOW_SIZE[1], 0, _SHADOW_SIZE[0])
-        dark = stage.draw(light, _SHADOW_SIZE, whole).is_link
-        box = layers.shadow_box(light, self._view, self._size)
+        light = framing(casting, 1.0, LIGHT_VIEW)
+        width, height = _SHADOW_SIZE
+        dark = scene.draw(light, _SHADOW_SIZE, Box(0, height, 0, width)).casts_shadow
+        edges = np.array((0.0, 1.0))
+        x, y = ground.places(light, (1, 1), edges, edges)  # the corners of that picture
+        corners = np.column_stack((x.ravel(), y.ravel(), np.zeros(4)))
+        box = self._view.box(Spheres(corners, np.zeros(4)), self._size)
+        if box:
+            share = self._mean(self._shadow(dark, light, box.times(self._samples)))
+            self._colors[box.part] *= 1.0 - (1.0 - _SHADOW) * share[:, :, np.newaxis]
+
+    def draw_solid(self, scene: RenderScene, box: Box) -> None:
+        """Draw what a scene has in a part of the picture, wherever nothing solid hides it."""
         if not box:
             return
         fine = box.times(self._samples)
-        shadow = layers.shadow(dark, light, self._view, self._fine_size, fine)
-        share = layers.shrunk(shadow, self._samples)[:, :, np.newaxis]
-        self._colors[box.rows, box.columns] *= 1.0 - (1.0 - _SHADOW) * share
+        drawing = scene.draw(self._view, self._fine_size, fine)
+        solid = self._depth[fine.part]
+        seen = drawing.depth < solid
+        paint = np.where(seen[:, :, np.newaxis], drawing.color, np.float32(0.0))
+        share = ground.haze(drawing.depth / np.float32(self._view.distance))
+        if share.max(initial=0.0, where=seen) > 0.0:
+            paint += (seen * share)[:, :, np.newaxis] * (ground.BACKGROUND - paint)
+        np.minimum(solid, drawing.depth, out=solid)
+        self._lay(box, paint, (~seen).astype(np.float32))
 
-    def draw_solid(self, stage: RenderScene, box: Box) -> None:
-        """Draw what a stage has in a part of the picture, wherever the ground does not hide it."""
-        if not box:
-            return
-        fine = box.times(self._samples)
-        drawing = stage.draw(self._view, self._fine_size, fine)
-        layer = layers.solid(drawing, self._ground_depth(fine), self._view)
-        layers.lay(self._colors, box, layer, self._samples)
-        self._solid = drawing, fine
-
-    def draw_over(self, stage: RenderScene, box: Box, opacity: float, hidden: float = 0.0) -> None:
-        """Blend in what a stage has in a part of the picture.
+    def draw_over(self, scene: RenderScene, box: Box, opacity: float, hidden: float = 0.0) -> None:
+        """Blend in what a scene has in a part of the picture.
 
         With one opacity where it is before all that is solid, and with another where it is not.
         """
         if not box:
             return
         fine = box.times(self._samples)
-        before = self._ground_depth(fine)[:, np.newaxis]
-        if self._solid is not None:
-            before = layers.nearest(*self._solid, before, fine)
-        drawing = stage.draw(self._view, self._fine_size, fine)
-        layer = layers.transparent(drawing, before, opacity, hidden)
-        layers.lay(self._colors, box, layer, self._samples)
+        drawing = scene.draw(self._view, self._fine_size, fine)
+        seen = drawing.depth < self._depth[fine.part]
+        share = np.where(seen, opacity, hidden * np.isfinite(drawing.depth)).astype(np.float32)
+        self._lay(box, share[:, :, np.newaxis] * drawing.color, 1.0 - share)
 
-    def _ground_depth(self, fine: Box) -> Samples:
-        """Of the rows of a part, in samples, m."""
+    def _lay(self, box: Box, paint: Samples, clear: Samples) -> None:
+        """Lay samples over a part of the picture.
+
+        Colours (h, w, 3) times the share that they cover, and the share (h, w) of what is below.
+        """
+        below = self._mean(clear)[:, :, np.newaxis] * self._colors[box.part]
+        self._colors[box.part] = self._mean(paint) + below
+
+    def _mean(self, fine: Samples) -> Samples:
+        """The mean (h, w, ...) of the samples of each pixel."""
+        edge = self._samples
+        if edge == 1:
+            return fine
+        total = fine[::edge, ::edge].copy()
+        for number in range(1, edge**2):
+            row, column = divmod(number, edge)
+            total += fine[row::edge, column::edge]
+        mean: Samples = total * np.float32(1.0 / edge**2)
+        return mean
+
+    def _shadow(self, dark: BoolArray, light: CameraPose, fine: Box) -> Samples:
+        """1 where the samples (h, w) of a part of the picture see ground without light, else 0.
+
+        `dark` is where something that casts a shadow is seen from the light.
+        """
         rows = np.arange(fine.top + 0.5, fine.bottom)
-        if not self._has_ground:
-            return np.full(len(rows), np.inf, dtype=np.float32)
-        return ground.depths(self._view, self._fine_size[1], rows).astype(np.float32)
+        columns = np.arange(fine.left + 0.5, fine.right)
+        x, y = ground.places(self._view, self._fine_size, rows, columns)
+        there = np.isfinite(x) & np.isfinite(y)
+        points = np.stack([np.where(there, axis, 0.0).ravel() for axis in (x, y, np.zeros_like(x))])
+        height, width = dark.shape
+        row, column = light.pixels(points, (width, height)).reshape(2, *x.shape)
+        there &= (row >= 0) & (row < height) & (column >= 0) & (column < width)
+        shadow: Samples = (there & dark[row * there, column * there]).astype(np.float32)
+        return shadow

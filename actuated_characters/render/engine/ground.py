@@ -4,13 +4,12 @@ It always has one grid, that of the world, so that it shows how far a character 
 pictures see one row of pixels of it in one distance along the camera's axis.
 """
 
-from math import tan
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuated_characters.render.engine.camera_pose import CameraPose
+from actuated_characters.render.engine.camera_pose import CameraPose, Size
 from msgs_config.arrays import FloatArray
 
 Samples: TypeAlias = NDArray[np.float32]
@@ -32,7 +31,8 @@ def depths(view: CameraPose, height: int, rows: FloatArray) -> FloatArray:
         height: Of the picture, in pixels.
         rows: Places in the picture (m,), in pixels from its upper edge.
     """
-    falls = -_slopes(view, height, rows)
+    _, up, back = view.axes()
+    falls = float(back[2]) - view.pixel(height) * (0.5 * height - rows) * float(up[2])
     eye = float(view.eye()[2])
     with np.errstate(divide="ignore"):
         depth: FloatArray = np.where((falls > 0.0) & (eye > 0.0), eye / falls, np.inf)
@@ -40,14 +40,14 @@ def depths(view: CameraPose, height: int, rows: FloatArray) -> FloatArray:
 
 
 def places(
-    view: CameraPose, size: tuple[int, int], rows: FloatArray, columns: FloatArray
+    view: CameraPose, size: Size, rows: FloatArray, columns: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """x and y (m, k) in m of the ground at rows (m,) and columns (k,), pixels from the corner.
 
     Where there is no ground, they are not finite.
     """
     width, height = size
-    scale = _scale(view, height)
+    scale = view.pixel(height)
     depth = depths(view, height, rows)[:, np.newaxis]
     across = scale * (columns - 0.5 * width)
     upwards = scale * (0.5 * height - rows)[:, np.newaxis]
@@ -61,7 +61,7 @@ def places(
     return x, y
 
 
-def colors(view: CameraPose, size: tuple[int, int]) -> Samples:
+def colors(view: CameraPose, size: Size) -> Samples:
     """What is seen of ground and sky (h, w, 3), 0 to 255, each pixel the mean of what it covers."""
     width, height = size
     rows, columns = np.arange(0.5, height), np.arange(0.5, width)
@@ -93,9 +93,7 @@ def tile_length(view: CameraPose) -> float:
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length))
 
 
-def _share_of_light(
-    view: CameraPose, size: tuple[int, int], rows: FloatArray, columns: FloatArray
-) -> Samples:
+def _share_of_light(view: CameraPose, size: Size, rows: FloatArray, columns: FloatArray) -> Samples:
     """The share (m, k) of light tiles in what pixels with these centres cover.
 
     A pixel's footprint is taken as a rectangle along the grid: then the mean of the product of two
@@ -110,34 +108,17 @@ def _share_of_light(
     for axis in (0, 1):
         middle = (middles[axis] / tile).astype(np.float32)
         along = 2.0 * np.abs((ends[axis] / tile).astype(np.float32) - middle)
-        across = _scale(view, size[1]) / tile * abs(float(right[axis])) * depth
-        width = along + across[:, np.newaxis].astype(np.float32)
-        product *= _mean_of_square_wave(middle, np.maximum(width, _LEAST_FOOTPRINT))
+        across = view.pixel(size[1]) / tile * abs(float(right[axis])) * depth
+        width = np.maximum(along + across[:, np.newaxis].astype(np.float32), _LEAST_FOOTPRINT)
+        product *= (_triangle_wave(middle + 0.5 * width) - _triangle_wave(middle - 0.5 * width)) / (
+            width
+        )
     share: Samples = 0.5 + 0.5 * product
     return share
 
 
-def _mean_of_square_wave(place: Samples, width: Samples) -> Samples:
-    """Mean over an interval around a place of what is 1 from 0 to 1, -1 from 1 to 2, and so on."""
-    half = 0.5 * width
-    mean: Samples = (_triangle_wave(place + half) - _triangle_wave(place - half)) / width
-    return mean
-
-
 def _triangle_wave(place: Samples) -> Samples:
-    """The square wave's integral from 0 on."""
+    """The integral from 0 of the square wave that is 1 from 0 to 1, -1 from 1 to 2, and so on."""
     whole: Samples = np.floor(0.5 * place)
     distance: Samples = np.abs(place - 2.0 * whole - 1.0)
     return 1.0 - distance
-
-
-def _scale(view: CameraPose, height: int) -> float:
-    """How far a pixel goes sideways for each metre along the camera's axis."""
-    return 2.0 * tan(0.5 * view.field_of_view) / height
-
-
-def _slopes(view: CameraPose, height: int, rows: FloatArray) -> FloatArray:
-    """How far the ray of a row rises for each metre along the camera's axis."""
-    _, up, back = view.axes()
-    upwards: FloatArray = _scale(view, height) * (0.5 * height - rows)
-    return upwards * float(up[2]) - float(back[2])

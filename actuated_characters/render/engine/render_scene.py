@@ -1,150 +1,122 @@
-"""What is seen of a world, in an engine of its own that has no physics, and its pictures.
+"""The shapes that are seen, in an engine that has no physics, and its drawings of them.
 
-The engine's software renderer draws it: no window, no GPU, the same picture each time.
+The engine's software renderer draws them: no window, no GPU, the same picture each time.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from math import tan
-from typing import TypeAlias
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from actuated_characters.render.engine.camera_pose import Box, CameraPose
+from actuated_characters.render.engine.camera_pose import Box, CameraPose, Size
 from actuated_characters.render.engine.ground import Samples
-from actuated_characters.render.engine.layers import Drawing
-from actuated_characters.render.engine.surfaces import (
-    HEAD_WIDTH,
-    Surface,
-    arrow_surface,
-    round_surface,
-)
+from actuated_characters.render.engine.posed_characters import Frames
+from actuated_characters.render.engine.surfaces import Surface, arrow_surface, round_surface
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 
-Size: TypeAlias = tuple[int, int]
-"""Width and height of a picture in pixels."""
-
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # from the light
 
 _NEAR, _FAR = 0.02, 50.0  # of the view's distance: what is nearer or farther is not drawn
 _LIGHT = {"lightAmbientCoeff": 0.6, "lightDiffuseCoeff": 0.45, "lightSpecularCoeff": 0.0}
 _TERRAIN_COLOR = (0.78, 0.76, 0.70, 1.0)
-_ARROW_RADIUS = 0.005  # of the view's distance
-_MARK_COLOR = (0.55, 0.15, 0.75, 1.0)
 _ARROW_COLOR = (0.86, 0.08, 0.24, 1.0)
 _BALL_COLOR = (0.25, 0.25, 0.28, 1.0)
-_NOWHERE = np.array((0.0, 0.0, -1e6))  # m, where no view looks
+_NOWHERE = (0.0, 0.0, -1e6)  # m, where no view looks
 
 
-@dataclass(frozen=True)
-class Arrow:
-    """An arrow in the world, as thick as suits a view."""
+class Drawing(NamedTuple):
+    """A part of a picture as the engine draws it, one sample a pixel."""
 
-    tail: FloatArray  # (3,), m
-    tip: FloatArray  # (3,), m
-
-    def outline(self, view: CameraPose) -> tuple[FloatArray, FloatArray]:
-        """Spheres around it: centres (2, 3), radii (2,), in m."""
-        return np.array((self.tail, self.tip)), np.full(2, HEAD_WIDTH * self.radius(view))
-
-    def radius(self, view: CameraPose) -> float:
-        """Of its shaft, m."""
-        return _ARROW_RADIUS * view.distance
+    color: Samples  # (h, w, 3): red, green, blue, 0 to 255
+    depth: Samples  # (h, w): distance from the camera along its axis, m; infinite: nothing
+    casts_shadow: BoolArray  # (h, w): whether it is a link or a ball
 
 
 class RenderScene:
-    """What is seen: the links of characters, a terrain, balls, arrows."""
+    """The links of characters and a terrain, balls and arrows, each of them shown or not."""
 
-    def __init__(self) -> None:
-        """Start the engine."""
+    def __init__(
+        self, links: Sequence[tuple[Shape, ...]], terrain: UrdfOptions | None = None
+    ) -> None:
+        """Start the engine, with the shapes of each link.
+
+        Raises:
+            CharacterError: the engine refuses a shape or the terrain's URDF.
+        """
         self._client = connect()
-        self._parts: list[tuple[int, int]] = []  # row of the link, body
-        self._colors: list[Quadruple] = []  # of each part
-        self._marked: set[int] = set()  # bodies
-        self._arrows: list[int] = []  # bodies
+        self._links: list[tuple[int, int, Quadruple]] = []  # row of the link, body, colour
         self._balls: list[tuple[float, int]] = []  # radius, body
-        self.has_terrain = False
+        self._arrows: list[int] = []  # bodies
+        self._terrain: tuple[int, Sequence[float], Sequence[float]] | None = None  # and its pose
+        try:
+            if terrain is not None:
+                self._add_terrain(terrain)
+            with captured_output():
+                for row, shapes in enumerate(links):
+                    self._links += [
+                        (row, self._add_shape(shape), shape.color_rgba) for shape in shapes
+                    ]
+        except BaseException:
+            self.close()
+            raise
 
     def close(self) -> None:
         """End the engine."""
         pybullet.disconnect(self._client)
 
-    def add_links(self, shapes: Sequence[tuple[Shape, ...]]) -> None:
-        """Add the shapes of each link.
+    def clear(self) -> None:
+        """Show nothing."""
+        hidden = [body for _, body, _ in self._links] + [body for _, body in self._balls]
+        hidden += [] if self._terrain is None else [self._terrain[0]]
+        for body in hidden:
+            self._put(body, _NOWHERE)
+        self._remove(self._arrows)
+        self._arrows = []
 
-        Raises:
-            CharacterError: the engine refuses one.
-        """
-        with captured_output():
-            for row, own in enumerate(shapes):
-                self._parts += [(row, self._add_shape(shape)) for shape in own]
-                self._colors += [_opaque(shape.color_rgba) for shape in own]
-
-    def add_terrain(self, terrain: UrdfOptions) -> None:
-        """Add what stays there. Raises CharacterError if the engine refuses its URDF."""
-        body = load_urdf(self._client, terrain)
-        for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):
-            pybullet.changeVisualShape(
-                body, link, rgbaColor=_TERRAIN_COLOR, physicsClientId=self._client
-            )
-        self.has_terrain = True
-
-    def place(self, origins: FloatArray, turns_xyzw: FloatArray) -> None:
-        """Put the links where their frames are: (links, 3) in m and (links, 4); NaN hides one."""
-        for row, body in self._parts:
-            if np.isnan(origins[row]).any():
-                self._put(body, _NOWHERE, np.array(rotations.IDENTITY_XYZW))
+    def show_links(self, frames: Frames, colors: Sequence[Quadruple | None]) -> None:
+        """Put the links where their frames are, NaN hides one; None is a link's own colour."""
+        for row, body, own_color in self._links:
+            origin, turn_xyzw = frames[0][row], frames[1][row]
+            if np.isnan(origin).any():
+                self._put(body, _NOWHERE)
             else:
-                self._put(body, origins[row], turns_xyzw[row])
+                self._put(body, origin, turn_xyzw)
+            red, green, blue, _ = colors[row] or own_color
+            self._paint(body, -1, (red, green, blue, 1.0))  # it draws nothing transparent
 
-    def mark(self, rows: BoolArray) -> None:
-        """Draw these links (links,) in the colour of a mark, the others in their own."""
-        for (row, body), color in zip(self._parts, self._colors, strict=True):
-            if bool(rows[row]) != (body in self._marked):
-                pybullet.changeVisualShape(
-                    body,
-                    -1,
-                    rgbaColor=_MARK_COLOR if rows[row] else color,
-                    physicsClientId=self._client,
-                )
-                self._marked ^= {body}
+    def show_terrain(self) -> None:
+        """Show the terrain, if there is one."""
+        if self._terrain is not None:
+            self._put(*self._terrain)
 
     def show_balls(self, balls: FloatArray) -> None:
-        """Have these balls, of which centres and radii (m, 4) are given in m, and no others."""
+        """Show these balls, of which centres and radii (m, 4) are given in m, and no others."""
         radii = balls[:, 3].tolist()
         if [radius for radius, _ in self._balls] != radii:
-            for _, body in self._balls:
-                pybullet.removeBody(body, physicsClientId=self._client)
-            self._balls = [(radius, self._add_ball(radius)) for radius in radii]
+            self._remove(body for _, body in self._balls)
+            spheres = [Shape(ShapeType.SPHERE, (r,), color_rgba=_BALL_COLOR) for r in radii]
+            self._balls = list(zip(radii, map(self._add_shape, spheres), strict=True))
         for (_, body), ball in zip(self._balls, balls, strict=True):
-            self._put(body, ball[:3], np.array(rotations.IDENTITY_XYZW))
+            self._put(body, ball[:3])
 
-    def _add_ball(self, radius: float) -> int:
-        return self._add_shape(Shape(ShapeType.SPHERE, (radius,), color_rgba=_BALL_COLOR))
-
-    def show_arrows(self, arrows: Sequence[Arrow], view: CameraPose) -> None:
-        """Have these arrows, none of length zero, and no others."""
-        for body in self._arrows:
-            pybullet.removeBody(body, physicsClientId=self._client)
-        self._arrows = []
-        for arrow in arrows:
-            along = arrow.tip - arrow.tail
-            length = float(np.linalg.norm(along))
-            surface = arrow_surface(length, arrow.radius(view))
-            body = self._add_body(pybullet.GEOM_MESH, _ARROW_COLOR, **_triangles(surface))
-            self._put(body, arrow.tail, _turn_from_z(along / length))
+    def show_arrows(self, arrows: Iterable[FloatArray], radius: float) -> None:
+        """Show these arrows, too, none of length zero: tail and tip (2, 3); shafts' radius; m."""
+        for tail, tip in arrows:
+            length = float(np.linalg.norm(tip - tail))
+            body = self._add_body(_ARROW_COLOR, **_triangles(arrow_surface(length, radius)))
+            self._put(body, tail, _turn_from_z((tip - tail) / length))
             self._arrows.append(body)
 
     def draw(self, view: CameraPose, size: Size, box: Box) -> Drawing:
         """What is seen in a part of a view's picture of a size; the part is not empty."""
         near, far = _NEAR * view.distance, _FAR * view.distance
         width, height = size
-        step = 2.0 * tan(0.5 * view.field_of_view) / height * near  # a pixel on the near plane
-        columns, rows = box.size
+        step = view.pixel(height) * near  # a pixel on the near plane
+        columns, rows = box.right - box.left, box.bottom - box.top
         _, _, rgba, depths, bodies = pybullet.getCameraImage(
             columns,
             rows,
@@ -169,13 +141,15 @@ class RenderScene:
         stored: Samples = np.reshape(depths, (rows, columns))
         depth: Samples = far * near / (far - (far - near) * stored)  # as graphics cards store it
         depth[seen < 0] = np.inf
-        casting = [body for _, body in (*self._parts, *self._balls)]
+        casting = [body for _, body, _ in self._links] + [body for _, body in self._balls]
         return Drawing(color, depth, np.isin(seen, casting))
 
-    def _put(self, body: int, origin: FloatArray, turn_xyzw: FloatArray) -> None:
-        pybullet.resetBasePositionAndOrientation(
-            body, origin, turn_xyzw, physicsClientId=self._client
-        )
+    def _add_terrain(self, terrain: UrdfOptions) -> None:
+        body = load_urdf(self._client, terrain)
+        for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):
+            self._paint(body, link, _TERRAIN_COLOR)
+        pose = pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
+        self._terrain = (body, *pose)
 
     def _add_shape(self, shape: Shape) -> int:
         """A shape as a body at the origin."""
@@ -186,24 +160,36 @@ class RenderScene:
             measures = {"fileName": shape.mesh, "meshScale": shape.size}
         else:
             measures = _triangles(round_surface(shape))
-        is_box = shape.type is ShapeType.BOX
-        geometry = pybullet.GEOM_BOX if is_box else pybullet.GEOM_MESH
+        measures["visualFramePosition"] = shape.pose.position
+        measures["visualFrameOrientation"] = shape.pose.orientation_xyzw
         try:
-            return self._add_body(
-                geometry,
-                _opaque(shape.color_rgba),
-                visualFramePosition=shape.pose.position,
-                visualFrameOrientation=shape.pose.orientation_xyzw,
-                **measures,
-            )
+            return self._add_body(shape.color_rgba, **measures)
         except pybullet.error as error:
             raise CharacterError(f"cannot draw {shape.mesh or f'a {shape.type.value}'}") from error
 
-    def _add_body(self, geometry: int, color: Quadruple, **measures: object) -> int:
+    def _add_body(self, color: Quadruple, **measures: object) -> int:
+        kind = pybullet.GEOM_BOX if "halfExtents" in measures else pybullet.GEOM_MESH
         seen = pybullet.createVisualShape(
-            geometry, rgbaColor=color, **measures, physicsClientId=self._client
+            kind, rgbaColor=color, **measures, physicsClientId=self._client
         )
         return int(pybullet.createMultiBody(0.0, -1, seen, physicsClientId=self._client))
+
+    def _put(
+        self,
+        body: int,
+        origin: FloatArray | Sequence[float],
+        turn_xyzw: FloatArray | Sequence[float] = rotations.IDENTITY_XYZW,
+    ) -> None:
+        pybullet.resetBasePositionAndOrientation(
+            body, origin, turn_xyzw, physicsClientId=self._client
+        )
+
+    def _paint(self, body: int, link: int, color: Quadruple) -> None:
+        pybullet.changeVisualShape(body, link, rgbaColor=color, physicsClientId=self._client)
+
+    def _remove(self, bodies: Iterable[int]) -> None:
+        for body in bodies:
+            pybullet.removeBody(body, physicsClientId=self._client)
 
 
 def _triangles(surface: Surface) -> dict[str, object]:
@@ -214,12 +200,6 @@ def _triangles(surface: Surface) -> dict[str, object]:
         "indices": surface.triangles.ravel().tolist(),
         "uvs": [(0.0, 0.0)] * len(surface.vertices),
     }
-
-
-def _opaque(color: Quadruple) -> Quadruple:
-    """The renderer knows no transparency."""
-    red, green, blue, _ = color
-    return red, green, blue, 1.0
 
 
 def _turn_from_z(direction: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from actuated_characters.render.engine.camera_pose import Spheres
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.mesh_check import check_mesh
@@ -79,11 +80,11 @@ def _shaded(color: tuple[float, float, float], depth: int) -> Quadruple:
     return (red, green, blue, 1.0)
 
 
-def outline(shape: Shape) -> tuple[FloatArray, FloatArray]:
-    """Spheres whose hull holds a shape: centres (m, 3) and radii (m,), in m, link frame."""
+def outline(shape: Shape) -> Spheres:
+    """Spheres whose hull holds a shape, in the link frame."""
     points, radius = _own_outline(shape)
     turned = rotations.rotate(np.array(shape.pose.orientation_xyzw), points)
-    return turned + np.array(shape.pose.position), np.full(len(points), radius)
+    return Spheres(turned + np.array(shape.pose.position), np.full(len(points), radius))
 
 
 def _own_outline(shape: Shape) -> tuple[FloatArray, float]:
@@ -94,10 +95,10 @@ def _own_outline(shape: Shape) -> tuple[FloatArray, float]:
         radius, length = shape.size
         return np.array([(0.0, 0.0, -0.5 * length), (0.0, 0.0, 0.5 * length)]), radius
     if shape.type is ShapeType.BOX:
-        corners = 0.5 * np.array(shape.size) * np.array(list(product((-1.0, 1.0), repeat=3)))
-        return corners, 0.0
-    vertices = _vertices(Path(shape.mesh)) * np.array(shape.size)
-    bounds = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+        bounds = np.outer((-0.5, 0.5), shape.size)
+    else:
+        vertices = _vertices(Path(shape.mesh)) * np.array(shape.size)
+        bounds = np.array([vertices.min(axis=0), vertices.max(axis=0)])
     return np.array(list(product(*bounds.T))), 0.0
 
 
@@ -113,7 +114,7 @@ def _vertices(mesh: Path) -> FloatArray:
 
 
 def _solid(shapes: tuple[Shape, ...]) -> list[Shape]:
-    """Without those of no size, which the engine refuses and nobody sees."""
+    """Without those of no size, which the engine refuses and no picture shows."""
     return [shape for shape in shapes if shape.type is ShapeType.MESH or min(shape.size) > 0.0]
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from actuated_characters.render.camera_path import followed_path, smoothed
+from actuated_characters.render.camera_path import smoothed
 
 
 @given(
@@ -44,13 +44,3 @@ def test_a_step_becomes_a_ramp_within_its_reach() -> None:
     np.testing.assert_allclose(smooth[:140], 0.0, atol=1e-12)
     np.testing.assert_allclose(smooth[260:], 1.0, atol=1e-12)
     assert smooth[199] + smooth[200] == pytest.approx(1.0)
-
-
-def test_an_episode_knows_nothing_of_the_one_before_it() -> None:
-    rng = np.random.default_rng(1)
-    first, second = rng.normal(size=(100, 2)), rng.normal(size=(50, 2)) + 40.0
-
-    both = followed_path(np.concatenate((first, second)), [0, 100], 30)
-
-    np.testing.assert_array_equal(both[:100], smoothed(first, 30))
-    np.testing.assert_array_equal(both[100:], smoothed(second, 30))

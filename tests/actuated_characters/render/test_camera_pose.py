@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from actuated_characters.render.engine.camera_pose import CameraPose, framing, natural_aspect
+from actuated_characters.render.engine.camera_pose import (
+    CameraPose,
+    Spheres,
+    framing,
+    natural_aspect,
+)
+from tests.support.pictures import points_at
 
 coordinates = st.floats(-5.0, 5.0)
 views = st.builds(
@@ -52,7 +58,7 @@ def test_what_is_seen_at_a_pixel_is_seen_at_that_pixel(
     pixels = np.mgrid[:height, :width].reshape(2, -1)
     depth = np.random.default_rng(1).uniform(0.5, 9.0, width * height)
 
-    points = view.points(pixels, depth, (width, height))
+    points = points_at(view, pixels, depth, (width, height))
 
     np.testing.assert_array_equal(view.pixels(points, (width, height)), pixels)
     along = view.axes()[2] @ (view.eye()[:, np.newaxis] - points)
@@ -70,7 +76,7 @@ def test_framing_shows_every_sphere_whole_and_comes_as_near_as_that_allows(
 ) -> None:
     points, radii = np.array(centres), np.full(len(centres), radius)
 
-    view = framing(points, radii, aspect, like)
+    view = framing(Spheres(points, radii), aspect, like)
 
     assert (view.yaw, view.pitch, view.field_of_view) == (like.yaw, like.pitch, like.field_of_view)
     clearance = _clearance(view, points, radii, aspect)
@@ -93,7 +99,7 @@ def test_the_natural_aspect_is_that_of_the_extents() -> None:
     corners = np.array([(0.0, 0.0, 0.0), (1.0, 5.0, 2.0)])
 
     # 5 m is the largest extent, of which a twentieth is left free on either side
-    assert natural_aspect(corners, np.zeros(2), upright) == pytest.approx(1.5 / 2.5)
+    assert natural_aspect(Spheres(corners, np.zeros(2)), upright) == pytest.approx(1.5 / 2.5)
 
 
 @given(
@@ -109,7 +115,7 @@ def test_a_box_has_all_that_is_seen_of_spheres(
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     surface = np.concatenate([np.array(centre) + radius * directions for centre in centres])
 
-    box = view.box(np.array(centres), np.full(len(centres), radius), size)
+    box = view.box(Spheres(np.array(centres), np.full(len(centres), radius)), size)
 
     before = (surface - view.eye()) @ view.axes()[2] < -1e-3
     rows, columns = view.pixels(surface[before].T, size)
@@ -123,14 +129,16 @@ def test_a_box_is_no_larger_than_what_it_is_of() -> None:
         (0.0, 0.0, 0.0), distance=10.0, yaw=0.0, pitch=0.0, field_of_view=2.0 * atan(0.1)
     )
 
-    box = view.box(np.array([(0.5, 0.0, 0.25)]), np.zeros(1), (200, 100))  # 50 pixels a metre
+    box = view.box(
+        Spheres(np.array([(0.5, 0.0, 0.25)]), np.zeros(1)), (200, 100)
+    )  # 50 pixels a metre
 
     assert box == (37, 38, 124, 126)  # with half a pixel around it
-    assert not view.box(np.array([(9.0, 0.0, 0.0)]), np.ones(1), (200, 100))
-    assert not view.box(np.empty((0, 3)), np.empty(0), (200, 100))
+    assert not view.box(Spheres(np.array([(9.0, 0.0, 0.0)]), np.ones(1)), (200, 100))
+    assert not view.box(Spheres(np.empty((0, 3)), np.empty(0)), (200, 100))
 
 
 def test_where_a_sphere_is_at_the_camera_the_box_is_the_whole_picture() -> None:
     view = CameraPose(distance=2.0)
 
-    assert view.box(view.eye()[np.newaxis], np.ones(1), (200, 100)) == (0, 100, 0, 200)
+    assert view.box(Spheres(view.eye()[np.newaxis], np.ones(1)), (200, 100)) == (0, 100, 0, 200)

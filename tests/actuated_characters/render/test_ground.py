@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from actuated_characters.render.engine import ground
 from actuated_characters.render.engine.camera_pose import CameraPose
+from tests.support.pictures import points_at
 
 SIZE = (24, 16)
 views = st.builds(
@@ -31,12 +32,12 @@ def test_the_ground_is_where_rays_meet_it(view: CameraPose) -> None:
 
     below = np.isfinite(depth) & (depth < 1e3)
     pixels = np.array(np.meshgrid(rows[below], columns, indexing="ij")).reshape(2, -1)
-    points = view.points(pixels, np.repeat(depth[below], width), SIZE)
+    points = points_at(view, pixels, np.repeat(depth[below], width), SIZE)
     np.testing.assert_allclose(points[2], 0.0, atol=1e-8)
     np.testing.assert_allclose(points[0], x[below].ravel(), atol=1e-8)
     np.testing.assert_allclose(points[1], y[below].ravel(), atol=1e-8)
     # what is not below the horizon has no ground
-    upwards = view.points(np.array([rows, 0 * rows]), np.ones(height), SIZE)[2] >= view.eye()[2]
+    upwards = points_at(view, np.array([rows, 0 * rows]), np.ones(height), SIZE)[2] >= view.eye()[2]
     np.testing.assert_array_equal(np.isinf(depth), upwards)
 
 

@@ -11,18 +11,20 @@ import pytest
 
 from actuated_characters.bags.recording import RecordedWorld, Recording
 from actuated_characters.bags.tracks import ControllerSettings
-from actuated_characters.render.engine.renderer import Picture
+from actuated_characters.render.captions import write_on
+from actuated_characters.render.drawing import SceneSettings, draw
+from actuated_characters.render.engine.renderer import FrameSpec, Picture
 from actuated_characters.render.movie import (
     GhostPlace,
     Movie,
     MovieSettings,
-    camera_paths,
+    camera_path,
     caption,
     picture_rows,
 )
 from actuated_characters.render.scene import make_scene, nearest_rows
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.model import Character, Placement
+from msgs_config.character.model import Character, Placement, UrdfOptions
 from msgs_config.errors import CharacterError, ConfigurationError, RecordingError, RunError
 from msgs_config.messages.wrenches import WrenchArrays
 from tests.support.physics import DATA, character
@@ -155,7 +157,7 @@ def test_a_reset_is_a_cut() -> None:
     effort[30] = np.nan
     jumped = replace(recording, position=position, effort=effort, reference_position=position)
 
-    path = camera_paths(make_scene([jumped]))
+    path = camera_path(make_scene([jumped]))
     before, after = drawn(jumped, replace(HERE, ghost=GhostPlace.NONE, fps=4))
 
     np.testing.assert_allclose(path[:, 0], position[:, 0], atol=1e-9)
@@ -167,7 +169,7 @@ def test_the_camera_of_an_arm_rests() -> None:
     rest = np.tile(arm.rest_position, (20, 1))
     rest[:, 0] += np.linspace(0.0, 0.5, 20)
 
-    assert not camera_paths(make_scene([recorded(arm, rest)])).any()
+    assert not camera_path(make_scene([recorded(arm, rest)])).any()
 
 
 # The ghost
@@ -389,14 +391,15 @@ def test_a_process_that_dies_is_one_line() -> None:
     assert not multiprocessing.active_children()
 
 
-def test_an_error_in_a_process_is_that_of_one_process(tmp_path: Path) -> None:
-    recording = standing("lift", ticks=24)
-    movie = Movie([recording], replace(HERE, fps=60, workers=2))
-    nowhere = replace(recording.character.loading, urdf_text="<robot name='x'/>")
-    movie._set = replace(movie._set, characters=(replace(recording.character, loading=nowhere),))
+def test_an_error_in_a_process_is_that_of_one_process() -> None:
+    lift = character("lift")
+    nowhere = UrdfOptions(lift.loading.urdf_path, "<robot name='x'/>")
+    settings = SceneSettings((lift,), True, nowhere, SIZE, write_on)
+    frames = [FrameSpec(np.array(lift.rest_position))] * 3
 
-    with pytest.raises(CharacterError):
-        list(movie.pictures())
+    for workers in (1, 2):
+        with pytest.raises(CharacterError, match="not a usable URDF"):
+            list(draw(settings, frames, workers))
 
 
 def test_a_film_is_saved_with_every_picture(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from msgs_config.messages.projectiles import BallStates, ball_names, decode_ball
 from msgs_config.messages.throw import ProjectileThrow
 from tests.support.in_process import InProcessRunner
 from tests.support.physics import character
+from tests.support.pictures import take_picture, view_of
 
 HUMANOID = character("humanoid")
 REST = np.array(HUMANOID.rest_position)
@@ -70,7 +71,8 @@ def test_where_the_balls_are_is_read_as_it_was_written() -> None:
 def test_a_scene_has_the_balls_of_each_state_with_their_radii(recording: Recording) -> None:
     scene = make_scene([recording])
 
-    found = [scene.balls(row).tolist() for row in range(6)]
+    frames = scene.frames(np.arange(6), [""] * 6, ghosts=False)
+    found = [[] if frame.balls is None else frame.balls.tolist() for frame in frames]
 
     assert found == [
         [],
@@ -85,13 +87,13 @@ def test_a_scene_has_the_balls_of_each_state_with_their_radii(recording: Recordi
 @pytest.mark.parametrize("ground", [False, True])
 def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
     with Renderer(HUMANOID, ground=ground) as camera:
-        view = camera.view(REST, size=SIZE)
+        view = view_of(camera, REST, size=SIZE)
         ball = np.array([[*view.target, 0.15]])
         ball[0, :3] += 0.8 * view.axes()[2]  # towards the camera: before the character
 
-        empty = camera.picture(REST, view=view, size=SIZE)
-        full = camera.picture(REST, view=view, size=SIZE, balls=ball)
-        again = camera.picture(REST, view=view, size=SIZE)
+        empty = take_picture(camera, REST, view=view, size=SIZE)
+        full = take_picture(camera, REST, view=view, size=SIZE, balls=ball)
+        again = take_picture(camera, REST, view=view, size=SIZE)
 
     differs = (empty != full).any(axis=2)
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
@@ -108,13 +110,13 @@ def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
 
 def test_a_ball_behind_the_character_is_hidden() -> None:
     with Renderer(HUMANOID, ground=False) as camera:
-        view = camera.view(REST, size=SIZE)
+        view = view_of(camera, REST, size=SIZE)
         behind = np.array([[*view.target, 0.02]])
         behind[0, :3] -= 1.0 * view.axes()[2]
         behind[0, 2] += 0.1
 
-        empty = camera.picture(REST, view=view, size=SIZE)
-        full = camera.picture(REST, view=view, size=SIZE, balls=behind)
+        empty = take_picture(camera, REST, view=view, size=SIZE)
+        full = take_picture(camera, REST, view=view, size=SIZE, balls=behind)
 
     assert np.array_equal(empty, full)
 
