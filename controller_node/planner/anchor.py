@@ -14,7 +14,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
 _FAR = 0.28  # m of the centre of mass from the reference's: it is perturbed
-_FAST = 0.65  # m/s likewise; a walk that nobody pushes reaches 0.63
+_FAST = 0.8  # m/s likewise; a walk that is not pushed reaches 0.63
 _HELD = 1.0  # s after which that is over
 _FOLLOWS_IN = 0.3  # s, time constant with which the place gives way
 _TURNS_IN = 1.0  # s, the heading
@@ -28,7 +28,7 @@ class Balance:
 
     centre: complex  # m, of the centre of mass, x + i y
     velocity: complex  # m/s
-    heading: float  # rad, yaw of the root
+    root: FloatArray  # (4,) orientation xyzw
 
 
 @dataclass(frozen=True)
@@ -75,15 +75,16 @@ class Anchor:
         far = _length(error) > _FAR or _length(state.velocity - wanted.velocity) > _FAST
         calm_from = time + _HELD if far else self.calm_from
         if time < calm_from:
-            turned = math.remainder(state.heading - wanted.heading, math.tau)
-            yaw = self.yaw + min(elapsed / _TURNS_IN, 1.0) * turned
+            yaw = self.yaw + min(elapsed / _TURNS_IN, 1.0) * _heading(state.root, wanted.root)
             before = _turn(self.yaw) * state.centre + self.place
             share = min(elapsed / _FOLLOWS_IN, 1.0)
             place = before - _turn(yaw) * (state.centre - share * error)
-            return Anchor(place, yaw, calm_from)
-        return self._returned(wanted.centre, elapsed, calm_from)
+            followed = Anchor(place, yaw, calm_from)
+        else:
+            followed = replace(self, calm_from=calm_from)
+        return followed._returned(wanted.centre, elapsed)
 
-    def _returned(self, centre: complex, elapsed: float, calm_from: float) -> "Anchor":
+    def _returned(self, centre: complex, elapsed: float) -> "Anchor":
         """A part of the way back, as seen where the reference's centre of mass is."""
         away = _turn(self.yaw) * centre + self.place - centre
         share = min(elapsed / _RETURNS_IN, 1.0)
@@ -91,7 +92,7 @@ class Anchor:
         if share * _length(away) > _SLOWLY * elapsed:
             share = _SLOWLY * elapsed / _length(away)
         place = centre + (1.0 - share) * away - _turn(yaw) * centre
-        return replace(self, place=place, yaw=yaw, calm_from=calm_from)
+        return replace(self, place=place, yaw=yaw)
 
 
 def balance_of(position: FloatArray, velocity: FloatArray, centre: FloatArray) -> Balance:
@@ -102,8 +103,16 @@ def balance_of(position: FloatArray, velocity: FloatArray, centre: FloatArray) -
         velocity: Of the centre of mass (3,), m/s.
         centre: Of mass (3,), m.
     """
-    heading = rotations.yaw(rotations.xyzw_from_wxyz(position[3:7]))
-    return Balance(complex(*centre[:2]), complex(*velocity[:2]), float(heading))
+    root = rotations.xyzw_from_wxyz(position[3:7])
+    return Balance(complex(*centre[:2]), complex(*velocity[:2]), root)
+
+
+def _heading(root: FloatArray, wanted: FloatArray) -> float:
+    """The turn about z in rad, -pi to pi, by which a root is off another; orientations xyzw (4,).
+
+    Not the difference of two headings: a body that lies or flips over has none.
+    """
+    return float(rotations.yaw(rotations.multiply(root, rotations.conjugate(wanted))))
 
 
 def _turn(angle: float) -> complex:
