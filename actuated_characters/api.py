@@ -48,10 +48,7 @@ class Controller:
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
         """
-        given = {**parameters, **more}
-        for name in ("clip", "keyframes"):
-            if name in more:
-                given.setdefault("reference", name)
+        given = {**_choose_reference(more), **parameters, **more}
         self.character = placed(character, given)
         declared = controller_parameters.PARAMETERS
         own = controller_parameters.character_parameters(self.character, given)
@@ -274,10 +271,8 @@ def run(
     Raises:
         ActuatedCharactersError: a name or a value is wrong, or a process failed.
     """
-    for name in ("clip", "keyframes"):
-        if name in reference:
-            reference.setdefault("reference", name)
-    plan = make_plan(character, duration, reference, simulator, controller)
+    motion = {**_choose_reference(reference), **reference}
+    plan = make_plan(character, duration, motion, simulator, controller)
     directory = Path(output).absolute()
     prepare_directory(directory, overwrite=overwrite)
     if in_process:
@@ -286,6 +281,12 @@ def run(
         run_over_topics(plan, directory, write_bag=True, progress=_ignore)
     figures, _ = read_figures(directory)
     return figures
+
+
+def _choose_reference(given: Mapping[str, object]) -> dict[str, object]:
+    """The kind of reference of which a clip or keyframes are given."""
+    kinds = [name for name in ("clip", "keyframes") if name in given]
+    return {"reference": kinds[0]} if kinds else {}
 
 
 def _ignore(ticks: int) -> None:

@@ -80,6 +80,9 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._duration, self._ticks, self._random = duration, ticks_per_step, random_start
         self._start = 0.0  # s of the reference, where the episode began
         self._is_fresh = True
+        self._make_spaces()
+
+    def _make_spaces(self) -> None:
         limits = np.repeat(self._character.effort_limits(), self._layout.vector_lengths)
         bound = limits[self._actuated]
         self.action_space = spaces.Box(-bound, bound, dtype=np.float64)

@@ -1,10 +1,10 @@
 """Writes a report: a page, and its pictures beside it."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from actuated_characters.bags.recording import find_bag, read_recordings
+from actuated_characters.bags.recording import Recording, find_bag, read_recordings
 from actuated_characters.report.contents import Contents, read_contents
 from actuated_characters.report.page import (
     GENERATOR,
@@ -53,10 +53,7 @@ def write_report(
     directory = output or default_directory(path)
     old = _old_files(directory)
     recordings, contents = read_recordings(path), read_contents(path)
-    reports = []
-    for number, recording in enumerate(recordings, start=1):
-        prefix = f"{number}-{_UNFIT.sub('_', recording.name)}-" if len(recordings) > 1 else ""
-        reports.append(CharacterReport(recording, prefix, stills))
+    reports = _plan_reports(recordings, stills)
     done, total = 0, sum(len(report.makers) for report in reports)
     progress(done, total)
     chapters: list[Chapter] = []
@@ -73,6 +70,15 @@ def write_report(
     page = render_page(", ".join(report.title for report in reports), chapters)
     _write(directory, {PAGE: page.encode("utf-8")} | files, old)
     return directory / PAGE
+
+
+def _plan_reports(recordings: Sequence[Recording], stills: int) -> list[CharacterReport]:
+    """The report of each character; of several, each file's name has the character's in it."""
+    reports = []
+    for number, recording in enumerate(recordings, start=1):
+        prefix = f"{number}-{_UNFIT.sub('_', recording.name)}-" if len(recordings) > 1 else ""
+        reports.append(CharacterReport(recording, prefix, stills))
+    return reports
 
 
 def default_directory(path: Path) -> Path:

@@ -53,7 +53,7 @@ def describe(
         "name": name,
         "characters": list(characters),
         "joints": [
-            {"name": joint.name, "type": joint.type.value} for joint in character.layout.joints
+            {"name": each.name, "type": each.type.value} for each in character.layout.joints
         ],
         "effort_limits": [_finite(limit) for limit in character.effort_limits().tolist()],
         "mass": character.mass,
@@ -61,9 +61,7 @@ def describe(
         "probe": None if probe is None else probe.content(),
         "actuation": None if actuation is None else dict(actuation),
         "parameters_after_stamp_ns": since_ns,
-        "parameters": {
-            name: _finite(value) for name, value in values.items() if name != SESSION.name
-        },
+        "parameters": {key: _finite(values[key]) for key in values if key != SESSION.name},
         "versions": installed_versions(),
     }
     return json.dumps(content, allow_nan=False)

@@ -52,25 +52,40 @@ def write_features(
         watched: What else there is to look at.
     """
     n = len(velocity)
-    root = quaternion(position, 3)
+    last, root = 2 * n - 6, quaternion(position, 3)
     turn = turn_between(quaternion(target, 3), root)
     for i in range(3):
         row[i] = turn[i]
     _write_joints(row, target, position, joints)
-    row[n - 3 : 2 * n - 6] = velocity[3:]
-    momentum, last = np.empty(6), 2 * n - 6
+    row[n - 3 : last] = velocity[3:]
+    _write_momentum(row[last:], position, velocity, mass, centre, root, tree, watched.mass)
+    for k in range(len(watched.end_effectors)):
+        for i in range(3):
+            row[last + 9 + 3 * k + i] = points[watched.end_effectors[k], i]
+
+
+@compiled
+def _write_momentum(
+    row: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    mass: FloatArray,
+    centre: FloatArray,
+    root: tuple[float, float, float, float],
+    tree: Tree,
+    whole: float,
+) -> None:
+    """Write centre of mass, its velocity and the angular momentum about it, three entries each."""
+    momentum = np.empty(6)
     mass_matrix.base_momentum(mass, tree, velocity, momentum)
     spin = to_parent(axes(root), (momentum[3], momentum[4], momentum[5]))
     x, y, z = centre[0] - position[0], centre[1] - position[1], centre[2] - position[2]
     for i in range(3):
-        row[last + i] = centre[i]
-        row[last + 3 + i] = momentum[i] / watched.mass
-    row[last + 6] = spin[0] - (y * momentum[2] - z * momentum[1])
-    row[last + 7] = spin[1] - (z * momentum[0] - x * momentum[2])
-    row[last + 8] = spin[2] - (x * momentum[1] - y * momentum[0])
-    for k in range(len(watched.end_effectors)):
-        for i in range(3):
-            row[last + 9 + 3 * k + i] = points[watched.end_effectors[k], i]
+        row[i] = centre[i]
+        row[3 + i] = momentum[i] / whole
+    row[6] = spin[0] - (y * momentum[2] - z * momentum[1])
+    row[7] = spin[1] - (z * momentum[0] - x * momentum[2])
+    row[8] = spin[2] - (x * momentum[1] - y * momentum[0])
 
 
 @compiled
