@@ -84,8 +84,7 @@ def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
 
     body = run.characters[0]._body
     points = pybullet.getContactPoints(ball, body._body, physicsClientId=body._client)
-    rows = {number: row for row, number in enumerate(body.links._numbers)}
-    return tuple(LINKS[rows[point[4]]] for point in points)
+    return tuple(LINKS[body._row[point[4]]] for point in points)
 
 
 # Aiming

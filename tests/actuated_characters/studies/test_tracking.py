@@ -158,13 +158,19 @@ def test_growth_is_that_of_the_controllers_own_law_stepped_with_delay(
     state[0] = rng.normal(size=3)
     sizes = np.zeros(3000)
 
-    def solve(force: FloatArray, added: FloatArray) -> FloatArray:
-        return np.array(np.linalg.solve(mass + np.diag(added), force), dtype=float)
+    class Model:
+        """The mass matrix alone."""
+
+        def solve(self, force: FloatArray, added: FloatArray, period: float) -> FloatArray:
+            return np.array(np.linalg.solve(mass + np.diag(added), force), dtype=float)
+
+        def bias_force(self) -> FloatArray:
+            return np.zeros(3)
 
     for tick in range(len(sizes)):
         position, velocity, *waiting = state
-        gains = np.zeros(3), stiffness, damping
-        effort = stable_pd_effort(solve, *gains, -position, velocity, np.zeros(3), PERIOD)
+        gains = stiffness, damping
+        effort = stable_pd_effort(Model(), *gains, -position, velocity, np.zeros(3), PERIOD)
         acting, *waiting = *waiting, effort
         for _ in range(substeps):
             velocity = velocity + np.linalg.solve(mass, acting) * PERIOD / substeps
