@@ -32,7 +32,7 @@ def counts(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
         monkeypatch.setattr(owner, name, call)
 
-    counted(files, "parse_xml")
+    counted(files.ElementTree, "XMLParser")
     counted(pybullet, "loadURDF")
     return found
 
@@ -52,4 +52,4 @@ def test_a_urdf_is_parsed_once_and_loaded_to_be_read_probed_and_simulated(
         configuration.describe(loaded.character, loaded.values, probe=sample)
 
     assert inverse_mass.any()
-    assert counts == {"parse_xml": 1, "loadURDF": 3}
+    assert counts == {"XMLParser": 1, "loadURDF": 3}
