@@ -104,7 +104,7 @@ def storage_files(bag: Path) -> list[Path]:
         names = ", ".join(file.name for file in files[:_MOST_NAMED])
         raise RecordingError(
             f"cannot recover {bag}: its files ({names}{', ...' * (len(files) > _MOST_NAMED)}) are "
-            "not those of one recording, NAME_0, NAME_1 and so on; give each a directory of its own"
+            "not those of one recording, NAME_0, NAME_1 and so on; give each its own directory"
         )
     return files
 

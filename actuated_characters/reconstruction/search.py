@@ -1,6 +1,6 @@
 """Sampling-based motion control whose samples plan ahead: window by window, the best worlds stay.
 
-Some worlds go on from the states that were kept, each with plans of its own. After a window the
+Some worlds go on from the states that were kept, each with different plans. After a window the
 best of them are kept, by what the last windows cost and by what going on as planned will cost, and
 the others go on from these.
 
@@ -21,7 +21,7 @@ from msgs_config.errors import ConfigurationError, SimulationError
 _RECENT = 4  # windows whose costs count beside what is ahead
 _FURTHEST_BACK = 16  # windows
 _PLACES = _FURTHEST_BACK + 1  # windows of which places are kept
-_MOST_WORLDS, _MOST_FAILURES = 2**10, 2**10  # each has seeds of its own
+_MOST_WORLDS, _MOST_FAILURES = 2**10, 2**10  # each has its own seeds
 _LARGEST_SEED = 2**32
 
 
@@ -83,7 +83,7 @@ def search(
     """Go on to the last window; returns None, or the number of a window where it is stuck.
 
     Where all worlds are lost it goes back, twice as far each time (at most 16 windows) until it
-    gets further than ever: who is going to fall has long been beyond help when it does.
+    gets further than ever: a world that falls has long been beyond recovery by then.
 
     Raises:
         SimulationError: what was found before is not repeated.
@@ -106,7 +106,7 @@ def search(
             progress.stuck += 1
             del progress.levels[max(failed - min(2**progress.stuck, _FURTHEST_BACK), 0) :]
             if progress.stuck >= settings.tries:
-                progress.stuck = 0  # who resumes it wants it to try again
+                progress.stuck = 0  # a resumed search tries again
                 report(progress)
                 return failed
         report(progress)

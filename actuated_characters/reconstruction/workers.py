@@ -1,4 +1,4 @@
-"""Processes that grow branches, each with an engine of its own."""
+"""Processes that grow branches, each with its own engine."""
 
 import multiprocessing
 import os
@@ -22,7 +22,7 @@ _world: TrialWorld | None = None
 class Workers:
     """Grows branches on a number of processes; 1 is this process alone.
 
-    Whoever opens it closes it: with it all the processes end. A process that dies is replaced, and
+    To be closed by its opener, which ends all the processes. A process that dies is replaced, and
     what it was doing is done again.
     """
 
@@ -37,7 +37,7 @@ class Workers:
 
     def __exit__(self, kind: object, *_: object) -> None:
         if self._pool is not None:
-            if kind is not None:  # nobody waits for what they are doing
+            if kind is not None:  # their work is not waited for
                 for process in multiprocessing.active_children():
                     process.terminate()
             self._pool.shutdown(cancel_futures=True)

@@ -41,7 +41,7 @@ PARAMETERS = [
     Parameter(
         "characters",
         [],
-        "characters that are recorded, each in a namespace of its own below the recorder's; none: "
+        "characters that are recorded, each in its namespace below the recorder's; none: "
         "the one in the recorder's own namespace",
         texts=True,
     ),
@@ -222,7 +222,7 @@ class RecorderNode(Node):
             if reader.lost:
                 self.get_logger().warning(f"'{reader.recorded.name}': {reader.lost} messages lost")
         for name in sorted(self._named.missing):
-            self.get_logger().warning(f"nobody published on '{name}'")
+            self.get_logger().warning(f"'{name}' had no publisher")
         for name, collector in self._collectors.items():
             self._conclude_character(name, collector)
         if self._failure is not None:

@@ -63,7 +63,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     result.notes += [
         "without the reference's velocity damping holds back: a slow motion lags by kd / kp; with "
         "it, it does not",
-        "small damping does not oscillate here, as stable PD has a damping kp h of its own",
+        "small damping does not oscillate here, as stable PD adds a damping kp h",
     ]
     for ((p, d), velocity), outcome in runs.items():
         curves[f"p{p:g}_d{d:g}_{velocity}_rad"] = _knee(outcome.recording, (p, d))[1]

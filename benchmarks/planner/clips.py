@@ -74,7 +74,7 @@ def main() -> int:
     parser.add_argument("--duration", type=float, help="s of each; else a cycle")
     parser.add_argument("--set", action="append", default=[], help="NODE.NAME:=VALUE, as of run")
     parser.add_argument("--push", action="append", default=[], help="LINK:FX,FY,FZ@S, as of run")
-    parser.add_argument("--mass", type=float, help="factor on each link's, which nobody plans with")
+    parser.add_argument("--mass", type=float, help="factor on each link's, unknown to the planner")
     parser.add_argument("--processes", type=int, default=2, help="(%(default)s)")
     options = parser.parse_args()
     if min(options.seeds, options.processes) < 1:
@@ -98,7 +98,7 @@ def _table(options: argparse.Namespace, folder: Path) -> int:
     ]
     console = Console(width=100)
     for task in tasks[:: options.seeds]:
-        _plan(task, world)  # what is wrong is said at once
+        _plan(task, world)  # a mistake shows at once
     with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool:
         done = list(track(pool.map(attempt, tasks), total=len(tasks), console=console))
     table = Table(title=f"seeds 1 to {options.seeds}", title_justify="left")

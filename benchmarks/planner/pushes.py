@@ -1,4 +1,4 @@
-"""What a planned walk bears that nobody told it of: `python -m benchmarks.planner.pushes`.
+"""Disturbances that a planned walk survives untold: `python -m benchmarks.planner.pushes`.
 
 A row a kind of push at the root, at random moments and from random sides. A walk ends by falling:
 the centre of mass lower than 0.65 of the clip's, or the root turned by more than 1.5 rad from the
@@ -234,7 +234,7 @@ def _plan(walk: Walk) -> Plan:
     return make_plan("humanoid", kind.duration, motion, simulator | given["sim_node"], controller)
 
 
-# What is said of them
+# Tables
 
 
 def main() -> int:
@@ -260,7 +260,7 @@ def main() -> int:
     ]
     console = Console(width=100)
     try:
-        _plan(tasks[0])  # what is wrong is said at once
+        _plan(tasks[0])  # a mistake shows at once
         with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool:
             done = list(track(pool.map(attempt, tasks), total=len(tasks), console=console))
     except ActuatedCharactersError as error:

@@ -31,7 +31,7 @@ def _deep_mimic(name: str) -> ModuleType:
 
 
 class DeepMimicStablePd:
-    """An engine of its own with their humanoid, for `with`."""
+    """A separate engine with their humanoid, for `with`."""
 
     def __init__(self) -> None:
         self._layout = load_character("humanoid").layout

@@ -75,7 +75,7 @@ class Nodes:
 
 
 def private_memory(child: Child) -> float:
-    """Memory in MB that a child shares with nobody and no file holds."""
+    """Memory in MB that a child does not share and no file holds."""
     lines = Path(f"/proc/{child.pid}/smaps_rollup").read_text().splitlines()
     (anonymous,) = (line.split()[1] for line in lines if line.startswith("Pss_Anon:"))
     return 1e-3 * float(anonymous)

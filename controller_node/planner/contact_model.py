@@ -29,7 +29,7 @@ _LIMIT = (0.01, 1.0)  # likewise, of hinges' limits
 _UNUSED = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR")  # of MuJoCo's parts
 
 _GROUND = "ground"
-_BY_PAIRS = {"contype": 0, "conaffinity": 0}  # of a shape: what touches what is said in pairs
+_BY_PAIRS = {"contype": 0, "conaffinity": 0}  # of a shape: explicit pairs say what may touch
 
 _GEOMETRIES = {
     ShapeType.BOX: mujoco.mjtGeom.mjGEOM_BOX,

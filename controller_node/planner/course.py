@@ -31,7 +31,7 @@ class Foreseen:
 
 
 class Course:
-    """Samples a reference, each tick of it once, until another one is said to have begun."""
+    """Samples a reference, each tick of it once, until `forget` is called."""
 
     def __init__(self, model: ContactModel, rollouts: Rollouts, settings: PlannerSettings) -> None:
         self._model, self._rollouts, self._settings = model, rollouts, settings

@@ -1,4 +1,4 @@
-"""What is expected of a plan, for those who watch."""
+"""What is expected of a plan, for `~/plan`, reports and pictures."""
 
 from dataclasses import dataclass
 

@@ -26,7 +26,7 @@ SILENT_AND_ALONE, SILENT = 1.0, 3.0  # s
 where at most one node publishes states, and where several do. A simulator that waits for commands,
 or is not alone, speaks each `republish_period`."""
 
-REMEDY = "give each simulator a ROS_DOMAIN_ID or a namespace of its own"
+REMEDY = "give each simulator a ROS_DOMAIN_ID or its own namespace"
 
 _MARK = "#"
 _FORM = re.compile(r"[A-Za-z0-9_/]{1,255}#[0-9A-Za-z]{1,40}")

@@ -76,7 +76,7 @@ class ConflictLog:
         self._topics: dict[str, Topic] = {}  # by joint
 
     def add(self, joint: str, topic: Topic) -> None:
-        """Note a conflict of commands for a joint; finding out who publishes takes its time."""
+        """Note a conflict of commands for a joint; finding the publishers' names takes time."""
         self._topics[joint] = topic
 
     def log(self) -> None:

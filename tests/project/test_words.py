@@ -18,7 +18,7 @@ FUNCTIONS = """
     make_cast make_role recall take_over is_stuck stand_back winds_up weaken conduct
     measure_mobility nearer_way
 """
-PROSE = ("anew", "lest", "save that", "for ever")
+PROSE = ("anew", "lest", "save that", "for ever", "nobody", "somebody", "whoever", "of its own")
 
 
 def sources() -> Iterator[Path]:

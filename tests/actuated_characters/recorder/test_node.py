@@ -114,7 +114,7 @@ def test_a_run_stores_and_compresses_its_bag_as_it_is_told(
     assert information["compression_format"] == "zstd"
     names = {t["topic_metadata"]["name"] for t in information["topics_with_message_count"]}
     assert "/contacts" not in names
-    assert "nobody published on '/mine'" in (tmp_path / "run/logs/recorder.log").read_text()
+    assert "'/mine' had no publisher" in (tmp_path / "run/logs/recorder.log").read_text()
     states = read_messages(tmp_path / "run" / "bag", ["/joint_states"])
     ticks = dict.fromkeys(tick_of(message.decode()) for message in states)
     assert list(ticks) == list(range(1, TICKS + 2))
