@@ -98,10 +98,10 @@ def humanoids(count: int) -> dict[str, object]:
 
 def make_simulation(cast: SimulatorParameters) -> Simulation:
     """The simulation of a cast, without ROS."""
-    roles = [
+    setups = [
         make_character_setup(part.character, part.values, part.name) for part in cast.characters
     ]
-    return Simulation(roles, make_settings(cast.values))
+    return Simulation(setups, make_settings(cast.values))
 
 
 def _measure(label: str, given: Mapping[str, object]) -> Cost:
@@ -131,7 +131,7 @@ def timed_engine() -> Iterator[list[float]]:
 def step_durations(cast: SimulatorParameters) -> FloatArray:
     """Durations (ticks,) in s of the steps of a simulation without ROS and without efforts."""
     with make_simulation(cast) as simulation:
-        efforts = [np.zeros(actor.layout.size) for actor in simulation.characters]
+        efforts = [np.zeros(simulated.layout.size) for simulated in simulation.characters]
         times = []
         for _ in range(_WARM_UP + _TICKS + 1):
             times.append(time.perf_counter())

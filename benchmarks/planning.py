@@ -134,12 +134,12 @@ class _World:
         controller = Controller(
             self._plan.character, self._plan.reference, self._control, rate_hz=_RATE, gravity=9.81
         )
-        role = make_character_setup(self._plan.character, values)
-        with Simulation([role], make_settings(values)) as simulation:
-            (actor,) = simulation.characters
+        setup = make_character_setup(self._plan.character, values)
+        with Simulation([setup], make_settings(values)) as simulation:
+            (simulated,) = simulation.characters
             for tick in range(_HORIZON):
-                state = replace(actor.state, stamp_ns=clock.stamp_ns(1 + first + tick))
+                state = replace(simulated.state, stamp_ns=clock.stamp_ns(1 + first + tick))
                 effort, _ = controller.compute_effort(state, clock.stamp_ns(1))
-                simulation.step([np.where(actor.commanded, effort, 0.0)], [()])
-                self._dynamics.update(actor.state.position, actor.state.velocity)
+                simulation.step([np.where(simulated.commanded, effort, 0.0)], [()])
+                self._dynamics.update(simulated.state.position, simulated.state.velocity)
                 yield self._dynamics.centre_of_mass()

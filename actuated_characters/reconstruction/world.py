@@ -97,25 +97,26 @@ class TrialWorld:
         plans: list[tuple[int, Offsets]] = []
         costs: list[float] = []
         before, gains = self._planner.plan, self._controller.settings.gains
-        (actor,) = self._simulation.characters
+        (simulated,) = self._simulation.characters
         pushes = push_schedule(self.plan, self._pushes)
         for tick in range(first, last):
-            effort, _ = self._controller.compute_effort(actor.state, self._episode_ns)
+            effort, _ = self._controller.compute_effort(simulated.state, self._episode_ns)
             made = self._planner.plan
             if made is not None and made is not before:
                 plans.append((made.tick, made.offsets.during(made.tick, self._period)))
                 before = made
             try:
                 self._simulation.step(
-                    [np.where(actor.commanded, effort, 0.0)], [pushes.take(self._simulation.tick)]
+                    [np.where(simulated.commanded, effort, 0.0)],
+                    [pushes.take(self._simulation.tick)],
                 )
             except SimulationError:
                 return None
             if (tick + 1) % self._period == 0 or tick + 1 == last:
-                costs.append(self._planner.cost(tick + 1, actor.state, gains, self._desired))
+                costs.append(self._planner.cost(tick + 1, simulated.state, gains, self._desired))
         if self._is_lost(last):
             return None
-        state = actor.state
+        state = simulated.state
         return Grown(
             Place(last, self._simulation.snapshot(), self._planner.snapshot()),
             tuple(plans),
@@ -132,5 +133,5 @@ class TrialWorld:
         return is_lost(here, self._centre_at(self._desired(tick).configuration.position))
 
     def _fresh(self) -> Simulation:
-        role = make_character_setup(self.plan.character, self.plan.simulator)
-        return Simulation([role], make_settings(self.plan.simulator))
+        setup = make_character_setup(self.plan.character, self.plan.simulator)
+        return Simulation([setup], make_settings(self.plan.simulator))

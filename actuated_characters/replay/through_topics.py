@@ -157,8 +157,8 @@ def replay_states(
         tell: Is told what is waited for, if it takes long.
         character: The name of the recording to play, where there are several.
         settings: Parameters of `controller_node` in place of the recorded ones.
-        start: Start the bag's own controller, in a ROS domain that nobody else is on. Without it,
-            somebody's own is waited for on the present domain, in the character's namespace.
+        start: Start the bag's own controller, in an unused ROS domain. Without it,
+            another one is waited for on the present domain, in the character's namespace.
 
     Raises:
         RecordingError: the bag cannot be read, or it has no commands.

@@ -356,7 +356,7 @@ class Stance:
 
     def push(self, impulse: tuple[float, float]) -> None:
         """Push the chest, at its centre of mass, by an impulse in N s."""
-        character_ = self._run.actor.character
+        character_ = self._run.simulated.character
         chest = [link.name for link in character_.links].index("chest")
         wrench = np.array([*impulse, 0.0, 0.0, 0.0, 0.0]) / PUSH_S
         point = np.array(character_.links[chest].inertial_pose.position)

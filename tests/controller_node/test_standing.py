@@ -50,7 +50,7 @@ def test_the_quadruped_stands_still_on_its_four_feet(with_root: bool) -> None:
     # Assert
     assert np.abs(run.state.velocity).max() < 0.01
     assert run.state.position == pytest.approx(whole.rest_position, abs=0.1)
-    origins, _ = link_poses(run.actor._body, whole)
+    origins, _ = link_poses(run.simulated._body, whole)
     assert origins[toes, 2] == pytest.approx(TOE_RADIUS, abs=0.003)
     assert share < 0.2
 
@@ -59,7 +59,7 @@ def test_the_rest_pose_of_the_quadruped_has_its_toes_on_the_ground_below_its_hip
     whole = character("laikago")
     run = simulation("laikago")
 
-    origins, _ = link_poses(run.actor._body, whole)
+    origins, _ = link_poses(run.simulated._body, whole)
 
     places = {link.name: origin for link, origin in zip(whole.links, origins, strict=True)}
     for toe in TOES:

@@ -217,26 +217,30 @@ def ends_of(file: str, parts: Sequence[CharacterParameters]) -> dict[str, Ending
         motion = make_motion(character, values)
         drivers.append(for_controller.make_controller(character, motion.reference, values))
         states[part.name] = motion.first_state()
-    roles = [make_character_setup(part.character, part.values, part.name) for part in parts]
+    setups = [make_character_setup(part.character, part.values, part.name) for part in parts]
     hashes = {part.name: StateHash() for part in parts}
-    with Simulation(roles, make_settings(parts[0].values)) as simulation:
+    with Simulation(setups, make_settings(parts[0].values)) as simulation:
         simulation.begin_in(states)
         begin_ns = simulation.stamp_ns
         for tick in range(TICKS + 1):
-            for actor in simulation.characters:
-                hashes[actor.setup.name].add(actor.state)
+            for simulated in simulation.characters:
+                hashes[simulated.setup.name].add(simulated.state)
             if tick < TICKS:
                 simulation.step(
                     [
                         np.where(
-                            actor.commanded, driver.compute_effort(actor.state, begin_ns)[0], 0.0
+                            simulated.commanded,
+                            driver.compute_effort(simulated.state, begin_ns)[0],
+                            0.0,
                         )
-                        for driver, actor in zip(drivers, simulation.characters, strict=True)
+                        for driver, simulated in zip(drivers, simulation.characters, strict=True)
                     ]
                 )
         return {
-            actor.setup.name: Ending(actor.state.position, hashes[actor.setup.name].hexdigest())
-            for actor in simulation.characters
+            simulated.setup.name: Ending(
+                simulated.state.position, hashes[simulated.setup.name].hexdigest()
+            )
+            for simulated in simulation.characters
         }
 
 

@@ -140,7 +140,7 @@ def bits_after(run: Simulation, ticks: int = 60) -> list[bytes]:
     states = []
     for _ in range(ticks):
         states += [a.state.position.tobytes() + a.state.velocity.tobytes() for a in run.characters]
-        run.step([np.zeros(actor.layout.size) for actor in run.characters])
+        run.step([np.zeros(simulated.layout.size) for simulated in run.characters])
     return states
 
 

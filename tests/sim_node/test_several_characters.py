@@ -43,8 +43,10 @@ def states_of(run: Simulation, *efforts: Efforts) -> list[bytes]:
     states = [b""] * len(run.characters)
     for together in zip(*efforts, strict=True):
         run.step(together)
-        for number, actor in enumerate(run.characters):
-            states[number] += actor.state.position.tobytes() + actor.state.velocity.tobytes()
+        for number, simulated in enumerate(run.characters):
+            states[number] += (
+                simulated.state.position.tobytes() + simulated.state.velocity.tobytes()
+            )
     return states
 
 
@@ -135,9 +137,9 @@ def test_without_weight_and_ground_what_touches_presses_equally_in_opposite_dire
         for _ in range(120):
             run.step([nothing, nothing])
             one, other = (
-                actor.contacts.wrenches[:, :3].sum(axis=0)
-                for actor in run.characters
-                if actor.contacts
+                simulated.contacts.wrenches[:, :3].sum(axis=0)
+                for simulated in run.characters
+                if simulated.contacts
             )
 
             np.testing.assert_allclose(one, -other, rtol=1e-9, atol=1e-9)

@@ -78,13 +78,13 @@ def eventful_run(
     run = Eventful(plan)
     controller = make_controller(plan.character, plan.reference, plan.controller)
     names = [link.name for link in plan.character.links]
-    role = make_character_setup(plan.character, plan.simulator)
+    setup = make_character_setup(plan.character, plan.simulator)
     now = START_NS
-    with Simulation([role], make_settings(plan.simulator)) as simulation:
+    with Simulation([setup], make_settings(plan.simulator)) as simulation:
         simulation.watches_contacts = True
-        (actor,) = simulation.characters
-        episode_ns = actor.state.stamp_ns
-        run.states.append(actor.state)
+        (simulated,) = simulation.characters
+        episode_ns = simulated.state.stamp_ns
+        run.states.append(simulated.state)
         run.log_times_ns.append(now)
         for tick in range(ticks):
             now += tick_ns + (round(1e9 * pause_s) if tick == pause_after else 0)
@@ -92,7 +92,7 @@ def eventful_run(
                 simulation.reset()
                 episode_ns = simulation.stamp_ns
             else:
-                effort, desired = controller.compute_effort(actor.state, episode_ns)
+                effort, desired = controller.compute_effort(simulated.state, episode_ns)
                 run.references.append(desired)
                 acting = [
                     ExternalWrench(
@@ -101,10 +101,10 @@ def eventful_run(
                     for first, count, link, force in pushed
                     if first <= tick < first + count
                 ]
-                simulation.step([np.where(actor.commanded, effort, 0.0)], [acting])
-            run.states.append(actor.state)
+                simulation.step([np.where(simulated.commanded, effort, 0.0)], [acting])
+            run.states.append(simulated.state)
             run.log_times_ns.append(now)
-            pushes, contacts = read_wrenches(actor)
+            pushes, contacts = read_wrenches(simulated)
             assert contacts is not None
             run.pushes.append(pushes)
             run.contacts.append(contacts)

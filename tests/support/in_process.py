@@ -75,22 +75,22 @@ class _Run:
         """Run to the end. Raises SimulationError if it diverges."""
         plan = self._plan
         controller = make_controller(plan.character, plan.reference, plan.controller)
-        role = make_character_setup(plan.character, plan.simulator)
-        with Simulation([role], make_settings(plan.simulator)) as simulation:
+        setup = make_character_setup(plan.character, plan.simulator)
+        with Simulation([setup], make_settings(plan.simulator)) as simulation:
             simulation.watches_contacts = self._case.contacts or controller.needs_contacts
             balls = self._throw_schedule(simulation)
-            schedule, (actor,) = self._schedule(simulation), simulation.characters
-            episode_ns = actor.state.stamp_ns
-            self._states.append(actor.state)
+            schedule, (simulated,) = self._schedule(simulation), simulation.characters
+            episode_ns = simulated.state.stamp_ns
+            self._states.append(simulated.state)
             for _ in range(plan.ticks):
-                touched = None if actor.contacts is None else actor.contacts.wrenches
-                effort, reference = controller.compute_effort(actor.state, episode_ns, touched)
+                touched = None if simulated.contacts is None else simulated.contacts.wrenches
+                effort, reference = controller.compute_effort(simulated.state, episode_ns, touched)
                 self._references.append(reference)
                 if controller.mode is not None and controller.mode not in self._modes[-1:]:
                     self._modes.append(controller.mode)
                 pushes, throws = schedule.take(simulation.tick), balls.take(simulation.tick)
-                simulation.step([np.where(actor.commanded, effort, 0.0)], [pushes], throws)
-                self._add(actor)
+                simulation.step([np.where(simulated.commanded, effort, 0.0)], [pushes], throws)
+                self._add(simulated)
                 self._add_balls(simulation)
 
     def _throw_schedule(self, simulation: Simulation) -> ThrowQueue:
@@ -119,9 +119,9 @@ class _Run:
             )
         return schedule
 
-    def _add(self, actor: SimulatedCharacter) -> None:
-        self._states.append(actor.state)
-        pushes, contacts = read_wrenches(actor)
+    def _add(self, simulated: SimulatedCharacter) -> None:
+        self._states.append(simulated.state)
+        pushes, contacts = read_wrenches(simulated)
         self._pushes.append(pushes)
         if contacts is not None:
             self._contacts.append(contacts)

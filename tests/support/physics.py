@@ -144,18 +144,18 @@ class LoneSimulation(Simulation):
 
     def __init__(self, setup: CharacterSetup, settings: SimulationSettings) -> None:
         super().__init__([setup], settings)
-        (self.actor,) = self.characters
-        self.layout = self.actor.layout
+        (self.simulated,) = self.characters
+        self.layout = self.simulated.layout
 
     @property
     def state(self) -> StampedState:
         """Its present state."""
-        return self.actor.state
+        return self.simulated.state
 
     def advance(self, effort: FloatArray, *pushes: ExternalWrench) -> StampedState:
         """Advance one tick; the next state."""
         self.step([effort], [pushes])
-        return self.actor.state
+        return self.simulated.state
 
 
 def acceleration(world: LoneWorld, effort: FloatArray) -> FloatArray:
@@ -309,18 +309,18 @@ def make_driver(whole: Character, given: Mapping[str, object]) -> Controller:
     return for_controller.make_controller(whole, make_motion(whole, values).reference, values)
 
 
-def read_wrenches(actor: SimulatedCharacter) -> tuple[WrenchArrays, WrenchArrays | None]:
+def read_wrenches(simulated: SimulatedCharacter) -> tuple[WrenchArrays, WrenchArrays | None]:
     """The pushes and the contacts of the tick before, as the simulator publishes them."""
-    stamp_ns, names = actor.state.stamp_ns, [link.name for link in actor.character.links]
+    stamp_ns, names = simulated.state.stamp_ns, [link.name for link in simulated.character.links]
     pushes = WrenchArrays.of_rows(
         stamp_ns,
-        [names[push.link] for push in actor.pushes],
-        [push.wrench for push in actor.pushes],
-        [push.point for push in actor.pushes],
+        [names[push.link] for push in simulated.pushes],
+        [push.wrench for push in simulated.pushes],
+        [push.point for push in simulated.pushes],
     )
-    if actor.contacts is None:
+    if simulated.contacts is None:
         return pushes, None
-    return pushes, select(stamp_ns, names, actor.contacts.wrenches, actor.contacts.touching)
+    return pushes, select(stamp_ns, names, simulated.contacts.wrenches, simulated.contacts.touching)
 
 
 def run_together(

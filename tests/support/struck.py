@@ -103,29 +103,31 @@ def run(
     }
     with joint_simulation(settings) as simulation:
         simulation.watches_contacts = True
-        actor, ball = simulation.characters
-        episode_ns = actor.state.stamp_ns
-        positions, velocities = [actor.state.position], [actor.state.velocity]
+        simulated, ball = simulation.characters
+        episode_ns = simulated.state.stamp_ns
+        positions, velocities = [simulated.state.position], [simulated.state.velocity]
         efforts, references, contacts, balls = [], [], [], []
         modes: list[ModeReport] = []
         for tick in range(ticks):
             for throw in throws:
                 if throw.tick == tick:
                     _throw(simulation, throw)
-            assert actor.contacts is not None
-            contacts.append(actor.contacts.wrenches)
+            assert simulated.contacts is not None
+            contacts.append(simulated.contacts.wrenches)
             effort, reference = control.compute_effort(
-                actor.state, episode_ns, actor.contacts.wrenches if control.needs_contacts else None
+                simulated.state,
+                episode_ns,
+                simulated.contacts.wrenches if control.needs_contacts else None,
             )
             if control.mode is not None and control.mode is not (modes or [None])[-1]:
                 modes.append(control.mode)
             simulation.step([effort, np.zeros(6)])
-            positions.append(actor.state.position)
-            velocities.append(actor.state.velocity)
+            positions.append(simulated.state.position)
+            velocities.append(simulated.state.velocity)
             efforts.append(effort)
             references.append(reference)
             balls.append(ball.state.velocity[:3])
-            if is_over(modes, actor.state.stamp_ns):
+            if is_over(modes, simulated.state.stamp_ns):
                 break
     assert layout.size == len(positions[0])
     return Run(
@@ -141,8 +143,8 @@ def run(
 
 def _throw(simulation: Simulation, throw: ProjectileThrow) -> None:
     """Put the ball beside the link, on its way to it; it flies with the link's own root."""
-    actor, ball = simulation.characters
-    origins, turns = actor.link_frames()
+    simulated, ball = simulation.characters
+    origins, turns = simulated.link_frames()
     index = LINKS.index(throw.link)
     middle = np.array(HUMANOID.links[index].inertial_pose.position)
     centre = origins[index] + rotations.rotate(turns[index], middle)
@@ -150,5 +152,5 @@ def _throw(simulation: Simulation, throw: ProjectileThrow) -> None:
     place = np.zeros(6)
     place[:3] = centre - _START * way
     motion = np.zeros(6)
-    motion[:3] = actor.state.velocity[:3] + throw.speed * way
+    motion[:3] = simulated.state.velocity[:3] + throw.speed * way
     ball._body.set_state(place, motion)

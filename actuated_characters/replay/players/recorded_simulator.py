@@ -62,7 +62,7 @@ _ACKNOWLEDGED = Duration(seconds=10)  # until the controller has a trajectory or
 
 
 class StatePlayer(Node):
-    """Publishes recorded states in lockstep with whoever answers them."""
+    """Publishes recorded states in lockstep with the controller that answers them."""
 
     def __init__(self) -> None:
         """Read the recording, and offer the simulator's topics.
@@ -160,7 +160,7 @@ class StatePlayer(Node):
         raw_state = self._said.state(tick.state)
         self._state.publish(raw_state)
         if not wanted.any():
-            return  # nor did it answer then, or nobody has heard it
+            return  # it was not answered then either, or the answer was lost
         self._wait_for_answer(row, stamp_ns, raw_state)
         for change in self._changes.get(row, ()):
             self._set(change)

@@ -60,23 +60,23 @@ class Watched:
 
     def balance(self, **instead: FloatArray | tuple[ExternalWrench, ...]) -> Balance:
         """The equation of the last tick; or of what it was not."""
-        actor, after = self.run.actor, self.run.state
-        assert after.effort is not None and actor.contacts is not None
+        simulated, after = self.run.simulated, self.run.state
+        assert after.effort is not None and simulated.contacts is not None
         known = {
             "position": self.before.position,
             "velocity": self.before.velocity,
             "effort": after.effort,
             "next_velocity": after.velocity,
-            "contacts": actor.contacts.wrenches,
-            "pushes": actor.pushes,
+            "contacts": simulated.contacts.wrenches,
+            "pushes": simulated.pushes,
         }
         return self.equation.balance(**(known | instead))  # type: ignore[arg-type]
 
     @property
     def contacts(self) -> FloatArray:
         """The contact wrenches (links, 6) of the last tick."""
-        assert self.run.actor.contacts is not None
-        return self.run.actor.contacts.wrenches
+        assert self.run.simulated.contacts is not None
+        return self.run.simulated.contacts.wrenches
 
 
 Watch = Callable[..., Watched]
@@ -275,7 +275,7 @@ def test_what_spinning_friction_does_is_left_over_as_a_torque_about_the_normal(
         effort, _ = driver.compute_effort(watched.run.state, watched.run.clock.stamp_ns(1))
 
         # Act
-        balance = watched.advance(np.where(watched.run.actor.commanded, effort, 0.0))
+        balance = watched.advance(np.where(watched.run.simulated.commanded, effort, 0.0))
 
         # Assert: of the whole body
         turn = rotations.matrix(rotations.exp(watched.before.position[3:6]))

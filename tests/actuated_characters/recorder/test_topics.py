@@ -115,7 +115,7 @@ def test_a_bag_holds_all_that_repeats_a_run_with_pushes_and_its_contacts(
             )
             assert list(bag["/joint_states"][tick + 1].position) == state.position.tolist()
             assert list(bag["/joint_states"][tick + 1].velocity) == state.velocity.tolist()
-            contacts, message = again.actor.contacts, bag["/contacts"][tick + 1]
+            contacts, message = again.simulated.contacts, bag["/contacts"][tick + 1]
             assert contacts is not None
             rows = np.flatnonzero(contacts.touching).tolist()
             assert list(message.joint_names) == [LINKS[row] for row in rows]

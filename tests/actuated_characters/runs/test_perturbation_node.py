@@ -74,14 +74,14 @@ def as_acting(
 def states_without_ros(plan: Plan, pushes: Sequence[ExternalWrench]) -> list[StampedState]:
     """The states of a plan when simulation and controller are called one after the other."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    role = make_character_setup(plan.character, plan.simulator)
-    with Simulation([role], make_settings(plan.simulator)) as run:
-        (actor,) = run.characters
-        states = [actor.state]
+    setup = make_character_setup(plan.character, plan.simulator)
+    with Simulation([setup], make_settings(plan.simulator)) as run:
+        (simulated,) = run.characters
+        states = [simulated.state]
         for _ in range(plan.ticks):
             effort, _ = controller.compute_effort(states[-1], states[0].stamp_ns)
             run.step([effort], [[push for push in pushes if push.acts_at(run.tick)]])
-            states.append(actor.state)
+            states.append(simulated.state)
     return states
 
 

@@ -55,8 +55,8 @@ def clip_run(clip: str) -> LoneSimulation:
             "initial_velocity": start.velocity.tolist(),
         },
     )
-    role = for_simulator.make_character_setup(HUMANOID, values)
-    simulation = LoneSimulation(role, for_simulator.make_settings(values))
+    setup = for_simulator.make_character_setup(HUMANOID, values)
+    simulation = LoneSimulation(setup, for_simulator.make_settings(values))
     simulation.watches_contacts = True
     return simulation
 
@@ -70,8 +70,8 @@ def test_no_clip_hits_itself(clip: str) -> None:
     with clip_run(clip) as simulation:
         # Act
         for current, _, _ in run_together(simulation, driver({"clip": clip}), ticks):
-            assert simulation.actor.contacts is not None
-            wrenches = simulation.actor.contacts.wrenches
+            assert simulation.simulated.contacts is not None
+            wrenches = simulation.simulated.contacts.wrenches
             largest = max(largest, watch.impulse(wrenches, current.position))
             touched += bool(wrenches.any())
 

@@ -152,7 +152,7 @@ def test_contacts_carry_the_whole_wrench_on_each_link(
             run.advance(effort)
             if tick not in by_tick:  # before the simulator knew of the listener
                 continue
-            expected = run.actor.contacts
+            expected = run.simulated.contacts
             assert expected is not None
             rows = [names.index(name) for name in by_tick[tick].joint_names]
             assert rows == np.flatnonzero(expected.touching).tolist()

@@ -101,11 +101,11 @@ def test_a_throw_begins_at_its_tick_and_does_what_it_does_without_ros(
     where, states = motions(thrown), client.states.by_tick()
     assert sorted(where) == list(range(11, 62))
     with simulation("humanoid") as run:
-        (actor,) = run.characters
+        (simulated,) = run.characters
         for tick in range(1, 61):
             run.step([np.zeros(run.layout.size)], None, {10: [AT_CHEST], 20: [FAR]}.get(tick, ()))
-            assert list(states[tick + 1].position) == actor.state.position.tolist()
-            assert list(states[tick + 1].velocity) == actor.state.velocity.tolist()
+            assert list(states[tick + 1].position) == simulated.state.position.tolist()
+            assert list(states[tick + 1].velocity) == simulated.state.velocity.tolist()
             if tick >= 10:
                 assert where[tick + 1].tobytes() == run.ball_motion().tobytes()
         assert abs(run.ball_motion()[0, 7]) < 6.0  # it has hit something
@@ -206,8 +206,8 @@ def test_the_balls_of_a_world_of_several_are_nobodys(processes: Processes, join:
         for tick in range(1, 20):
             run.step([nothing, nothing], None, [AT_CHEST] if tick == 3 else ())
         assert motions(thrown)[20].tobytes() == run.ball_motion().tobytes()
-        for state, actor in zip(states, run.characters, strict=True):
-            assert list(state.position) == actor.state.position.tolist()
+        for state, simulated in zip(states, run.characters, strict=True):
+            assert list(state.position) == simulated.state.position.tolist()
     assert run.balls == (AT_CHEST,)
 
 

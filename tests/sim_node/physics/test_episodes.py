@@ -44,9 +44,9 @@ def a_dirty_episode(run: LoneSimulation) -> None:
     for tick, effort in enumerate(humanoid_efforts(150, size=5.0, seed=9)):
         pushes = [a_push("chest", 300.0, 200.0, -300.0)] if tick < 30 else []
         run.advance(effort, *pushes)
-        run.actor.link_frames()
-    assert run.actor.contacts is not None
-    assert run.actor.contacts.touching.sum() > 2
+        run.simulated.link_frames()
+    assert run.simulated.contacts is not None
+    assert run.simulated.contacts.touching.sum() > 2
     run.watches_contacts = False
 
 
@@ -90,13 +90,13 @@ def test_a_reset_forgets_contacts_pushes_and_commands_on_their_way() -> None:
         run.watches_contacts = True
         for effort in humanoid_efforts(60, size=2.0):
             run.advance(effort, a_push("chest", 10.0, 0.0, 0.0))
-        assert run.actor.contacts is not None and run.actor.contacts.touching.any()
+        assert run.simulated.contacts is not None and run.simulated.contacts.touching.any()
 
         run.reset()
 
-        assert run.actor.pushes == ()
-        assert run.actor.contacts is not None
-        assert not run.actor.contacts.touching.any()
+        assert run.simulated.pushes == ()
+        assert run.simulated.contacts is not None
+        assert not run.simulated.contacts.touching.any()
         for effort in humanoid_efforts(2, size=2.0):
             applied = run.advance(effort).effort
             np.testing.assert_array_equal(applied, np.zeros(HUMANOID.size))
@@ -117,7 +117,7 @@ def test_a_reset_helps_after_a_divergence() -> None:
 
 def touch_each_other(run: Simulation) -> bool:
     """Whether the two bodies of a simulation are in contact with each other."""
-    one, other = (actor._body for actor in run.characters)
+    one, other = (simulated._body for simulated in run.characters)
     return bool(pybullet.getContactPoints(one._body, other._body, physicsClientId=one._client))
 
 
@@ -139,13 +139,13 @@ def test_a_reset_of_two_humanoids_in_contact_is_a_fresh_simulation_to_the_bit(
 
         used.reset()
 
-        assert [actor.state.stamp_ns for actor in used.characters] == [used.stamp_ns] * 2
+        assert [simulated.state.stamp_ns for simulated in used.characters] == [used.stamp_ns] * 2
         touched = False
         for both in zip(*efforts, strict=True):
             used.step(both)
             fresh.step(both)
             touched |= touch_each_other(used)
-            for actor, expected in zip(used.characters, fresh.characters, strict=True):
-                assert actor.state.position.tobytes() == expected.state.position.tobytes()
-                assert actor.state.velocity.tobytes() == expected.state.velocity.tobytes()
+            for simulated, expected in zip(used.characters, fresh.characters, strict=True):
+                assert simulated.state.position.tobytes() == expected.state.position.tobytes()
+                assert simulated.state.velocity.tobytes() == expected.state.velocity.tobytes()
         assert touched

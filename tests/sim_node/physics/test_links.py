@@ -101,9 +101,9 @@ def test_looking_at_links_changes_no_bit_of_what_follows(name: str) -> None:
         for effort in efforts:
             expected = blind.advance(effort)
 
-            watched.actor.link_frames()
+            watched.simulated.link_frames()
             state = watched.advance(effort)
-            watched.actor.link_frames()
+            watched.simulated.link_frames()
 
             assert state.position.tobytes() == expected.position.tobytes()
             assert state.velocity.tobytes() == expected.velocity.tobytes()

@@ -63,7 +63,7 @@ def pose_within_limits(rng: np.random.Generator) -> FloatArray:
 
 def dropped(run: LoneSimulation, rng: np.random.Generator) -> None:
     """Put it 0.3 to 1.5 m above the ground at up to 2 m/s and 3 rad/s, touching nothing."""
-    body, still = run.actor._body, np.zeros(LAYOUT.size)
+    body, still = run.simulated._body, np.zeros(LAYOUT.size)
     for _ in range(200):
         position = pose_within_limits(rng)
         body.set_state(position, still)
@@ -81,7 +81,7 @@ def dropped(run: LoneSimulation, rng: np.random.Generator) -> None:
 
 def energies(run: LoneSimulation) -> tuple[float, float]:
     """Kinetic and all energy by the engine's numbers, J; the ground is the zero level."""
-    motions = link_motions(run.actor._body, HUMANOID)
+    motions = link_motions(run.simulated._body, HUMANOID)
     kinetic = sum(motion.kinetic_energy for motion in motions)
     height = sum(motion.mass * GRAVITY * float(motion.centre[2]) for motion in motions)
     return kinetic, kinetic + height

@@ -206,9 +206,9 @@ def test_a_push_acts_over_the_whole_tick_and_not_beyond_it(substeps: int) -> Non
         "humanoid", initial_position=start, substeps=substeps, rate=1000, gravity=0.0
     ) as run:
         run.advance(nothing, a_push("chest", force))
-        pushed, _ = momentum(run.actor._body, whole)
+        pushed, _ = momentum(run.simulated._body, whole)
         run.advance(nothing)
-        coasting, _ = momentum(run.actor._body, whole)
+        coasting, _ = momentum(run.simulated._body, whole)
 
     # the impulse is the force times the tick
     np.testing.assert_allclose(pushed, np.array(force) / 1000.0, rtol=2e-2)
@@ -229,11 +229,11 @@ def test_a_push_stays_in_the_world_while_its_link_turns() -> None:
         initial_position=start,
         initial_velocity=spin,
     ) as run:
-        before, _ = momentum(run.actor._body, whole)
+        before, _ = momentum(run.simulated._body, whole)
         push = a_push("root", force)
 
         run.advance(np.zeros(HUMANOID.size), push)
-        after, _ = momentum(run.actor._body, whole)
+        after, _ = momentum(run.simulated._body, whole)
 
     # had it turned with the link, a half of it would be along y
     np.testing.assert_allclose(after - before, [30.0, 0.0, 0.0], rtol=0.0, atol=0.5)
@@ -242,14 +242,14 @@ def test_a_push_stays_in_the_world_while_its_link_turns() -> None:
 def test_the_actor_keeps_what_pushed_it_in_the_last_tick() -> None:
     push = a_push("neck", (1.0, 2.0, 3.0))
     with simulation("humanoid") as run:
-        assert run.actor.pushes == ()
+        assert run.simulated.pushes == ()
 
         run.advance(np.zeros(HUMANOID.size), push)
-        during = run.actor.pushes
+        during = run.simulated.pushes
         run.advance(np.zeros(HUMANOID.size))
 
         assert during == (push,)
-        assert run.actor.pushes == ()
+        assert run.simulated.pushes == ()
 
 
 # --- contacts ------------------------------------------------------------------------------------
@@ -268,9 +268,9 @@ def test_watching_the_contacts_changes_no_bit_of_what_follows(substeps: int) -> 
 
             assert state.position.tobytes() == expected.position.tobytes()
             assert state.velocity.tobytes() == expected.velocity.tobytes()
-        assert blind.actor.contacts is None
-        assert watching.actor.contacts is not None
-        assert watching.actor.contacts.touching.any()
+        assert blind.simulated.contacts is None
+        assert watching.simulated.contacts is not None
+        assert watching.simulated.contacts.touching.any()
 
 
 def test_a_contact_in_any_of_a_ticks_substeps_is_one() -> None:
@@ -282,13 +282,13 @@ def test_a_contact_in_any_of_a_ticks_substeps_is_one() -> None:
             touched, wrenches = np.zeros(len(LINKS), dtype=np.bool_), np.zeros((len(LINKS), 6))
             for _ in range(4):
                 fine.advance(effort)
-                assert fine.actor.contacts is not None
-                touched |= fine.actor.contacts.touching
-                wrenches += 0.25 * fine.actor.contacts.wrenches
+                assert fine.simulated.contacts is not None
+                touched |= fine.simulated.contacts.touching
+                wrenches += 0.25 * fine.simulated.contacts.wrenches
 
-            assert coarse.actor.contacts is not None
-            np.testing.assert_array_equal(coarse.actor.contacts.touching, touched)
-            np.testing.assert_allclose(coarse.actor.contacts.wrenches, wrenches, atol=1e-9)
+            assert coarse.simulated.contacts is not None
+            np.testing.assert_array_equal(coarse.simulated.contacts.touching, touched)
+            np.testing.assert_allclose(coarse.simulated.contacts.wrenches, wrenches, atol=1e-9)
 
 
 # --- errors --------------------------------------------------------------------------------------
@@ -329,7 +329,7 @@ def test_the_listed_joints_are_commanded_and_by_default_all_but_the_root(
     with simulation("humanoid", **given) as run:
         expected = HUMANOID.mask(joints or HUMANOID.actuated_joint_names)
 
-        np.testing.assert_array_equal(run.actor.commanded, expected)
+        np.testing.assert_array_equal(run.simulated.commanded, expected)
 
 
 def test_an_unknown_commanded_joint_is_an_error_that_lists_those_that_exist() -> None:

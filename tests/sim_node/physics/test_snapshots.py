@@ -47,15 +47,17 @@ def fresh(plan: Plan) -> Simulation:
 def advance(plan: Plan, simulation: Simulation, ticks: int, noise: float = 0.0) -> FloatArray:
     """Advance under control with some noise (N m); what the states and efforts were (ticks, 3n)."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    (actor,), rng = simulation.characters, np.random.default_rng(3)
+    (simulated,), rng = simulation.characters, np.random.default_rng(3)
     episode_ns, rows = simulation.clock.stamp_ns(1), []
     for _ in range(ticks):
-        effort, _ = controller.compute_effort(actor.state, episode_ns)
+        effort, _ = controller.compute_effort(simulated.state, episode_ns)
         effort = effort + noise * rng.normal(size=len(effort))
-        simulation.step([np.where(actor.commanded, effort, 0.0)])
-        assert actor.state.effort is not None
+        simulation.step([np.where(simulated.commanded, effort, 0.0)])
+        assert simulated.state.effort is not None
         rows.append(
-            np.concatenate((actor.state.position, actor.state.velocity, actor.state.effort))
+            np.concatenate(
+                (simulated.state.position, simulated.state.velocity, simulated.state.effort)
+            )
         )
     return np.array(rows)
 

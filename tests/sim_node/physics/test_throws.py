@@ -82,14 +82,18 @@ def walked(
 ) -> tuple[list[FloatArray], list[bool]]:
     """States (2 n + 13 m,), with those of the balls; whether a ball touched in each tick."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    (actor,) = simulation.characters
+    (simulated,) = simulation.characters
     rows, hits = [], []
     for _ in range(ticks):
-        effort, _ = controller.compute_effort(actor.state, simulation.clock.stamp_ns(1))
+        effort, _ = controller.compute_effort(simulated.state, simulation.clock.stamp_ns(1))
         simulation.step([effort], None, (throws or {}).get(simulation.tick, ()))
         rows.append(
             np.concatenate(
-                (actor.state.position, actor.state.velocity, simulation.ball_motion().ravel())
+                (
+                    simulated.state.position,
+                    simulated.state.velocity,
+                    simulation.ball_motion().ravel(),
+                )
             )
         )
         hits.append(_a_ball_touches(simulation))
