@@ -18,7 +18,7 @@ from controller_node.planner import settings as planner_settings
 from controller_node.planner.compiled.rollout import Desired
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.search.cost import Comparison
-from controller_node.planner.search.rollouts import Rollouts
+from controller_node.planner.search.rollout_pool import RolloutPool
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.messages.clock import TickClock
@@ -91,8 +91,8 @@ class _World:
         self._knots = np.zeros((2, character.layout.size - 6))
 
     def steps_a_second(self, workers: int) -> float:
-        """Rollouts' steps a wall second."""
-        rollouts, start = Rollouts(self._model, workers), self._desired(0.3)
+        """RolloutPool' steps a wall second."""
+        rollouts, start = RolloutPool(self._model, workers), self._desired(0.3)
         plans = np.repeat(self._knots[np.newaxis], _SAMPLES, axis=0)
         durations = []
         for _ in range(_ROUNDS):
@@ -104,7 +104,7 @@ class _World:
     def errors(self, moment: float) -> FloatArray:
         """How far the centre of mass is off that foreseen, m, after each of `_AHEAD`."""
         desired = self._desired(moment)
-        features, sound = Rollouts(self._model, 1).simulate(
+        features, sound = RolloutPool(self._model, 1).simulate(
             desired.positions[0], desired.velocities[0], self._knots[None], desired, self._body
         )
         assert sound.all()

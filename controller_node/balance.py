@@ -44,7 +44,7 @@ class GroundWrenches:
     moments: FloatArray  # (2, 3) about those points, N m
 
 
-class Balance:
+class BalanceController:
     """The virtual force of a character that stands on two feet, as joint efforts.
 
     It has no memory: the same state gets the same effort.

@@ -129,8 +129,8 @@ def scale_gains(layout: JointLayout, gains: GainArrays, strengths: FloatArray) -
 
 def scale_limits(limits: FloatArray, strengths: FloatArray) -> FloatArray:
     """Effort limits (b,) scaled by strengths (b,); infinity times 0 is 0."""
-    weak = strengths > 0.0
-    return np.where(weak, limits * np.where(weak, strengths, 1.0), 0.0)
+    driven = strengths > 0.0
+    return np.where(driven, limits * np.where(driven, strengths, 1.0), 0.0)
 
 
 # Laws by name

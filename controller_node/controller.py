@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.balance import Balance, BalanceGains
+from controller_node.balance import BalanceController, BalanceGains
 from controller_node.behaviours.base import (
     BehaviourChoice,
     BehaviourOutput,
@@ -95,7 +95,7 @@ class Controller:
         self._model = DynamicsModel(character, gravity)
         check_inertia(self._model, character)
         self._context = LawContext(self.layout, self._model, self.clock.period_s, series)
-        self._balance = Balance(character, character.feet) if character.feet else None
+        self._balance = BalanceController(character, character.feet) if character.feet else None
         self.check(settings)
         self._settings = settings
         choice = behaviour or BehaviourChoice()
@@ -229,8 +229,8 @@ class Controller:
             offset=self._offset(acting, gains),
         )
         effort = self._effort(tracking, gains)
-        if self.planner is not None and self.planner.late_commands is not None:
-            self.planner.late_commands.send(tick, effort)
+        if self.planner is not None and self.planner.in_flight is not None:
+            self.planner.in_flight.send(tick, effort)
         now = tracking.now
         if acting is not state:  # the reference that is published is that of the state's stamp
             now = self._tracked.desired_at(self._tracked.tick(stamp_ns))
@@ -238,7 +238,7 @@ class Controller:
 
     def _state_then(self, tick: int, state: StampedState) -> StampedState:
         """The state in which the answer to a tick's state acts, as far as it can be foreseen."""
-        late = None if self.planner is None else self.planner.late_commands
+        late = None if self.planner is None else self.planner.in_flight
         if late is None:
             return state
         position, velocity = late.state_then(tick, state.position, state.velocity)

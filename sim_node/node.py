@@ -38,7 +38,7 @@ from sim_node.physics.simulation import Simulation
 from sim_node.timing.flow_control import FlowControl
 from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
 from sim_node.timing.rate_limiter import RateLimiter
-from sim_node.timing.run_state import RunControl
+from sim_node.timing.run_control import RunControl
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
@@ -123,7 +123,7 @@ class SimNode(Node):
         try:
             self._begin(stop, executor)
             while not stop and not self._finished:
-                self._turn(executor)
+                self._spin_once(executor)
         finally:
             self._run_services.end(executor)
             self._publish_diagnostics()
@@ -160,7 +160,7 @@ class SimNode(Node):
         wait_for_subscribers(self, publishers, self._settings.wait_for_subscribers, stop, executor)
         self._begin_episode()
 
-    def _turn(self, executor: PollingExecutor) -> None:
+    def _spin_once(self, executor: PollingExecutor) -> None:
         """Take commands, and advance if the tick is complete and due; or rest."""
         received = self._receive()
         if received:
@@ -175,7 +175,7 @@ class SimNode(Node):
             executor.serve()
         else:
             self._advance()  # before the clock: a command that came in time is no timeout
-        self._look_at_the_clock()
+        self._run_watchdog()
 
     def _receive(self) -> bool:
         """Take one command a character, or all in real time; whether there was one."""
@@ -241,7 +241,7 @@ class SimNode(Node):
         else:
             self._raise_fault(describe_conflict(self, character.conflict, character.torques))
 
-    def _look_at_the_clock(self) -> None:
+    def _run_watchdog(self) -> None:
         now = time.monotonic()
         if now >= self._next_diagnostics:
             self._next_diagnostics = now + DIAGNOSTICS_PERIOD

@@ -30,7 +30,7 @@ _NEAR = 1e-4
 
 
 @dataclass(frozen=True)
-class Balance:
+class MotionResidual:
     """The parts of the equation of one tick, generalised forces (n,): N or N m an entry."""
 
     inertial: FloatArray  # M (v' - v) / h
@@ -84,7 +84,7 @@ class EquationOfMotion:
         next_velocity: FloatArray,  # (n,) of that state
         contacts: FloatArray,  # (links, 6) N, N m; world axes, at the centres of mass
         pushes: Sequence[ExternalWrench] = (),
-    ) -> Balance:
+    ) -> MotionResidual:
         """The parts of the equation of one tick."""
         model = self._model
         model.update(position, velocity)
@@ -92,7 +92,7 @@ class EquationOfMotion:
         # the simulator's own passive forces: its damping may be bounded, and it has soft limits
         passive = self._passive.effort(position, velocity)
         reached = position + self._period * next_velocity  # where it counts, of hinges and sliders
-        return Balance(
+        return MotionResidual(
             inertial=model.mass_matrix() @ acceleration,
             bias=model.bias_force() - self._damping * velocity - passive,
             applied=effort,

@@ -162,7 +162,7 @@ class _Watch:
         if tick % round(EVERY * self.rate):
             return
         here, there = self._centre_at(state.position), self._centre_at(wanted.position)
-        placed = anchor.out_of(there[np.newaxis])[0]
+        placed = anchor.to_world(there[np.newaxis])[0]
         self.errors.append(float(np.linalg.norm(here - placed)))
         self.away = float(np.linalg.norm(placed - there))
         root, clip = rotations.exp(state.position[3:6]), rotations.exp(wanted.position[3:6])

@@ -23,7 +23,7 @@ _SLOWLY = 0.15  # m/s, at most, of the place on the way back
 
 
 @dataclass(frozen=True)
-class Balance:
+class PlanarState:
     """How a character moves over the ground, in the world or in the reference's."""
 
     centre: complex  # m, of the centre of mass, x + i y
@@ -43,7 +43,9 @@ class Anchor:
         """Whether the reference goes where the character is, at a time in s."""
         return time < self.calm_from
 
-    def into(self, position: FloatArray, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def to_reference_world(
+        self, position: FloatArray, velocity: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """A state of the world in the reference's: MuJoCo's position (q,), velocity (n,)."""
         if self.place == 0 and self.yaw == 0.0:
             return position, velocity  # to the last bit
@@ -56,13 +58,15 @@ class Anchor:
         position[3:7] = rotations.wxyz_from_xyzw(turned)
         return position, velocity
 
-    def out_of(self, points: FloatArray) -> FloatArray:
+    def to_world(self, points: FloatArray) -> FloatArray:
         """Points (m, 3) of the reference's world in the world, m."""
         shift = np.array((self.place.real, self.place.imag, 0.0))
         placed: FloatArray = rotations.rotate(rotations.about_z(self.yaw), points) + shift
         return placed
 
-    def follow(self, state: Balance, wanted: Balance, time: float, elapsed: float) -> "Anchor":
+    def follow(
+        self, state: PlanarState, wanted: PlanarState, time: float, elapsed: float
+    ) -> "Anchor":
         """Where it is next, after a look at a state and at the reference, both in the latter's.
 
         Args:
@@ -95,7 +99,7 @@ class Anchor:
         return replace(self, place=place, yaw=yaw)
 
 
-def balance_of(position: FloatArray, velocity: FloatArray, centre: FloatArray) -> Balance:
+def planar_state(position: FloatArray, velocity: FloatArray, centre: FloatArray) -> PlanarState:
     """The balance of a state.
 
     Args:
@@ -104,7 +108,7 @@ def balance_of(position: FloatArray, velocity: FloatArray, centre: FloatArray) -
         centre: Of mass (3,), m.
     """
     root = rotations.xyzw_from_wxyz(position[3:7])
-    return Balance(complex(*centre[:2]), complex(*velocity[:2]), root)
+    return PlanarState(complex(*centre[:2]), complex(*velocity[:2]), root)
 
 
 def _heading(root: FloatArray, wanted: FloatArray) -> float:

@@ -10,7 +10,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages.state import StampedState
 
 if TYPE_CHECKING:
-    from controller_node.planner.late_commands import LateCommands  # needs numba
+    from controller_node.planner.commands_in_flight import CommandsInFlight  # needs numba
 
 DesiredAt = Callable[[int], ReferenceState]
 """The desired state of a tick, counted from the episode's first state."""
@@ -20,7 +20,7 @@ class Planner(Protocol):
     """What keeps a motion by offsets to the tracking errors. It remembers the ticks before."""
 
     @property
-    def late_commands(self) -> "LateCommands | None":
+    def in_flight(self) -> "CommandsInFlight | None":
         """The commands that have not acted yet; None where they act at once."""
 
     def while_waiting(self, act: Callable[[], None]) -> None:

@@ -13,9 +13,9 @@ import numpy as np
 
 from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.features import Watched
-from controller_node.planner.compiled.law import Joints, Law
+from controller_node.planner.compiled.law import Joints, LawGains
 from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
-from controller_node.planner.compiled.rollout import Body, Engine
+from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
 from controller_node.planner.compiled.soft_limits import SoftLimits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import add_links, compile_exactly, quaternion_starts
@@ -86,11 +86,11 @@ class ContactModel:
         mujoco.mj_differentiatePos(self._model, found, 1.0, self._identity, position)
         return found
 
-    def body(self, gains: GainArrays) -> Body:
+    def body(self, gains: GainArrays) -> RolloutModel:
         """What rollouts need of the character and its gains; the root's do not count."""
         layout = self._character.layout
         actuated = np.arange(layout.size) >= 6
-        law = Law(
+        law = LawGains(
             self._period_s,
             np.where(actuated, gains.stiffness, 0.0),
             np.where(actuated, gains.damping, 0.0),
@@ -100,14 +100,14 @@ class ContactModel:
             layout.vector_lengths,
         )
         watched = Watched(np.array(self.end_effectors, dtype=np.intp) + 1, self._character.mass)
-        return Body(self._tree, self._joints, self._limits, law, watched)
+        return RolloutModel(self._tree, self._joints, self._limits, law, watched)
 
-    def engine(self) -> Engine:
+    def engine(self) -> EngineBuffers:
         """Something that simulates it, for one thread."""
         data, law = mujoco.MjData(self._model), mujoco.MjData(self._model)
         self._data += [data, law]  # they must outlive what points into them
         model = self._model._address
-        return Engine(
+        return EngineBuffers(
             model,
             data._address,
             data.qpos,

@@ -15,7 +15,7 @@ from msgs_config.parameters import Values
 from msgs_config.shared_parameters import COMMAND_DELAY
 
 if TYPE_CHECKING:
-    from controller_node.planner.late_commands import LateCommands  # needs numba
+    from controller_node.planner.commands_in_flight import CommandsInFlight  # needs numba
 
 
 def check_planning(character: Character, values: Values) -> None:
@@ -43,7 +43,7 @@ def make_planner(character: Character, values: Values) -> Planner | None:
     check_planner(character, values)
     if name == RECORDED:
         plan = _recorded_plan(character, values)
-        return RecordedPlanner(plan, _late_commands(character, values))
+        return RecordedPlanner(plan, _commands_in_flight(character, values))
     settings = make_settings(character, values)
     with saying_what_it_needs(name):
         from controller_node.planner.planner import PredictivePlanner
@@ -68,21 +68,21 @@ def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
     return plan
 
 
-def _late_commands(character: Character, values: Values) -> "LateCommands | None":
+def _commands_in_flight(character: Character, values: Values) -> "CommandsInFlight | None":
     """The commands on their way, where they take a tick or more."""
     delay = values.integer(COMMAND_DELAY.name)
     if not delay:
         return None
     with saying_what_it_needs(f"{RECORDED}' with '{COMMAND_DELAY.name}"):
+        from controller_node.planner.commands_in_flight import CommandsInFlight
         from controller_node.planner.contact_model import ContactModel
-        from controller_node.planner.late_commands import LateCommands
     model = ContactModel(
         character,
         period_s=1.0 / values.integer("rate"),
         gravity=values.number("gravity"),
         friction=values.number("plan.friction"),
     )
-    return LateCommands(character, model, delay)
+    return CommandsInFlight(character, model, delay)
 
 
 @contextmanager

@@ -17,17 +17,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from controller_node.control_laws import GainArrays
-from controller_node.planner.anchor import Anchor, Balance, balance_of
+from controller_node.planner.anchor import Anchor, PlanarState, planar_state
 from controller_node.planner.base import DesiredAt
-from controller_node.planner.compiled.rollout import Body
+from controller_node.planner.commands_in_flight import CommandsInFlight
+from controller_node.planner.compiled.rollout import RolloutModel
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.course import Course, Target
-from controller_node.planner.late_commands import LateCommands
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.plan import Plan
+from controller_node.planner.sampled_reference import SampledReference, Target
 from controller_node.planner.search.cost import Comparison
 from controller_node.planner.search.plan_search import PlanSearch, Start
-from controller_node.planner.search.rollouts import Rollouts
+from controller_node.planner.search.rollout_pool import RolloutPool
 from controller_node.planner.settings import PlannerSettings
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
@@ -47,7 +47,7 @@ class PlannerSnapshot:
 
 
 @dataclass(frozen=True)
-class Coming:
+class PendingPlan:
     """A plan that is being sought."""
 
     seen: int  # tick of the state from which
@@ -73,20 +73,20 @@ class PredictivePlanner:
         self._model = ContactModel(
             character, period_s=1.0 / rate_hz, gravity=gravity, friction=settings.friction
         )
-        self._rollouts = Rollouts(self._model, settings.workers)
-        self.late_commands = (
-            LateCommands(character, self._model, settings.delay) if settings.delay else None
+        self._rollouts = RolloutPool(self._model, settings.workers)
+        self.in_flight = (
+            CommandsInFlight(character, self._model, settings.delay) if settings.delay else None
         )
         self._comparison = Comparison(character, self._model, settings)
         self._search = PlanSearch(self._rollouts, self._comparison, settings, rate_hz)
-        self._course = Course(self._model, self._rollouts, settings)
+        self._reference = SampledReference(self._model, self._rollouts, settings)
         self._thread = ThreadPoolExecutor(1)
         self._act: Callable[[], None] = lambda: None
         self._rate_hz = rate_hz
         self._seed = settings.seed
         self._episode = 0
         self._plan: Plan | None = None
-        self._coming: Coming | None = None
+        self._coming: PendingPlan | None = None
         self._anchor = Anchor()
         self._compile(character)
 
@@ -103,9 +103,9 @@ class PredictivePlanner:
         """Forget plan and reference; `episode` is the tick of the episode's first state."""
         self._episode = episode
         self.rest()
-        self._course.forget()
-        if self.late_commands is not None:
-            self.late_commands.forget()
+        self._reference.forget()
+        if self.in_flight is not None:
+            self.in_flight.forget()
 
     @property
     def plan(self) -> Plan | None:
@@ -115,19 +115,19 @@ class PredictivePlanner:
     def snapshot(self) -> PlannerSnapshot:
         """What it goes on from while no plan is sought, for this planner or an equal one."""
         assert self._coming is None
-        late = self.late_commands
+        late = self.in_flight
         return PlannerSnapshot(self._plan, self._anchor, {} if late is None else late.sent())
 
     def restore(self, snapshot: PlannerSnapshot, seed: int) -> None:
         """Go on from a snapshot, with samples of a seed."""
         self._seed, self._plan, self._anchor = seed, snapshot.plan, snapshot.anchor
         self._coming = None
-        if self.late_commands is not None:
-            self.late_commands.restore(snapshot.sent)
+        if self.in_flight is not None:
+            self.in_flight.restore(snapshot.sent)
 
     def change_reference(self) -> None:
         """Say that the reference is another one from now on; the plan in force stays."""
-        self._course.forget()
+        self._reference.forget()
         self._abandon_search()
 
     def rest(self) -> None:
@@ -148,12 +148,12 @@ class PredictivePlanner:
         self._forget_what_is_over(tick)
         self._take(tick)
         if self._plan is None:
-            self._coming = self._sought(tick, tick, state, gains, desired_at)
+            self._coming = self._start_search(tick, tick, state, gains, desired_at)
             self._take(tick)
         assert self._plan is not None
         acts = tick + self.settings.planning_delay
         if self._coming is None and acts >= self._plan.tick + self.settings.period:
-            self._coming = self._sought(tick, acts, state, gains, desired_at)
+            self._coming = self._start_search(tick, acts, state, gains, desired_at)
             self._take(tick)
         return np.concatenate((np.zeros(6), self._plan.offsets.at(tick)))
 
@@ -166,7 +166,7 @@ class PredictivePlanner:
         """
         body, position = self._model.body(gains), self._model.position_of(state.position)
         features = self._rollouts.features_of(position, state.velocity.copy(), body)
-        return self._search.cost(features, self._course.target(tick, desired_at, body).features)
+        return self._search.cost(features, self._reference.target(tick, desired_at, body).features)
 
     def cost_ahead(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -177,7 +177,7 @@ class PredictivePlanner:
         """
         assert self._coming is None
         body, position = self._model.body(gains), self._model.position_of(state.position)
-        desired = self._course.ahead(tick, desired_at, body)
+        desired = self._reference.ahead(tick, desired_at, body)
         velocity = state.velocity.copy()
         start = Start(tick, position, velocity, desired, body, Anchor(), gives_way=False)
         return self._search.cost_ahead(start, self._plan)
@@ -189,12 +189,12 @@ class PredictivePlanner:
         still = ReferenceState(layout.configuration(rest), nothing, nothing)
         gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
         body = self._model.body(gains)
-        desired = self._course.ahead(0, lambda _: still, body)
+        desired = self._reference.ahead(0, lambda _: still, body)
         position = self._model.position_of(rest)
         self._search.rehearse(
             Start(0, position, nothing, desired, body, self._anchor, gives_way=False)
         )
-        self._course.forget()
+        self._reference.forget()
 
     def _forget_what_is_over(self, tick: int) -> None:
         """Plan again from a state of before, which comes once more, or beyond the plan's end."""
@@ -228,32 +228,34 @@ class PredictivePlanner:
             plan = replace(plan, outlook=replace(plan.outlook, times=plan.outlook.times - late))
         self._plan = plan
 
-    def _sought(
+    def _start_search(
         self, tick: int, acts: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
-    ) -> Coming:
+    ) -> PendingPlan:
         """A plan that acts from a later tick on, from the state to which this one will lead."""
         body = self._model.body(gains)
-        target = self._course.target(tick, desired_at, body)
-        position, velocity = self._look(tick, state, body, target)
+        target = self._reference.target(tick, desired_at, body)
+        position, velocity = self._observe(tick, state, body, target)
         if self._plan is not None and acts > tick:
             offsets = self._plan.offsets
-            between = self._course.between(tick, acts, offsets.first_knot, desired_at, body)
+            between = self._reference.between(tick, acts, offsets.first_knot, desired_at, body)
             position, velocity = self._rollouts.state_after(
                 position, velocity, offsets, between, body
             )
-        desired = self._course.ahead(acts, desired_at, body)
+        desired = self._reference.ahead(acts, desired_at, body)
         gives_way = self._anchor.gives_way(tick / self._rate_hz)
         start = Start(tick, position, velocity, desired, body, self._anchor, gives_way)
         seed = (self._seed, self._episode)
-        return Coming(tick, acts, self._thread.submit(self._search.find, start, self._plan, seed))
+        return PendingPlan(
+            tick, acts, self._thread.submit(self._search.find, start, self._plan, seed)
+        )
 
-    def _look(
-        self, tick: int, state: StampedState, body: Body, target: Target
+    def _observe(
+        self, tick: int, state: StampedState, body: RolloutModel, target: Target
     ) -> tuple[FloatArray, FloatArray]:
         """A state in the reference's world, (q,) and (n,), which may have given way to it."""
         position = self._model.position_of(state.position)
         velocity = state.velocity.copy()  # a message's cannot be written to: another type
-        seen = self._anchor.into(position, velocity)
+        seen = self._anchor.to_reference_world(position, velocity)
         features = self._rollouts.features_of(*seen, body)
         since_plan = tick - (tick if self._plan is None else self._plan.seen)
         self._anchor = self._anchor.follow(
@@ -262,8 +264,8 @@ class PredictivePlanner:
             tick / self._rate_hz,
             since_plan / self._rate_hz,
         )
-        return self._anchor.into(position, velocity)
+        return self._anchor.to_reference_world(position, velocity)
 
-    def _balance(self, position: FloatArray, features: FloatArray) -> Balance:
+    def _balance(self, position: FloatArray, features: FloatArray) -> PlanarState:
         centre, velocity = self._comparison.balance(features)
-        return balance_of(position, velocity, centre)
+        return planar_state(position, velocity, centre)

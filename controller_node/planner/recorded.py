@@ -13,7 +13,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages.state import StampedState
 
 if TYPE_CHECKING:
-    from controller_node.planner.late_commands import LateCommands  # needs numba
+    from controller_node.planner.commands_in_flight import CommandsInFlight  # needs numba
 
 
 class RecordedPlanner:
@@ -21,9 +21,9 @@ class RecordedPlanner:
 
     outlook: Outlook | None = None
 
-    def __init__(self, plan: RecordedPlan, late_commands: "LateCommands | None" = None) -> None:
+    def __init__(self, plan: RecordedPlan, in_flight: "CommandsInFlight | None" = None) -> None:
         self._plan = plan
-        self.late_commands = late_commands
+        self.in_flight = in_flight
 
     def while_waiting(self, act: Callable[[], None]) -> None:
         """It waits for no plan."""
@@ -31,8 +31,8 @@ class RecordedPlanner:
     def begin_episode(self, episode: int) -> None:
         """Start over."""
         del episode
-        if self.late_commands is not None:
-            self.late_commands.forget()
+        if self.in_flight is not None:
+            self.in_flight.forget()
 
     def change_reference(self) -> None:
         """The offsets are added to whatever is tracked."""

@@ -105,8 +105,8 @@ class CharacterInterface:
             self.commands.counts[CommandStatus.REJECTED] += 1
             self._once_logger.log_once(f"command{self._of} rejected: {error}")
             return CommandStatus.REJECTED
-        is_late = status is CommandStatus.STALE and command.stamp_ns == 0
-        if status is CommandStatus.FUTURE or is_late:
+        is_unstamped = status is CommandStatus.STALE and command.stamp_ns == 0
+        if status is CommandStatus.FUTURE or is_unstamped:
             self._once_logger.log_once(
                 f"command{self._of} dropped: it answers {command.stamp_ns} ns, the state is of "
                 f"{self.commands.stamp_ns} ns; the stamp must be that of the state",

@@ -9,7 +9,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from msgs_config.errors import CommandError
 from msgs_config.runtime.polling import PollingExecutor
-from sim_node.timing.run_state import RunControl
+from sim_node.timing.run_control import RunControl
 
 
 class Services:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controller_node.balance import Balance, BalanceGains
+from controller_node.balance import BalanceController, BalanceGains
 from controller_node.control_laws import stable_pd_effort
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -49,8 +49,8 @@ def humanoid() -> Character:
 
 
 @pytest.fixture(scope="module")
-def balance(humanoid: Character) -> Balance:
-    return Balance(humanoid, FEET)
+def balance(humanoid: Character) -> BalanceController:
+    return BalanceController(humanoid, FEET)
 
 
 def bent_pose(humanoid: Character) -> FloatArray:
@@ -162,7 +162,7 @@ def test_the_weight_is_what_gravity_does_to_the_root(humanoid: Character) -> Non
 
 
 def test_the_feet_together_exert_the_virtual_force_through_the_centre_of_mass(
-    humanoid: Character, balance: Balance
+    humanoid: Character, balance: BalanceController
 ) -> None:
     # Arrange: the body leans on flat soles, so little that none is at its limit
     gains = BalanceGains()
@@ -185,7 +185,7 @@ def test_the_feet_together_exert_the_virtual_force_through_the_centre_of_mass(
 
 @pytest.mark.parametrize("side", [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5), (0.4, -0.3)])
 def test_the_centre_of_pressure_stays_inside_the_soles_and_the_force_inside_the_cone(
-    humanoid: Character, balance: Balance, side: tuple[float, float]
+    humanoid: Character, balance: BalanceController, side: tuple[float, float]
 ) -> None:
     # Arrange: it falls fast, with its soles flat
     position = bent_pose(humanoid)
@@ -210,7 +210,9 @@ def test_the_centre_of_pressure_stays_inside_the_soles_and_the_force_inside_the_
     assert (alone == pytest.approx(model.weight)) == (side[1] != 0.0)
 
 
-def test_the_soles_are_the_lower_faces_of_the_feet(humanoid: Character, balance: Balance) -> None:
+def test_the_soles_are_the_lower_faces_of_the_feet(
+    humanoid: Character, balance: BalanceController
+) -> None:
     rest = np.array(humanoid.rest_position)
 
     ground = balance.ground_wrenches(still(humanoid, rest), BalanceGains())
@@ -223,7 +225,7 @@ def test_the_soles_are_the_lower_faces_of_the_feet(humanoid: Character, balance:
 # The effort
 
 
-def test_the_effort_is_statics_by_hand(humanoid: Character, balance: Balance) -> None:
+def test_the_effort_is_statics_by_hand(humanoid: Character, balance: BalanceController) -> None:
     # Arrange: what each joint has to hold by the engine's own numbers, link by link
     position = bent_pose(humanoid)
     position += np.random.default_rng(6).uniform(-0.2, 0.2, humanoid.layout.size)
@@ -294,7 +296,7 @@ def below(whole: Character, index: int) -> list[int]:
 
 
 def test_without_gains_and_over_the_feet_nothing_would_move(
-    humanoid: Character, balance: Balance
+    humanoid: Character, balance: BalanceController
 ) -> None:
     # Arrange: the ground's wrenches hold the root, the effort the joints
     model = still(humanoid, bent_pose(humanoid))
@@ -329,7 +331,7 @@ class Stance:
         driver = controller("humanoid", root_assistance=False, rate=rate_hz, **SOFT_HIPS)
         self._posture = driver.settings.gains
         self._model, self._period = DynamicsModel(humanoid), 1.0 / rate_hz
-        self._balance, self._gains = Balance(humanoid, FEET), gains
+        self._balance, self._gains = BalanceController(humanoid, FEET), gains
         self.states = b""
 
     def effort(self) -> FloatArray:
@@ -439,7 +441,7 @@ def test_it_withstands_a_push(humanoid: Character, impulse: tuple[float, float])
 
 @pytest.mark.parametrize("turn", [(-1.5, 0.0, 0.0), (1.5, 0.0, 0.0), (0.0, 1.5, 0.0)])
 def test_once_it_lies_nothing_is_added(
-    humanoid: Character, balance: Balance, turn: tuple[float, float, float]
+    humanoid: Character, balance: BalanceController, turn: tuple[float, float, float]
 ) -> None:
     position = bent_pose(humanoid)
     position[3:6] = turned(position[3:6], turn)
@@ -468,4 +470,4 @@ def test_feet_that_cannot_be_balanced_on_are_refused(
     name: str, feet: list[str], message: str
 ) -> None:
     with pytest.raises(CharacterError, match=message):
-        Balance(character(name), feet)
+        BalanceController(character(name), feet)

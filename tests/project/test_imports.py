@@ -17,7 +17,7 @@ ENGINES = {  # who imports them; how far they are known beyond that is in pyproj
     "pybullet": {"msgs_config/character/bullet.py"},
     "mujoco": {
         "msgs_config/character/dynamics.py",
-        "controller_node/planner/compiled/engine.py",
+        "controller_node/planner/compiled/mujoco_functions.py",
         "controller_node/planner/contact_model.py",
     },
 }

@@ -22,7 +22,7 @@ class Joints(NamedTuple):
     scalar_velocities: IntArray  # (h,)
 
 
-class Law(NamedTuple):
+class LawGains(NamedTuple):
     """Gains and limits of the law; the root's are zero."""
 
     period: float  # s, of control and of simulation
@@ -65,7 +65,7 @@ def stable_pd(
     bias: FloatArray,
     mass: FloatArray,
     tree: Tree,
-    law: Law,
+    law: LawGains,
     room: Room,
 ) -> None:
     """Write the effort (n,) against the errors in `room`, reference at the period's end.
@@ -98,7 +98,7 @@ def stable_pd(
 
 
 @compiled
-def _clip(effort: FloatArray, law: Law) -> None:
+def _clip(effort: FloatArray, law: LawGains) -> None:
     """Shorten each physical vector to its limit."""
     for vector in range(len(law.limits)):
         first = law.vector_starts[vector]

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from controller_node.planner.compiled.decorator import compiled
-from controller_node.planner.compiled.engine import step_after_forces, step_before_forces
 from controller_node.planner.compiled.features import Watched, write_features
-from controller_node.planner.compiled.law import Joints, Law, Room, add_errors, stable_pd
+from controller_node.planner.compiled.law import Joints, LawGains, Room, add_errors, stable_pd
 from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
+from controller_node.planner.compiled.mujoco_functions import step_after_forces, step_before_forces
 from controller_node.planner.compiled.soft_limits import (
     MOST_BOUNDS,
     PassedBounds,
@@ -24,7 +24,7 @@ _knot_before = compiled(knot_before)
 _FASTEST = 1e3  # rad/s or m/s; what is faster has diverged
 
 
-class Engine(NamedTuple):
+class EngineBuffers(NamedTuple):
     """MuJoCo's model and data by their addresses, and what of the data is read and written."""
 
     model: int
@@ -40,13 +40,13 @@ class Engine(NamedTuple):
     centres: FloatArray  # (bodies, 3) m, centres of mass of what each body carries
 
 
-class Body(NamedTuple):
+class RolloutModel(NamedTuple):
     """What stays the same: the character and its law."""
 
     tree: Tree
     joints: Joints
     limits: SoftLimits
-    law: Law
+    law: LawGains
     watched: Watched
 
 
@@ -68,8 +68,8 @@ def roll_out(
     start_velocity: FloatArray,
     knots: FloatArray,
     desired: Desired,
-    body: Body,
-    engine: Engine,
+    body: RolloutModel,
+    engine: EngineBuffers,
 ) -> bool:
     """Simulate a horizon and write the features (checks, f) at its checks; whether that went well.
 
@@ -107,8 +107,8 @@ def let_act(
     start_position: FloatArray,
     start_velocity: FloatArray,
     efforts: FloatArray,
-    body: Body,
-    engine: Engine,
+    body: RolloutModel,
+    engine: EngineBuffers,
 ) -> bool:
     """Simulate ticks in which given efforts (ticks, n) act; whether that went well.
 
@@ -127,7 +127,7 @@ def let_act(
 
 
 @compiled
-def _begin(position: FloatArray, velocity: FloatArray, engine: Engine) -> None:
+def _begin(position: FloatArray, velocity: FloatArray, engine: EngineBuffers) -> None:
     """Put it into a state, with nothing left of what it did before."""
     engine.position[:] = position
     engine.velocity[:] = velocity
@@ -150,7 +150,7 @@ def _room_for_bounds(n: int) -> PassedBounds:
 
 
 @compiled
-def _is_bounded(engine: Engine) -> bool:
+def _is_bounded(engine: EngineBuffers) -> bool:
     """Whether the state is one that goes on, and the forces are finite."""
     bounded = True
     for i in range(len(engine.velocity)):
@@ -173,8 +173,8 @@ def _set_offset(error: FloatArray, knots: FloatArray, tick: int, desired: Desire
 def _apply(
     target: FloatArray,
     target_velocity: FloatArray,
-    body: Body,
-    engine: Engine,
+    body: RolloutModel,
+    engine: EngineBuffers,
     room: Room,
     bounds: PassedBounds,
 ) -> None:
@@ -186,7 +186,7 @@ def _apply(
 
 
 @compiled
-def _add_passive(body: Body, engine: Engine, bounds: PassedBounds) -> None:
+def _add_passive(body: RolloutModel, engine: EngineBuffers, bounds: PassedBounds) -> None:
     """Add what the passive damping and the soft limits do to the applied forces."""
     for i in range(len(engine.velocity)):
         engine.applied[i] -= body.law.passive_damping[i] * engine.velocity[i]
@@ -202,7 +202,9 @@ def _add_passive(body: Body, engine: Engine, bounds: PassedBounds) -> None:
 
 
 @compiled
-def _write_check(row: FloatArray, target: FloatArray, body: Body, engine: Engine) -> None:
+def _write_check(
+    row: FloatArray, target: FloatArray, body: RolloutModel, engine: EngineBuffers
+) -> None:
     write_features(
         row,
         target,
@@ -219,7 +221,11 @@ def _write_check(row: FloatArray, target: FloatArray, body: Body, engine: Engine
 
 @compiled
 def features_of(
-    row: FloatArray, position: FloatArray, velocity: FloatArray, body: Body, engine: Engine
+    row: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    body: RolloutModel,
+    engine: EngineBuffers,
 ) -> None:
     """Write the features (f,) of a state against itself: those of a reference."""
     engine.position[:] = position

@@ -7,12 +7,12 @@ import numpy as np
 
 from controller_node.planner.anchor import Anchor
 from controller_node.planner.compiled.draws import normal_draws
-from controller_node.planner.compiled.rollout import Body
-from controller_node.planner.course import Foreseen
+from controller_node.planner.compiled.rollout import RolloutModel
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.plan import Plan, areas_of
+from controller_node.planner.sampled_reference import Foreseen
 from controller_node.planner.search.cost import Comparison
-from controller_node.planner.search.rollouts import Rollouts
+from controller_node.planner.search.rollout_pool import RolloutPool
 from controller_node.planner.search.round import Found, Problem, improve
 from controller_node.planner.settings import PlannerSettings
 from controller_node.references.offsets import Offsets
@@ -35,7 +35,7 @@ class Start:
     position: FloatArray  # (q,) MuJoCo's
     velocity: FloatArray  # (n,)
     desired: Foreseen
-    body: Body
+    body: RolloutModel
     anchor: Anchor
     gives_way: bool  # to what the reference cannot absorb
 
@@ -44,7 +44,7 @@ class PlanSearch:
     """Finds plans. It remembers nothing."""
 
     def __init__(
-        self, rollouts: Rollouts, comparison: Comparison, settings: PlannerSettings, rate_hz: int
+        self, rollouts: RolloutPool, comparison: Comparison, settings: PlannerSettings, rate_hz: int
     ) -> None:
         self._rollouts, self._comparison = rollouts, comparison
         self._settings, self._rate_hz = settings, rate_hz
@@ -146,4 +146,4 @@ class PlanSearch:
         numbers: FloatArray = np.arange(1.0, checks + 1.0)
         times = (settings.delay + settings.period * numbers) / self._rate_hz
         costs, others = fixed_order.dot(residuals, residuals)
-        return Outlook(times, start.anchor.out_of(centres), costs, others, start.anchor)
+        return Outlook(times, start.anchor.to_world(centres), costs, others, start.anchor)

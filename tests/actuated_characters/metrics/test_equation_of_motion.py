@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import read_recording
-from actuated_characters.metrics.equation_of_motion import Balance, EquationOfMotion
+from actuated_characters.metrics.equation_of_motion import EquationOfMotion, MotionResidual
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
@@ -51,14 +51,14 @@ class Watched:
     whole: Character
     equation: EquationOfMotion
 
-    def advance(self, effort: FloatArray, *pushes: ExternalWrench) -> Balance:
+    def advance(self, effort: FloatArray, *pushes: ExternalWrench) -> MotionResidual:
         """Take a tick."""
         self.before = self.run.state
         self.run.watches_contacts = True
         self.run.advance(effort, *pushes)
         return self.balance()
 
-    def balance(self, **instead: FloatArray | tuple[ExternalWrench, ...]) -> Balance:
+    def balance(self, **instead: FloatArray | tuple[ExternalWrench, ...]) -> MotionResidual:
         """The equation of the last tick; or of what it was not."""
         simulated, after = self.run.simulated, self.run.state
         assert after.effort is not None and simulated.contacts is not None

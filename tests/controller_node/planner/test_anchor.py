@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from controller_node.planner.anchor import Anchor, Balance, balance_of
+from controller_node.planner.anchor import Anchor, PlanarState, planar_state
 from controller_node.planner.contact_model import ContactModel
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
@@ -14,12 +14,12 @@ from tests.support.physics import character
 PERIOD = 0.05
 HUMANOID = character("humanoid")
 MODEL = ContactModel(HUMANOID, period_s=1 / 240, gravity=9.81, friction=0.45)
-STILL = Balance(0j, 0j, rotations.about_z(0.0))
+STILL = PlanarState(0j, 0j, rotations.about_z(0.0))
 
 
-def pushed(error: complex, *, heading: float = 0.0, velocity: complex = 0j) -> Balance:
+def pushed(error: complex, *, heading: float = 0.0, velocity: complex = 0j) -> PlanarState:
     """A character away from a reference that stands at the origin."""
-    return Balance(error, velocity, rotations.about_z(heading))
+    return PlanarState(error, velocity, rotations.about_z(heading))
 
 
 def random_state(seed: int) -> tuple[FloatArray, FloatArray]:
@@ -35,7 +35,7 @@ def test_undisturbed_it_stays_where_it_is_to_the_last_bit() -> None:
         anchor = anchor.follow(pushed(0.2 + 0.1j, velocity=0.4j), STILL, tick * PERIOD, PERIOD)
     position, velocity = random_state(0)
 
-    seen, moving = anchor.into(position, velocity)
+    seen, moving = anchor.to_reference_world(position, velocity)
 
     assert anchor == Anchor()
     assert seen is position
@@ -48,7 +48,7 @@ def test_a_state_is_seen_from_the_references_world(seed: int) -> None:
     anchor = Anchor(complex(*draw.normal(size=2)), draw.normal())
     position, velocity = random_state(seed)
 
-    seen, moving = anchor.into(position, velocity)
+    seen, moving = anchor.to_reference_world(position, velocity)
 
     turn = rotations.about_z(anchor.yaw)
     shift = np.array((anchor.place.real, anchor.place.imag, 0.0))
@@ -89,7 +89,7 @@ def test_the_way_back_leads_to_the_clips_own_place_and_heading() -> None:
     walking, away = 0j, list[complex]()
     for tick in range(400):
         walking += 1.2 * PERIOD
-        at_ease = Balance(walking, 1.2, STILL.root)
+        at_ease = PlanarState(walking, 1.2, STILL.root)
         turn = complex(math.cos(anchor.yaw), math.sin(anchor.yaw))
         before = turn * walking + anchor.place
         anchor = anchor.follow(at_ease, at_ease, tick * PERIOD, PERIOD)
@@ -106,7 +106,7 @@ def test_a_balance_is_read_off_a_state() -> None:
     root = rotations.multiply(rotations.about_z(0.4), rotations.ABOUT_X_QUARTER_TURN_XYZW)
     position[3:7] = rotations.wxyz_from_xyzw(root)
 
-    found = balance_of(position, np.array((3.0, 4.0, 5.0)), np.array((1.0, 2.0, 0.9)))
+    found = planar_state(position, np.array((3.0, 4.0, 5.0)), np.array((1.0, 2.0, 0.9)))
 
     assert found.centre == 1.0 + 2.0j
     assert found.velocity == 3.0 + 4.0j
@@ -119,10 +119,10 @@ def test_what_flips_over_turns_the_reference_by_how_far_it_is_off_about_z(lean: 
     wanted = np.array((0.0, math.sin(0.5 * lean), 0.0, math.cos(0.5 * lean)))
     leaning = np.array((math.sin(0.03), 0.0, 0.0, math.cos(0.03)))
     off = rotations.multiply(rotations.about_z(0.2), leaning)
-    state = Balance(0.4 + 0j, 0j, rotations.multiply(off, wanted))
+    state = PlanarState(0.4 + 0j, 0j, rotations.multiply(off, wanted))
 
     # Act
-    anchor = Anchor().follow(state, Balance(0j, 0j, wanted), 0.0, PERIOD)
+    anchor = Anchor().follow(state, PlanarState(0j, 0j, wanted), 0.0, PERIOD)
 
     # Assert
     assert anchor.yaw == pytest.approx(0.2 * PERIOD / 1.0, rel=0.02)
@@ -131,7 +131,7 @@ def test_what_flips_over_turns_the_reference_by_how_far_it_is_off_about_z(lean: 
 def test_it_returns_while_it_gives_way_too() -> None:
     """What is never calm, as a flip after the other, may not drift for good."""
     anchor = Anchor(0.5 + 0j, 0.4)
-    fast = Balance(0j, 0.9 + 0j, STILL.root)  # where the reference is, but faster
+    fast = PlanarState(0j, 0.9 + 0j, STILL.root)  # where the reference is, but faster
     for tick in range(100):
         anchor = anchor.follow(fast, STILL, tick * PERIOD, PERIOD)
 

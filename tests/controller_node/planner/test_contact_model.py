@@ -11,9 +11,9 @@ from controller_node.parameters import PARAMETERS as CONTROLLER
 from controller_node.parameters import character_parameters, make_settings
 from controller_node.planner.compiled import linear, mass_matrix, soft_limits
 from controller_node.planner.compiled.draws import normal_draws
-from controller_node.planner.compiled.rollout import Body, Desired
+from controller_node.planner.compiled.rollout import Desired, RolloutModel
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.search.rollouts import Rollouts
+from controller_node.planner.search.rollout_pool import RolloutPool
 from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import read_clip
@@ -133,7 +133,7 @@ def test_a_rollout_is_that_of_the_products_law_and_limits(
     body = MODEL.body(used)
 
     # Act
-    rollouts = Rollouts(MODEL, 1)
+    rollouts = RolloutPool(MODEL, 1)
     start = MODEL.position_of(position)
     features, sound = rollouts.simulate(start, velocity, size * draws, course, body)
 
@@ -182,11 +182,11 @@ def test_a_rollout_depends_on_its_own_plan_alone() -> None:
     body, start = MODEL.body(gains()), MODEL.position_of(position)
 
     alone = [
-        Rollouts(MODEL, 1).simulate(start, velocity, plan[np.newaxis], course, body)[0][0]
+        RolloutPool(MODEL, 1).simulate(start, velocity, plan[np.newaxis], course, body)[0][0]
         for plan in plans
     ]
     for workers in (1, 2, 4):
-        together, _ = Rollouts(MODEL, workers).simulate(start, velocity, plans, course, body)
+        together, _ = RolloutPool(MODEL, workers).simulate(start, velocity, plans, course, body)
         assert together.tobytes() == np.array(alone).tobytes()
 
 
@@ -197,7 +197,7 @@ def test_a_rollout_that_comes_to_nothing_harms_no_other() -> None:
     plans[1] = np.nan
     body, start = MODEL.body(gains()), MODEL.position_of(position)
 
-    features, sound = Rollouts(MODEL, 1).simulate(start, velocity, plans, course, body)
+    features, sound = RolloutPool(MODEL, 1).simulate(start, velocity, plans, course, body)
 
     assert sound.tolist() == [True, False, True]
     assert features[0].tobytes() == features[2].tobytes()
@@ -207,9 +207,9 @@ def test_a_rollout_that_comes_to_nothing_harms_no_other() -> None:
 def test_the_floor_carries_it_and_hinges_stay_within_their_limits() -> None:
     course, states = desired(clip("punch"), 500)
     position, velocity = start_of(states)
-    body: Body = MODEL.body(gains(**{"gain_scale.p": 0.0, "gain_scale.d": 0.0}))
+    body: RolloutModel = MODEL.body(gains(**{"gain_scale.p": 0.0, "gain_scale.d": 0.0}))
 
-    features, sound = Rollouts(MODEL, 1).simulate(
+    features, sound = RolloutPool(MODEL, 1).simulate(
         MODEL.position_of(position), velocity, np.zeros((1, 6, N - 6)), course, body
     )
 

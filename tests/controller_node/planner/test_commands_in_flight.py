@@ -14,8 +14,8 @@ from controller_node.parameters import (
     check_world,
     make_controller,
 )
+from controller_node.planner.commands_in_flight import CommandsInFlight
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.late_commands import LateCommands
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values, resolve
@@ -49,7 +49,7 @@ def test_a_position_comes_back_from_what_the_model_has_of_it() -> None:
 
 def test_in_the_air_the_state_is_foreseen_in_which_a_command_acts() -> None:
     delay, draw = 3, np.random.default_rng(4)
-    late = LateCommands(HUMANOID, MODEL, delay)
+    late = CommandsInFlight(HUMANOID, MODEL, delay)
     start = walk(0.1).reference.sample(0.3).configuration.position.copy()
     start[2] += 3.0  # m
     foreseen = {}
@@ -98,7 +98,7 @@ def test_a_plan_counts_from_the_state_that_was_told() -> None:
 
 def test_what_diverges_is_not_foreseen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    late = LateCommands(HUMANOID, MODEL, 2)
+    late = CommandsInFlight(HUMANOID, MODEL, 2)
     position, velocity = np.array(HUMANOID.rest_position), np.zeros(LAYOUT.size)
     velocity[20] = 2e3
 
@@ -115,7 +115,7 @@ def test_a_command_acts_within_the_limits_and_until_the_next_one() -> None:
     effort = np.concatenate((still[:6], np.full(LAYOUT.size - 6, 4.0)))
 
     def foreseen(*sent: tuple[int, FloatArray]) -> bytes:
-        late = LateCommands(HUMANOID, MODEL, 3)
+        late = CommandsInFlight(HUMANOID, MODEL, 3)
         for tick, each in sent:
             late.send(tick, each)
         return late.state_then(10, position, still)[1].tobytes()

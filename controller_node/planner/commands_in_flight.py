@@ -17,7 +17,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 
 
-class LateCommands:
+class CommandsInFlight:
     """The commands on their way, which take one tick or more. It remembers them."""
 
     def __init__(self, character: Character, model: ContactModel, delay_ticks: int) -> None:

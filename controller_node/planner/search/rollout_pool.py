@@ -9,9 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from controller_node.planner.compiled.rollout import (
-    Body,
     Desired,
-    Engine,
+    EngineBuffers,
+    RolloutModel,
     features_of,
     roll_out,
 )
@@ -22,7 +22,7 @@ from msgs_config.arrays import BoolArray, FloatArray
 _LARGEST = 1e4  # of a feature; beyond, a rollout has come to nothing
 
 
-class Rollouts:
+class RolloutPool:
     """Threads with an engine each."""
 
     def __init__(self, model: ContactModel, workers: int) -> None:
@@ -32,7 +32,9 @@ class Rollouts:
         self._engines = [model.engine() for _ in range(workers)]
         self._threads = ThreadPoolExecutor(max(workers - 1, 1))
 
-    def features_of(self, position: FloatArray, velocity: FloatArray, body: Body) -> FloatArray:
+    def features_of(
+        self, position: FloatArray, velocity: FloatArray, body: RolloutModel
+    ) -> FloatArray:
         """The features (f,) of a reference's state, MuJoCo's position (q,) and velocity (n,)."""
         row = np.zeros(self._model.feature_count)
         features_of(row, position, velocity, body, self._own)
@@ -44,7 +46,7 @@ class Rollouts:
         velocity: FloatArray,
         offsets: Offsets,
         desired: Desired,
-        body: Body,
+        body: RolloutModel,
     ) -> tuple[FloatArray, FloatArray]:
         """The state, (q,) and (n,), to which offsets lead; the same one if they lead to nothing."""
         unchecked = desired._replace(check_ticks=len(desired.positions))
@@ -60,7 +62,7 @@ class Rollouts:
         velocity: FloatArray,
         plans: FloatArray,
         desired: Desired,
-        body: Body,
+        body: RolloutModel,
     ) -> tuple[FloatArray, BoolArray]:
         """What becomes of plans (s, k, n - 6): features (s, checks, f), and which went well (s,).
 
@@ -73,7 +75,7 @@ class Rollouts:
         sound = np.zeros(len(plans), dtype=np.bool_)
         numbers = itertools.count()  # each worker takes the next plan
 
-        def work(engine: Engine) -> None:
+        def work(engine: EngineBuffers) -> None:
             while (number := next(numbers)) < len(plans):
                 sound[number] = roll_out(
                     features[number], position, velocity, plans[number], desired, body, engine

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.planner.base import DesiredAt
-from controller_node.planner.compiled.rollout import Body, Desired
+from controller_node.planner.compiled.rollout import Desired, RolloutModel
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.search.rollouts import Rollouts
+from controller_node.planner.search.rollout_pool import RolloutPool
 from controller_node.planner.settings import PlannerSettings
 from msgs_config.arrays import FloatArray
 
@@ -30,10 +30,12 @@ class Foreseen:
     features: FloatArray
 
 
-class Course:
+class SampledReference:
     """Samples a reference, each tick of it once, until `forget` is called."""
 
-    def __init__(self, model: ContactModel, rollouts: Rollouts, settings: PlannerSettings) -> None:
+    def __init__(
+        self, model: ContactModel, rollouts: RolloutPool, settings: PlannerSettings
+    ) -> None:
         self._model, self._rollouts, self._settings = model, rollouts, settings
         self._targets: dict[int, Target] = {}
 
@@ -41,7 +43,7 @@ class Course:
         """Say that the reference may be another one."""
         self._targets.clear()
 
-    def target(self, tick: int, desired_at: DesiredAt, body: Body) -> Target:
+    def target(self, tick: int, desired_at: DesiredAt, body: RolloutModel) -> Target:
         """The reference at a tick."""
         if tick not in self._targets:
             state = desired_at(tick)
@@ -50,7 +52,7 @@ class Course:
             self._targets[tick] = Target(position, state.velocity, features)
         return self._targets[tick]
 
-    def ahead(self, tick: int, desired_at: DesiredAt, body: Body) -> Foreseen:
+    def ahead(self, tick: int, desired_at: DesiredAt, body: RolloutModel) -> Foreseen:
         """The reference from a tick on, over the horizon."""
         settings = self._settings
         for known in [known for known in self._targets if known < tick]:
@@ -62,7 +64,7 @@ class Course:
         return Foreseen(desired, np.array([target.features for target in checked]))
 
     def between(
-        self, first: int, last: int, first_knot: int, desired_at: DesiredAt, body: Body
+        self, first: int, last: int, first_knot: int, desired_at: DesiredAt, body: RolloutModel
     ) -> Desired:
         """The reference from one tick to another, for offsets whose first knot is given."""
         targets = [self.target(each, desired_at, body) for each in range(first, last + 1)]

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from msgs_config.errors import CommandError
-from sim_node.timing.run_state import RunControl
+from sim_node.timing.run_control import RunControl
 
 
 @pytest.fixture
