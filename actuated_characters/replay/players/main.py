@@ -1,4 +1,4 @@
-"""The process of a player: `python -m actuated_characters.replay.players.main commands|states`."""
+"""The process of a player: `python -m actuated_characters.replay.players.main PLACE`."""
 
 import sys
 from collections.abc import Callable
@@ -6,25 +6,26 @@ from typing import NoReturn
 
 from msgs_config.runtime.process import RunnableNode, limit_threads, run_node
 
-COMMANDS, STATES = "commands", "states"
+CONTROLLER, SIMULATOR = "controller", "simulator"
+"""The places that a bag can take."""
 
 
 def main() -> NoReturn:
     """Run a player until it has played."""
     limit_threads()
-    run_node(_load_commands if sys.argv.pop(1) == COMMANDS else _load_states)
+    run_node(_load_controller if sys.argv.pop(1) == CONTROLLER else _load_simulator)
 
 
-def _load_commands() -> Callable[[], RunnableNode]:
-    from actuated_characters.replay.players.recorded_controller import CommandPlayer
+def _load_controller() -> Callable[[], RunnableNode]:
+    from actuated_characters.replay.players.recorded_controller import RecordedController
 
-    return CommandPlayer
+    return RecordedController
 
 
-def _load_states() -> Callable[[], RunnableNode]:
-    from actuated_characters.replay.players.recorded_simulator import StatePlayer
+def _load_simulator() -> Callable[[], RunnableNode]:
+    from actuated_characters.replay.players.recorded_simulator import RecordedSimulator
 
-    return StatePlayer
+    return RecordedSimulator
 
 
 if __name__ == "__main__":

@@ -17,12 +17,12 @@ from actuated_characters.bags.recording import (
     read_recordings,
 )
 from actuated_characters.bags.writer import BagWriter
+from actuated_characters.metrics.error_measures import different_bits
 from actuated_characters.metrics.run_metrics import StateHash
-from actuated_characters.replay.commands import check_commands
-from actuated_characters.replay.comparison import Difference, differing, unit_of
-from actuated_characters.replay.players.script import read_world
+from actuated_characters.replay.comparison import Difference, unit_of
+from actuated_characters.replay.effort_check import check_commands
 from actuated_characters.replay.replay import replay, tick_count
-from actuated_characters.replay.world import common_rows, left_out
+from actuated_characters.replay.world import cut_world, read_world
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import RecordingError
 from msgs_config.messages import configuration
@@ -135,8 +135,8 @@ def test_one_bit_of_a_state_is_found(walk: Recording, quantity: str, row: int) -
 def test_the_sign_of_zero_is_a_bit(walk: Recording) -> None:
     zeros = np.zeros(3)
 
-    assert differing(zeros, -zeros) == [0, 1, 2]
-    assert differing(np.full(3, np.nan), np.full(3, np.nan)) == []
+    assert different_bits(zeros, -zeros).all()
+    assert not different_bits(np.full(3, np.nan), np.full(3, np.nan)).any()
 
 
 def test_an_effort_that_was_another_one_changes_the_states(walk: Recording) -> None:
@@ -381,7 +381,6 @@ def two_of_one_world(path: Path, left: slice, right: slice) -> Path:
 def test_a_state_more_of_one_character_is_left_out(tmp_path: Path) -> None:
     bag = two_of_one_world(tmp_path / "bag", slice(0, 24), slice(0, 25))
 
-    assert common_rows(read_recordings(bag)) == ([0, 0], 24)
     together, notes = read_world(bag)
     assert [len(each.stamps_ns) for each in together] == [24, 24] and notes == []
 
@@ -407,10 +406,9 @@ def test_states_before_the_first_common_episode_are_told(pendulum: Recording) ->
         effort=effort[rows],
     )
 
-    begins, count = common_rows([early, late])
+    cut, (note,) = cut_world([early, late])
 
-    assert (begins, count) == ([10, 0], len(pendulum.stamps_ns) - 10)
-    (note,) = left_out([early, late], begins)
+    assert [each.stamps_ns.tolist() for each in cut] == [late.stamps_ns.tolist()] * 2
     assert note.startswith("the first 10 states of early were left out")
 
 

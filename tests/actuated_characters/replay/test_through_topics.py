@@ -28,20 +28,24 @@ from actuated_characters.bags.recording import (
 )
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
-from actuated_characters.replay.players.base import Watch
-from actuated_characters.replay.players.files import write_character
-from actuated_characters.replay.players.findings import (
-    CommandFindings,
-    commanded,
+from actuated_characters.replay.command_comparison import (
+    CommandComparison,
     compare_commands,
-    merged,
+    merge_commands,
+    recorded_commands,
 )
-from actuated_characters.replay.players.results import FoundStates, compare_found
-from actuated_characters.replay.players.script import make_scripts
-from actuated_characters.replay.players.steering import first_parameters, parameter_changes
-from actuated_characters.replay.players.stream import STEERING, read_stream
+from actuated_characters.replay.comparison import EFFORT, POSITION, VELOCITY, compare_world
+from actuated_characters.replay.players.character_files import write_character
+from actuated_characters.replay.players.controller_parameters import (
+    first_parameters,
+    parameter_changes,
+)
+from actuated_characters.replay.players.processes import PlayerReport
+from actuated_characters.replay.players.simulator_inputs import make_inputs
+from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.replay.through_topics import replay_commands, replay_states
 from actuated_characters.runs.run_directory import SUMMARY, read_figures
+from msgs_config.arrays import FloatArray
 from msgs_config.character.file import CHARACTERS_DIRECTORY, shipped_characters
 from msgs_config.character.loading import load_character
 from msgs_config.errors import RecordingError, RunError
@@ -234,7 +238,7 @@ def by_commands(path: Path, **options: Any) -> Any:
     return replay_commands(path, progress=lambda _: None, tell=print, **options)
 
 
-def by_states(path: Path, **options: Any) -> CommandFindings:
+def by_states(path: Path, **options: Any) -> CommandComparison:
     return replay_states(path, progress=lambda _: None, tell=print, **options)
 
 
@@ -397,9 +401,9 @@ def test_changed_gains_laws_and_trajectories_come_again(eventful: Path) -> None:
     recording = read_recording(eventful)
     changes = parameter_changes(recording)
     assert sum(map(len, changes.values())) == 5
-    stream = read_stream(eventful, recording)
-    assert stream.steered == {topic.name for topic in STEERING}
-    assert sum(map(len, stream.steering.values())) == 4
+    rare = read_rare_messages(eventful, recording)
+    assert rare.requested == {topic.name for topic in REQUESTS}
+    assert sum(map(len, rare.requests.values())) == 4
 
     findings = by_states(eventful)
 
@@ -453,19 +457,22 @@ def test_where_only_the_sign_of_zero_differs_the_largest_difference_is_that(walk
     recording = read_recording(walk)
     entry, rest = 7, recording.layout.dof_names[6:]  # nothing commands the root
     sent = [
-        tuple(CommandArrays(rest, merged(recording.layout, each)[6:], 0) for each in [commands])
+        tuple(
+            CommandArrays(rest, merge_commands(recording.layout, each)[6:], 0)
+            for each in [commands]
+        )
         for commands in recording.commands
     ]
     sent[5][0].efforts[entry - 6] = 0.0
     recording = replace(recording, commands=tuple(sent))
-    received = commanded(recording)
+    received = recorded_commands(recording)
     received[5, entry] = -0.0
 
     findings = compare_commands(recording, received)
 
     assert not findings.identical and findings.within(0.0)
     assert findings.largest is not None and findings.largest == findings.first
-    assert findings.largest.dof_name == recording.layout.dof_names[entry]
+    assert findings.largest.name == recording.layout.dof_names[entry]
 
 
 # A bag that begins in the middle of an episode
@@ -578,10 +585,12 @@ def test_another_controller_is_found_at_its_first_answer(
     processes.python(str(EXAMPLE), "--ros-args", "-p", "target:=1.1")
 
     recording = read_recording(foreign)
-    answered = ~np.isnan(commanded(recording)).all(axis=1)  # the recorder may join a bit late
-    first_ns = recording.stamps_ns[np.argmax(answered)]
+    answered = ~np.isnan(recorded_commands(recording)).all(
+        axis=1
+    )  # the recorder may join a bit late
+    time = recording.stamps_ns[np.argmax(answered)] / 1e9
     assert process.wait() == 1
-    assert f"({first_ns} ns): command of 'hinge' is" in process.stderr
+    assert f"({time:.9f} s): command of 'hinge' is" in process.stderr
     assert "largest difference: tick" in process.stdout
 
 
@@ -639,17 +648,17 @@ def test_what_is_waited_for_is_told_every_two_seconds_and_then_given_up(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     now = 100.0
-    monkeypatch.setattr("actuated_characters.replay.players.base.time.monotonic", lambda: now)
-    watch = Watch()
+    monkeypatch.setattr("actuated_characters.replay.players.processes.time.monotonic", lambda: now)
+    report = PlayerReport()
     told = []
     for now in np.arange(100.0, 160.1, 0.5):  # the clock
-        watch.look(lambda: "an answer")
+        report.tell_wait(lambda: "an answer")
         told += [now] * bool(capsys.readouterr().out)
 
     assert told[0] <= 102.5 and told[-1] >= 157.5 and np.diff(told).max() <= 2.5
     now = 160.5
     with pytest.raises(RunError, match=r"^waited 60 s for an answer$"):
-        watch.look(lambda: "an answer")
+        report.tell_wait(lambda: "an answer")
 
 
 # What is sent
@@ -669,12 +678,12 @@ def test_commands_are_sent_until_they_cover_the_tick(walk: Path) -> None:
     unknown = CommandArrays(("nose",), np.ones(1), 0)
     not_finite = command(recording.layout, legs, np.nan)
 
-    (script,) = make_scripts(
+    (inputs,) = make_inputs(
         [replace(recording, commands=((unknown, not_finite, *sent),) * len(recording.stamps_ns))]
     )
 
-    assert not script.applies
-    assert script.commands == ((sent[0], sent[2]),) * 120  # a repeated one is not needed
+    assert not inputs.are_applied
+    assert inputs.commands == ((sent[0], sent[2]),) * 120  # a repeated one is not needed
 
 
 def test_after_a_conflict_the_commands_that_were_asked_for_anew_count(walk: Path) -> None:
@@ -687,22 +696,22 @@ def test_after_a_conflict_the_commands_that_were_asked_for_anew_count(walk: Path
         command(recording.layout, rest, 3.0),
     ]
 
-    (script,) = make_scripts(
+    (inputs,) = make_inputs(
         [replace(recording, commands=(tuple(sent),) * len(recording.stamps_ns))]
     )
 
-    assert script.commands[0] == (sent[1], sent[2])
+    assert inputs.commands[0] == (sent[1], sent[2])
 
 
 def test_one_tick_without_its_commands_lets_the_applied_efforts_decide(walk: Path) -> None:
     recording = read_recording(walk)
     lacking = (*recording.commands[:50], (), *recording.commands[51:])
 
-    (script,) = make_scripts([replace(recording, commands=lacking)])
+    (inputs,) = make_inputs([replace(recording, commands=lacking)])
 
-    assert script.applies
+    assert inputs.are_applied
     for tick in (0, 50, 119):
-        (sent,) = script.commands[tick]
+        (sent,) = inputs.commands[tick]
         entries = recording.layout.indices(sent.names)
         assert sent.efforts.tobytes() == recording.effort[tick, entries].tobytes()
 
@@ -711,7 +720,7 @@ def test_pushes_that_nobody_knows_the_effect_of_are_an_error(walk: Path) -> None
     recording = replace(read_recording(walk), pushes_sent=2, applied_wrench=())
 
     with pytest.raises(RecordingError, match="2 messages on 'external_wrench'"):
-        make_scripts([recording])
+        make_inputs([recording])
 
 
 def test_a_recording_without_commanded_joints_says_what_to_do(walk: Path) -> None:
@@ -719,7 +728,7 @@ def test_a_recording_without_commanded_joints_says_what_to_do(walk: Path) -> Non
     limp = replace(recording, parameters={**recording.parameters, "commanded_joints": []})
 
     with pytest.raises(RecordingError, match="without --through-topics"):
-        make_scripts([limp])
+        make_inputs([limp])
 
 
 # What is compared
@@ -739,8 +748,8 @@ def test_any_bit_of_any_command_is_found(walk: Path) -> None:
 
         assert findings.first is not None and findings.first == findings.largest
         name = recording.layout.dof_names[entry]
-        assert (findings.first.tick, findings.first.dof_name) == (row + 1, name)
-        assert findings.first.received == changed[row, entry]
+        assert (findings.first.tick, findings.first.name) == (row + 1, name)
+        assert findings.first.found == changed[row, entry]
         assert findings.largest_difference == abs(changed[row, entry] - said[row, entry])
 
 
@@ -763,21 +772,22 @@ def test_a_ball_joints_difference_is_the_length_of_a_vector(walk: Path) -> None:
     assert [joint.largest for joint in findings.joints if joint.name != "chest"] == [0.0] * 13
 
 
-def found_again(recording: Recording) -> FoundStates:
+def found_again(recording: Recording) -> dict[str, FloatArray]:
     first = np.full((1, recording.layout.size), np.nan)
     effort = np.concatenate((first, recording.effort))
-    return FoundStates(recording.position.copy(), recording.velocity.copy(), effort)
+    position, velocity = recording.position.copy(), recording.velocity.copy()
+    return {EFFORT: effort, POSITION: position, VELOCITY: velocity}
 
 
 def test_of_states_that_came_back_any_bit_is_found_at_its_tick(walk: Path) -> None:
     recording = read_recording(walk)
     rng = np.random.default_rng(6)
-    for quantity in ("position", "velocity", "effort") * 5:
+    for quantity in (POSITION, VELOCITY, EFFORT) * 5:
         found, row, entry = found_again(recording), int(rng.integers(1, 121)), int(rng.integers(34))
-        getattr(found, quantity).view(np.int64)[row, entry] ^= 1 << int(rng.integers(52))
-        found.velocity[row + 1 :] += 1.0  # what it leads to comes later
+        found[quantity].view(np.int64)[row, entry] ^= 1 << int(rng.integers(52))
+        found[VELOCITY][row + 1 :] += 1.0  # what it leads to comes later
 
-        result = compare_found([recording], [found])
+        result = compare_world([recording], [found])
 
         assert result.difference is not None
         assert result.difference.quantity == quantity
@@ -788,11 +798,11 @@ def test_of_states_that_came_back_any_bit_is_found_at_its_tick(walk: Path) -> No
 def test_within_a_tolerance_the_largest_differences_are_told(walk: Path) -> None:
     recording = read_recording(walk)
     found = found_again(recording)
-    found.velocity[60] += 1e-6
-    found.effort[30] += 1e-3  # what is applied may be another one, if the states are not
+    found[VELOCITY][60] += 1e-6
+    found[EFFORT][30] += 1e-3  # what is applied may be another one, if the states are not
 
-    assert compare_found([recording], [found], tolerance=1e-5).identical
-    result = compare_found([recording], [found], tolerance=1e-7)
+    assert compare_world([recording], [found], tolerance=1e-5).identical
+    result = compare_world([recording], [found], tolerance=1e-7)
 
     assert result.difference is not None
     assert (result.difference.tick, result.difference.quantity) == (61, "velocity")
@@ -808,10 +818,10 @@ def test_a_turn_by_more_than_pi_is_a_small_difference(walk: Path) -> None:
     position[:, chest] = [np.pi - 1e-6, 0.0, 0.0]
     turned = replace(recording, position=position)
     found = found_again(turned)
-    found.position[:, chest] = [-np.pi + 1e-6, 0.0, 0.0]
+    found[POSITION][:, chest] = [-np.pi + 1e-6, 0.0, 0.0]
 
-    assert compare_found([turned], [found], tolerance=3e-6).identical
-    assert not compare_found([turned], [found], tolerance=1e-6).identical
+    assert compare_world([turned], [found], tolerance=3e-6).identical
+    assert not compare_world([turned], [found], tolerance=1e-6).identical
 
 
 # What a controller is given
