@@ -6,6 +6,7 @@ would hide it. What never acted has left no trace, and does not show: what a lim
 a command, and the commands for an episode's last states, after which no tick came.
 """
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from actuated_characters.replay.world import of_character, simulator_values
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import LayoutError
 from msgs_config.parameters import Values
-from sim_node.parameters import command_timeout_ns, is_realtime
+from sim_node.parameters import is_realtime
 
 _ARRIVAL_TICKS = 2  # by which the arrival of a command without a stamp is uncertain
 
@@ -76,14 +77,14 @@ def check_commands(recording: Recording) -> CommandCheck:
 
     In lockstep each is the clip of what was commanded `command_delay_ticks` before, to the bit,
     and with `on_timeout` also what that fills in. In real time each is zero or the clip of a
-    command that was young enough then.
+    command that was there then, as it is held for a time that may have been changed meanwhile.
 
     Raises:
         RecordingError: this simulator does not have the recorded parameters.
     """
     values = simulator_values(recording)
     check = _Check(recording, values)
-    found = check.check_realtime(values) if is_realtime(values) else check.check_lockstep(values)
+    found = check.check_realtime() if is_realtime(values) else check.check_lockstep(values)
     difference = next((each for each in found if each is not None), None)
     return CommandCheck(difference, tuple(recording.stamps_ns[check.silent_rows].tolist()))
 
@@ -197,27 +198,29 @@ class _Check:
         tick, character = clock_of(self._recording).tick(stamp_ns), self._recording.name
         return Difference(tick, stamp_ns, EFFORT, name, applied, expected, sentence, character)
 
-    def check_realtime(self, values: Values) -> Iterator[Difference]:
+    def check_realtime(self) -> Iterator[Difference]:
         """Yield what is wrong with a tick."""
-        stamps, timeout_ns = self._recording.stamps_ns, command_timeout_ns(values)
         later = _ARRIVAL_TICKS if self._recording.unstamped_commands else 0
         for first, end in self._episodes():
-            sent = self._sent(first, end)
+            sent = deque(self._sent(first, end))
+            known = [{0} for _ in range(self._layout.size)]  # bits that an entry can have; 0 is 0.0
             for row in range(first, end):
-                applied, answered = self._recording.effort[row], row - self._delay
-                known = applied.view(np.int64) == 0
-                if answered >= first:
-                    oldest_ns = stamps[answered] - timeout_ns
-                    oldest = int(np.searchsorted(stamps, oldest_ns, side="right"))
-                    known |= sent.match(applied, max(oldest, first), answered)
-                    if not known.all():  # the timeout may have been changed while it ran
-                        known |= sent.match(applied, first, answered + later)
-                if not known.all():
-                    index = int(np.argmin(known))
-                    yield self._found(row, index, 0.0, "but no command can have led to that")
+                answered = row - self._delay
+                while sent and first <= answered and sent[0][0] <= answered + later:
+                    _, effort, indices = sent.popleft()
+                    bits = effort.view(np.int64).tolist()
+                    for index in indices.tolist():
+                        known[index].add(bits[index])
+                applied = self._recording.effort[row].view(np.int64).tolist()
+                unknown = [n for n, bits in enumerate(applied) if bits not in known[n]]
+                if unknown:
+                    yield self._found(row, unknown[0], 0.0, "but no command can have led to that")
 
-    def _sent(self, first: int, end: int) -> "_SentCommands":
-        """The commands of an episode, each clipped, in the order of the states they answer."""
+    def _sent(self, first: int, end: int) -> list[tuple[int, FloatArray, IntArray]]:
+        """The commands of an episode, in the order of the rows of the states that they answer.
+
+        Each with that row, the clipped effort (n,), and the entries that it is for.
+        """
         rows = [(row, each) for row in range(first, end) for each in self._recording.commands[row]]
         unstamped = self._recording.unstamped_commands
         if unstamped:
@@ -229,29 +232,10 @@ class _Check:
         for row, command in sorted(rows, key=lambda pair: pair[0]):
             indices = self._entries(command)
             if indices is not None:
-                effort = self._zero.copy()
+                effort = np.zeros(self._layout.size)
                 effort[indices] = command.efforts
                 sent.append((row, self._clip(effort), indices))
-        return _SentCommands(sent, self._layout.size)
+        return sent
 
     def _clip(self, effort: FloatArray) -> FloatArray:
         return self._layout.clipped(effort + 0.0, self._limits)
-
-
-class _SentCommands:
-    """Commands of an episode, clipped: the row of the state, the effort (n,), and its entries."""
-
-    def __init__(self, commands: Sequence[tuple[int, FloatArray, IntArray]], size: int) -> None:
-        self._rows = np.array([row for row, _, _ in commands], dtype=np.intp)
-        efforts = [effort for _, effort, _ in commands]
-        self._bits = np.array(efforts).reshape(-1, size).view(np.int64)
-        self._is_given = np.zeros(self._bits.shape, dtype=np.bool_)
-        for number, (_, _, indices) in enumerate(commands):
-            self._is_given[number, indices] = True
-
-    def match(self, applied: FloatArray, first: int, last: int) -> BoolArray:
-        """Which entries (n,) are those of a command that answers the states `first` to `last`."""
-        begin, end = np.searchsorted(self._rows, [first, last + 1])
-        same = self._bits[begin:end] == applied.view(np.int64)
-        found: BoolArray = (same & self._is_given[begin:end]).any(axis=0)
-        return found

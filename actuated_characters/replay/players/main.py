@@ -13,16 +13,15 @@ CONTROLLER, SIMULATOR = "controller", "simulator"
 def main() -> NoReturn:
     """Run a player until it has played."""
     limit_threads()
-    run_node(_load_controller if sys.argv.pop(1) == CONTROLLER else _load_simulator)
+    place = sys.argv.pop(1)
+    run_node(lambda: _load(place))
 
 
-def _load_controller() -> Callable[[], RunnableNode]:
-    from actuated_characters.replay.players.recorded_controller import RecordedController
+def _load(place: str) -> Callable[[], RunnableNode]:
+    if place == CONTROLLER:
+        from actuated_characters.replay.players.recorded_controller import RecordedController
 
-    return RecordedController
-
-
-def _load_simulator() -> Callable[[], RunnableNode]:
+        return RecordedController
     from actuated_characters.replay.players.recorded_simulator import RecordedSimulator
 
     return RecordedSimulator

@@ -1,6 +1,5 @@
 """The node `player` in the controller's place: it sends the commands that a bag has."""
 
-import time
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -20,19 +19,12 @@ from msgs_config.errors import RunError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.joint_state import (
-    JointArrays,
     JointStateDecoder,
     JointStateEncoder,
     state_in_layout,
 )
 from msgs_config.messages.projectiles import ThrowCodec
-from msgs_config.messages.session import (
-    ANONYMOUS,
-    SESSION,
-    SessionBinding,
-    given_session,
-    session_of,
-)
+from msgs_config.messages.session import SESSION, given_session, session_of
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
@@ -47,7 +39,6 @@ PARAMETERS = [
     SESSION,
 ]
 
-_MOST_FOREIGN = 1000  # states in a row
 _ACKNOWLEDGED = Duration(seconds=10)  # until the simulator has a push or throw
 
 
@@ -67,13 +58,12 @@ class RecordedController(Node):
         world, _ = read_world(Path(values.text("recording")), values.integer("world"))
         self._tick_clock, self._throws = clock_of(world[0]), world[0].throws
         self._reset_client = self.create_client(Trigger, f"{topics.SIM_NODE}/reset")
-        self._binding = SessionBinding(
-            given_session(values), lambda: self.count_publishers(topics.JOINT_STATES.name)
-        )
+        session = given_session(values)
+        self._throw_codec = ThrowCodec(session)
         self._throw_topic = topics.create_publisher(self, topics.THROW)
         inputs = make_inputs(world)
         self._characters = [
-            _CharacterTopics(self, *each, self._binding) for each in zip(world, inputs, strict=True)
+            _CharacterTopics(self, *each, session) for each in zip(world, inputs, strict=True)
         ]
         self._ticks, self._resets = len(inputs[0].commands), inputs[0].resets
         self._report = PlayerReport()
@@ -107,7 +97,6 @@ class RecordedController(Node):
         self._played = 0  # states that all characters have
         self._report.begin_wait()
         while not stop and self._played <= self._ticks:
-            self._binding.look(time.monotonic())
             received = [each.receive() for each in self._characters]  # of all, not until one
             if any(received):
                 executor.received()
@@ -140,9 +129,8 @@ class RecordedController(Node):
         """Send what was thrown as a tick began; returns when the simulator has it."""
         throws = self._throws[tick] if self._throws else ()
         for throw in throws:
-            codec = ThrowCodec(self._binding.bound or ANONYMOUS)
             stamp_ns = self._tick_clock.stamp_ns(FIRST_TICK + tick)
-            self._throw_topic.publish(codec.encode(stamp_ns, throw))
+            self._throw_topic.publish(self._throw_codec.encode(stamp_ns, throw))
         if throws and not self._throw_topic.wait_for_all_acked(_ACKNOWLEDGED):
             raise RunError(f"the throws of tick {FIRST_TICK + tick} were not acknowledged")
 
@@ -165,17 +153,17 @@ class _CharacterTopics:
     """The topics of a character: what is sent to it, and the states that come back."""
 
     def __init__(
-        self, node: Node, recording: Recording, inputs: SimulatorInputs, binding: SessionBinding
+        self, node: Node, recording: Recording, inputs: SimulatorInputs, session: str
     ) -> None:
         """Offer the topics, below the character's name where there are several."""
         name = recording.world.name
         self.states: list[StampedState] = []  # each once
         self.last_sent: list[bytes] = []  # commands
         self.size = recording.layout.size
-        self._inputs, self._binding = inputs, binding
+        self._inputs, self._session = inputs, session
         self._layout, self._clock = recording.layout, clock_of(recording)
         self._decoder = JointStateDecoder()
-        self._encoder = lru_cache(maxsize=16)(JointStateEncoder)
+        self._encoder = lru_cache(maxsize=16)(lambda names: JointStateEncoder(names, session))
         self._torques = topics.create_publisher(node, topics.JOINT_TORQUES.under(name))
         self._wrenches = topics.create_publisher(node, topics.EXTERNAL_WRENCH.under(name))
         self.publishers = self._torques, self._wrenches
@@ -187,11 +175,9 @@ class _CharacterTopics:
         Raises:
             RunError: it is not the next one.
         """
-        arrays = self._next_state()
-        if arrays is None:
+        state = self._next_state()
+        if state is None:
             return False
-        state = state_in_layout(self._layout, arrays)
-        self._binding.take(session_of(arrays.frame_id))
         expected = self._clock.stamp_ns(FIRST_TICK + len(self.states))
         if state.stamp_ns == expected:
             self.states.append(state)
@@ -202,18 +188,12 @@ class _CharacterTopics:
                 self._torques.publish(raw_command)
         return True
 
-    def _next_state(self) -> JointArrays | None:
-        """The next state of the bound simulator, before the first of any; None if there is none."""
-        for _ in range(_MOST_FOREIGN):
-            raw = self._subscription.take()
-            if raw is None:
-                return None
+    def _next_state(self) -> StampedState | None:
+        """The next state of the simulator of this session; None if there is none."""
+        while (raw := self._subscription.take()) is not None:
             arrays = self._decoder.decode(raw)
-            session = session_of(arrays.frame_id)
-            if session == self._binding.bound or (
-                not self.states and self._binding.admits(session)
-            ):
-                return arrays
+            if session_of(arrays.frame_id) == self._session:
+                return state_in_layout(self._layout, arrays)
         return None
 
     def push(self, tick: int) -> None:
@@ -225,16 +205,16 @@ class _CharacterTopics:
         push = self._inputs.pushes[tick]
         if push is not None:
             stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
-            own = replace(push, stamp_ns=stamp_ns, frame_id=self._binding.bound or ANONYMOUS)
+            own = replace(push, stamp_ns=stamp_ns, frame_id=self._session)
             self._wrenches.publish(encode_wrenches(own))
             if not self._wrenches.wait_for_all_acked(_ACKNOWLEDGED):
                 raise RunError(f"the push of tick {FIRST_TICK + tick} was not acknowledged")
 
     def command(self, tick: int) -> None:
         """Send what was commanded in a tick."""
-        stamp_ns, session = self._clock.stamp_ns(FIRST_TICK + tick), self._binding.bound
+        stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
         self.last_sent = [
-            self._encoder(each.names, session or ANONYMOUS).encode(stamp_ns, effort=each.efforts)
+            self._encoder(each.names).encode(stamp_ns, effort=each.efforts)
             for each in self._inputs.commands[tick]
         ]
         for raw in self.last_sent:
