@@ -118,10 +118,6 @@ def compare_world(
         for recording, states in zip(together, found, strict=True)
     ]
     differences = [first_difference(*pair, tolerance=tolerance) for pair in pairs]
-    largest: dict[str, float] = {}
-    for recording, states in pairs if tolerance is not None else ():
-        for unit, size in _largest_differences(recording, states).items():
-            largest[unit] = max(size, largest.get(unit, 0.0))
     return ReplayResult(
         difference=min(filter(None, differences), key=lambda each: each.tick, default=None),
         states=count,
@@ -130,7 +126,7 @@ def compare_world(
             recording.name: _hash(recording, states)
             for recording, states in zip(together, found, strict=True)
         },
-        largest=largest,
+        largest={} if tolerance is None else _largest_differences(pairs),
         notes=notes,
     )
 
@@ -189,11 +185,9 @@ def _state_difference(
 
 def _values(recording: Recording, quantity: str, rows: slice) -> FloatArray:
     """A quantity (m, n) of some states as recorded; an effort is that of the tick before."""
-    if quantity == POSITION:
-        return recording.position[rows]
-    if quantity == VELOCITY:
-        return recording.velocity[rows]
-    return np.vstack((np.full((1, recording.layout.size), np.nan), recording.effort))[rows]
+    if quantity == EFFORT:
+        return np.vstack((np.full((1, recording.layout.size), np.nan), recording.effort))[rows]
+    return recording.position[rows] if quantity == POSITION else recording.velocity[rows]
 
 
 def _apart(
@@ -206,15 +200,17 @@ def _apart(
     return difference
 
 
-def _largest_differences(recording: Recording, found: States) -> dict[str, float]:
-    """The largest difference of the first states of a recording, by its unit."""
-    layout, largest = recording.layout, dict[str, float]()
-    for quantity, values in found.items():
-        recorded = _values(recording, quantity, slice(len(values)))
-        sizes = np.abs(_apart(layout, quantity, recorded, values)).max(axis=0, initial=0.0)
-        for entry, size in enumerate(sizes.tolist()):
-            unit = unit_of(layout, entry, quantity)
-            largest[unit] = max(size, largest.get(unit, 0.0))
+def _largest_differences(pairs: Sequence[tuple[Recording, States]]) -> dict[str, float]:
+    """The largest difference of the first states of recordings, by its unit."""
+    largest: dict[str, float] = {}
+    for recording, found in pairs:
+        layout = recording.layout
+        for quantity, values in found.items():
+            recorded = _values(recording, quantity, slice(len(values)))
+            sizes = np.abs(_apart(layout, quantity, recorded, values)).max(axis=0, initial=0.0)
+            for entry, size in enumerate(sizes.tolist()):
+                unit = unit_of(layout, entry, quantity)
+                largest[unit] = max(size, largest.get(unit, 0.0))
     return largest
 
 

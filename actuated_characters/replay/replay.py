@@ -31,7 +31,6 @@ from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import select
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.wrenches import ExternalWrench
 
 _PROGRESS_TICKS = 100
 
@@ -155,7 +154,7 @@ class _ReplayedWorld:
         try:
             simulation.step(
                 [recording.effort[row] for recording in recordings],
-                [_pushes(recording, row, simulation.tick) for recording in recordings],
+                [make_pushes(recording, row, simulation.tick) for recording in recordings],
                 lead.throws[row] if lead.throws else (),
             )
         except SimulationError as error:
@@ -187,10 +186,3 @@ class _ReplayedWorld:
         links, simulation = [link.name for link in recording.character.links], self._simulation
         found = select(simulation.stamp_ns, links, contacts.wrenches, contacts.touching)
         return compare_contacts(simulation.tick, recorded, found, recording.name)
-
-
-def _pushes(recording: Recording, row: int, tick: int) -> Sequence[ExternalWrench]:
-    applied = recording.applied_wrench[row] if recording.applied_wrench else None
-    if applied is None or not applied.links:
-        return ()
-    return make_pushes(recording.character, applied, tick)

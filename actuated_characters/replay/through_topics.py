@@ -8,12 +8,7 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.replay.command_comparison import CommandComparison, compare_commands
-from actuated_characters.replay.comparison import (
-    QUANTITIES,
-    ReplayResult,
-    States,
-    compare_world,
-)
+from actuated_characters.replay.comparison import QUANTITIES, ReplayResult, States, compare_world
 from actuated_characters.replay.players.character_files import write_character, write_urdf
 from actuated_characters.replay.players.controller_parameters import first_parameters
 from actuated_characters.replay.players.main import CONTROLLER, SIMULATOR
@@ -33,19 +28,8 @@ from msgs_config.messages.session import SESSION, make_session
 from msgs_config.shared_parameters import CHARACTER, PLACEMENT
 from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
 
-_OF_A_CHARACTER = (
-    PLACEMENT.name,
-    "commanded_joints",
-    "initial_position",
-    "initial_velocity",
-)
-_NOT_TO_BE_SET = (
-    CHARACTER.name,
-    PLACEMENT.name,
-    SESSION.name,
-    "rate",
-    "wait_for_subscribers",
-)
+_OF_A_CHARACTER = (PLACEMENT.name, "commanded_joints", "initial_position", "initial_velocity")
+_NOT_TO_BE_SET = (CHARACTER.name, PLACEMENT.name, SESSION.name, "rate", "wait_for_subscribers")
 _APPLIED = (
     "not every tick has its commands in the bag, so the efforts that were really applied were "
     "sent, to a simulator in lockstep without effort limits and without delay"

@@ -9,10 +9,8 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording, read_recordings
 from actuated_characters.replay.comparison import clock_of
-from msgs_config.character.model import Character
 from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.parameters import Values, resolve
 from msgs_config.versions import describe_changes, installed_versions
 from sim_node.parameters import (
@@ -154,18 +152,22 @@ def _unlimited(setup: CharacterSetup) -> CharacterSetup:
     return replace(setup, character=replace(character, links=links))
 
 
-def make_pushes(character: Character, applied: WrenchArrays, tick: int) -> list[ExternalWrench]:
-    """The pushes that acted during the tick that begins at `tick`, in their order.
+def make_pushes(recording: Recording, row: int, tick: int) -> list[ExternalWrench]:
+    """The pushes that acted during the tick of a row, which begins at `tick`, in their order.
 
     Raises:
         RecordingError: a link does not exist.
     """
-    rows = {link.name: row for row, link in enumerate(character.links)}
+    applied = recording.applied_wrench[row] if recording.applied_wrench else None
+    if applied is None or not applied.links:
+        return []
+    links = recording.character.links
+    rows = {link.name: number for number, link in enumerate(links)}
     pushes = []
     for number, name in enumerate(applied.links):
         if name not in rows:
             raise RecordingError(f"a push of tick {tick}: {one_of('link', name, list(rows))}")
-        centre = character.links[rows[name]].inertial_pose.position
+        centre = links[rows[name]].inertial_pose.position
         point = applied.points[number] if len(applied.points) else np.array(centre)
         pushes.append(ExternalWrench(rows[name], applied.wrenches[number], point, tick, 1))
     return pushes
