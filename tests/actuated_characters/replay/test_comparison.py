@@ -13,10 +13,14 @@ from actuated_characters.replay.comparison import (
     POSITION,
     QUANTITIES,
     VELOCITY,
+    compare_balls,
+    compare_contacts,
     compare_world,
     unit_of,
 )
 from msgs_config.arrays import FloatArray
+from msgs_config.messages.projectiles import BallStates
+from msgs_config.messages.wrenches import WrenchArrays
 from tests.support.bags import make_run
 from tests.support.recordings import changed, commanding, recording_of
 
@@ -116,6 +120,35 @@ def test_a_turn_by_more_than_pi_is_a_small_difference(walk: Recording) -> None:
 
     assert compare_world([turned], [found], tolerance=3e-6).identical
     assert not compare_world([turned], [found], tolerance=1e-6).identical
+
+
+# Contacts and balls
+
+
+def test_contacts_are_compared_as_numbers() -> None:
+    one = WrenchArrays.of_rows(5, ["chest", "neck"], np.arange(12.0).reshape(2, 6), [])
+    turned = WrenchArrays.of_rows(5, ["neck", "chest"], one.wrenches[::-1], [])
+    other = replace(one, wrenches=one.wrenches + np.eye(12)[8].reshape(2, 6))
+
+    assert compare_contacts(2, one, replace(one, wrenches=one.wrenches * 1.0)) is None
+    assert compare_contacts(2, one, turned) is None
+    difference = compare_contacts(2, one, other, "left")
+    assert difference is not None and (difference.recorded, difference.found) == (8.0, 9.0)
+    expected = "tick 2 of left (0.000000005 s): z of the contact force on 'neck' was 8.0 in the"
+    assert str(difference) == f"{expected} recording and is 9.0 now"
+
+
+def test_balls_are_compared_to_the_last_bit() -> None:
+    recorded = BallStates(7, ("ball_1", "ball_2"), np.zeros((2, 13)))
+    other = recorded.motion.copy()
+    other[1, 9] = -0.0
+
+    assert compare_balls(3, recorded, recorded.motion.copy()) is None
+    difference = compare_balls(3, recorded, other)
+    assert difference is not None and difference.name == "ball_2"
+    assert "z of the velocity in m/s was 0.0 in the recording and is -0.0" in str(difference)
+    fewer = compare_balls(3, recorded, other[:1])
+    assert "there were 2 balls in the recording and are 1 now" in str(fewer)
 
 
 # Commands

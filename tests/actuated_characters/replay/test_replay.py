@@ -24,6 +24,7 @@ from actuated_characters.replay.world import cut_world, read_world
 from msgs_config.errors import RecordingError
 from msgs_config.messages import configuration
 from msgs_config.messages.wrenches import WrenchArrays
+from msgs_config.versions import installed_versions
 from sim_node.parameters import make_settings
 from tests.support.bags import (
     CONFIGURATION,
@@ -34,12 +35,7 @@ from tests.support.bags import (
     said_states,
     write_bag,
 )
-from tests.support.recordings import (
-    changed,
-    commanding,
-    recording_of,
-    with_parameters,
-)
+from tests.support.recordings import changed, commanding, recording_of, with_parameters
 
 WALK = {"reference": "clip", "clip": "walk"}
 TICKS = 48
@@ -104,27 +100,21 @@ def test_one_bit_of_a_state_is_found(walk: Recording, quantity: str, row: int) -
     assert f"tick {row + 1}" in str(difference) and repr(difference.recorded) in str(difference)
 
 
-def test_an_effort_that_was_another_one_changes_the_states(walk: Recording) -> None:
-    index = walk.layout.dof_names.index("right_knee")
+@pytest.mark.parametrize(
+    ("entry", "change", "said"),
+    [("right_knee", 1.0, ""), ("chest_x", np.inf, "the replay diverged at tick 22")],
+)
+def test_an_effort_that_was_another_one_changes_the_states(
+    walk: Recording, entry: str, change: float, said: str
+) -> None:
     effort = walk.effort.copy()
-    effort[20, index] += 1.0
-    nobody = replace(walk, effort=effort, commands=((),) * (TICKS + 1))
+    effort[20, walk.layout.dof_names.index(entry)] += change
 
-    result = replay([nobody])
+    result = replay([replace(walk, effort=effort, commands=((),) * (TICKS + 1))])
 
     assert result.difference is not None and result.difference.tick == 22
+    assert said in str(result.difference)
     assert any("no commands" in note for note in result.notes)
-
-
-def test_an_effort_that_is_no_number_is_no_traceback(walk: Recording) -> None:
-    effort = walk.effort.copy()
-    effort[20, 7] = np.inf
-    nobody = replace(walk, effort=effort, commands=((),) * (TICKS + 1))
-
-    difference = replay([nobody]).difference
-
-    assert difference is not None and difference.tick == 22
-    assert "the replay diverged at tick 22" in str(difference)
 
 
 def test_contacts_are_compared_where_they_were_recorded(walk: Recording) -> None:
@@ -147,10 +137,12 @@ def test_within_a_tolerance_the_largest_differences_are_told(walk: Recording) ->
     other = replace(walk, velocity=velocity)
 
     result = replay([other], tolerance=1e-6)
+    beyond = replay([other], tolerance=1e-8).difference
 
     assert result.difference is None
     assert result.largest["m/s"] == pytest.approx(1e-7, rel=1e-6)
     assert result.largest["m"] == result.largest["rad/s"] == 0.0
+    assert beyond is not None and (beyond.tick, beyond.name) == (31, "root_x")
 
 
 # Commands
@@ -371,13 +363,18 @@ def test_terrain_lies_in_the_recording(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("parameters", "reason"),
-    [({"rate": "often"}, "cannot be built again"), ({"turbo": 1}, "unknown parameter")],
+    [
+        ({"rate": "often"}, "cannot be built again"),
+        ({"turbo": 1}, r"unknown parameter 'turbo'.*; recorded with numpy 99\.0 \(now "),
+    ],
 )
-def test_a_simulator_of_another_kind_is_told(
+def test_a_simulator_of_another_kind_or_version_is_told(
     pendulum: Recording, parameters: Mapping[str, object], reason: str
 ) -> None:
+    newer = replace(pendulum, versions={**installed_versions(), "numpy": "99.0"})
+
     with pytest.raises(RecordingError, match=reason):
-        replay([with_parameters(pendulum, **parameters)])
+        replay([with_parameters(newer, **parameters)])
 
 
 def test_pushes_act_again(pendulum: Recording) -> None:

@@ -19,14 +19,9 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from actuated_characters.bags.reader import RecordedMessage
-from actuated_characters.bags.recording import (
-    read_recording,
-)
+from actuated_characters.bags.recording import read_recording
 from actuated_characters.cli import main
-from actuated_characters.replay.command_comparison import (
-    CommandComparison,
-    recorded_commands,
-)
+from actuated_characters.replay.command_comparison import CommandComparison, recorded_commands
 from actuated_characters.replay.players.controller_parameters import (
     first_parameters,
     parameter_changes,
@@ -76,6 +71,17 @@ def recorded(directory: Path, **parameters: object) -> Iterator[Processes]:
 # Recordings
 
 
+def weakened(folder: Path, name: str, joint: str, limit: float) -> str:
+    """The file of a character whose joint has an effort limit, in N m."""
+    content = yaml.safe_load((CHARACTERS_DIRECTORY / f"{name}.yaml").read_text())
+    if (CHARACTERS_DIRECTORY / content["urdf"]).is_file():  # else it is a package's
+        content["urdf"] = str(CHARACTERS_DIRECTORY / content["urdf"])
+    content["joints"][joint]["effort_limit"] = limit
+    file = folder / f"{name}.yaml"
+    file.write_text(yaml.safe_dump(content))
+    return str(file)
+
+
 @pytest.fixture(scope="module")
 def walk(folder: Path) -> Path:
     """A walk with assistance, by the command `run`."""
@@ -87,10 +93,7 @@ def walk(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def eventful(folder: Path, context: Context) -> Path:
     """Late and clipped commands, pushes, changed gains, pauses, a reset, trajectories."""
-    content = yaml.safe_load((CHARACTERS_DIRECTORY / "humanoid.yaml").read_text())
-    content["joints"]["chest"]["effort_limit"] = CHEST_LIMIT
-    own = folder / "weak.yaml"
-    own.write_text(yaml.safe_dump(content))
+    own = weakened(folder, "humanoid", "chest", CHEST_LIMIT)
     client = SimulatorClient(context)
     trajectories = client.speak(topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE))
     strengths = client.speak(topics.STRENGTH.of(topics.CONTROLLER_NODE))
@@ -113,7 +116,7 @@ def eventful(folder: Path, context: Context) -> Path:
 
     with recorded(folder / "eventful") as processes:
         simulator = processes.simulator(
-            str(own),
+            own,
             commanded_joints=["root", *character("humanoid").layout.actuated_joint_names],
             rate=RATE,
             command_delay_ticks=DELAY,
@@ -122,7 +125,7 @@ def eventful(folder: Path, context: Context) -> Path:
             max_ticks=TICKS,
             wait_for_subscribers=4,
         )
-        processes.controller(str(own), rate=RATE, reference="clip", wait_for_subscribers=2)
+        processes.controller(own, rate=RATE, reference="clip", wait_for_subscribers=2)
         client.spin_until(
             lambda: trajectories.get_subscription_count() == 2, "who hears trajectories"
         )
@@ -179,18 +182,14 @@ def foreign(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def realtime(folder: Path, context: Context) -> Path:
     """The pendulum by the wall clock, its commands clipped."""
-    content = yaml.safe_load((CHARACTERS_DIRECTORY / "pendulum.yaml").read_text())
-    content["urdf"] = str(CHARACTERS_DIRECTORY / content["urdf"])
-    content["joints"]["hinge"]["effort_limit"] = 2.0
-    own = folder / "weak_pendulum.yaml"
-    own.write_text(yaml.safe_dump(content))
+    own = weakened(folder, "pendulum", "hinge", 2.0)
     client = Client(context)
     states = client.listen(topics.JOINT_STATES)
     with recorded(folder / "realtime") as processes:
         simulator = processes.simulator(
-            str(own), mode="realtime", wait_for_subscribers=3, command_delay_ticks=1
+            own, mode="realtime", wait_for_subscribers=3, command_delay_ticks=1
         )
-        processes.controller(str(own), wait_for_subscribers=2)
+        processes.controller(own, wait_for_subscribers=2)
 
         def driven() -> bool:
             return sum(map(any, (message.effort for message in states.messages))) > 60
@@ -365,10 +364,10 @@ def test_changed_gains_laws_and_trajectories_come_again(eventful: Path) -> None:
     assert rare.requested == {topic.name for topic in REQUESTS}
     assert sum(map(len, rare.requests.values())) == 4
 
-    findings = by_states(eventful)
+    comparison = by_states(eventful)
 
-    assert findings.identical, str(findings.first)
-    assert findings.states >= TICKS - 1
+    assert comparison.identical, str(comparison.first)
+    assert comparison.states >= TICKS - 1
 
 
 def test_a_gain_that_is_not_changed_as_it_was_is_found_at_its_first_tick(eventful: Path) -> None:
@@ -380,37 +379,39 @@ def test_a_gain_that_is_not_changed_as_it_was_is_found_at_its_first_tick(eventfu
         if any(change.get("gains.chest.p") == 700.0 for change in each)
     ]
 
-    findings = by_states(eventful, settings={"gains.chest.p": first})
+    comparison = by_states(eventful, settings={"gains.chest.p": first})
 
-    assert findings.first is not None and findings.largest is not None
-    assert findings.first.tick == row + 2  # of the next state; the first row is that of tick 1
-    largest = {joint.name: joint.largest for joint in findings.joints}
+    assert comparison.first is not None and comparison.largest is not None
+    assert comparison.first.tick == row + 2  # of the next state; the first row is that of tick 1
+    largest = {joint.name: joint.largest for joint in comparison.joints}
     assert largest["chest"] > 0.1
-    assert not findings.within(0.5 * findings.largest_difference)
-    assert findings.within(findings.largest_difference)
+    assert not comparison.within(0.5 * comparison.largest_difference)
+    assert comparison.within(comparison.largest_difference)
 
 
 def test_each_character_of_a_world_can_be_answered(pair: Path) -> None:
-    findings = by_states(pair, character="right")
+    comparison = by_states(pair, character="right")
 
-    assert findings.identical and findings.states >= 40
+    assert comparison.identical and comparison.states >= 40
 
 
 def test_states_that_the_controller_never_saw_are_left_out(realtime: Path) -> None:
     recording = read_recording(realtime)
     answered = sum(map(bool, recording.commands))
 
-    findings = by_states(realtime)
+    comparison = by_states(realtime)
 
-    assert findings.identical, str(findings.first)
-    assert findings.states == answered > 10
+    assert comparison.identical, str(comparison.first)
+    assert comparison.states == answered > 10
 
 
 def test_a_controller_that_drives_less_is_told(walk: Path) -> None:
-    findings = by_states(walk, settings={"root_assistance": False})
+    comparison = by_states(walk, settings={"root_assistance": False})
 
-    assert not findings.identical and not findings.within(1e9)
-    assert findings.lacking == tuple(f"root_{entry}" for entry in ("x", "y", "z", "rx", "ry", "rz"))
+    assert not comparison.identical and not comparison.within(1e9)
+    assert comparison.lacking == tuple(
+        f"root_{entry}" for entry in ("x", "y", "z", "rx", "ry", "rz")
+    )
 
 
 # A bag that begins in the middle of an episode
@@ -445,10 +446,10 @@ def test_its_controller_begins_with_what_was_in_force_then(late: Path) -> None:
     assert first_parameters(recording)["law"] == "zero"
     assert first_parameters(recording)["gains.chest.p"] == 700.0
 
-    findings = by_states(late)
+    comparison = by_states(late)
 
-    assert findings.identical, str(findings.first)
-    assert findings.states >= len(recording.stamps_ns) - 1
+    assert comparison.identical, str(comparison.first)
+    assert comparison.states >= len(recording.stamps_ns) - 1
 
 
 # The command
