@@ -55,6 +55,10 @@ def add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--through-topics simulator commands, N m or N): for a bag from another machine, whose "
         "last bits may be other ones",
     )
+    _add_through_topics(parser)
+
+
+def _add_through_topics(parser: argparse.ArgumentParser) -> None:
     options = parser.add_argument_group(
         "through topics", "the real nodes, in lockstep, and the bag in the place of one of them"
     )

@@ -113,8 +113,8 @@ class _ReplayedWorld:
     ) -> None:
         self._simulation, self._is_exact = simulation, is_exact
         self._characters = [
-            (recording, actor, list[StampedState]())
-            for recording, actor in zip(together, simulation.actors, strict=True)
+            (recording, simulated, list[StampedState]())
+            for recording, simulated in zip(together, simulation.actors, strict=True)
         ]
         self._lead = together[0]  # of which balls and resets are taken
 
@@ -136,8 +136,8 @@ class _ReplayedWorld:
                 self._simulation.reset()
             elif row and (diverged := self._step(row - 1)) is not None:
                 return diverged
-            for _, actor, states in self._characters:
-                states.append(actor.state)
+            for _, simulated, states in self._characters:
+                states.append(simulated.state)
             if self._is_exact and (difference := self._compare(row)) is not None:
                 return difference
             if row % _PROGRESS_TICKS == 0 or row == last:
@@ -166,10 +166,13 @@ class _ReplayedWorld:
 
     def _compare(self, row: int) -> Difference | None:
         """What differs in the state of a row, and in the contacts of the tick before it."""
-        for recording, actor, _ in self._characters:
-            found = {POSITION: actor.state.position[None], VELOCITY: actor.state.velocity[None]}
+        for recording, simulated, _ in self._characters:
+            found = {
+                POSITION: simulated.state.position[None],
+                VELOCITY: simulated.state.velocity[None],
+            }
             difference = first_difference(recording, found, first_row=row)
-            difference = difference or self._compare_contacts(recording, actor, row)
+            difference = difference or self._compare_contacts(recording, simulated, row)
             if difference is not None:
                 return difference
         balls = self._lead.balls[row] if self._lead.balls else None
@@ -178,10 +181,10 @@ class _ReplayedWorld:
         return compare_balls(self._simulation.tick, balls, self._simulation.ball_motion())
 
     def _compare_contacts(
-        self, recording: Recording, actor: SimulatedCharacter, row: int
+        self, recording: Recording, simulated: SimulatedCharacter, row: int
     ) -> Difference | None:
         recorded = recording.contacts[row - 1] if recording.contacts and row else None
-        if recorded is None or (contacts := actor.contacts) is None:
+        if recorded is None or (contacts := simulated.contacts) is None:
             return None
         links, simulation = [link.name for link in recording.character.links], self._simulation
         found = select(simulation.stamp_ns, links, contacts.wrenches, contacts.touching)

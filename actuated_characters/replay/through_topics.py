@@ -13,6 +13,7 @@ from actuated_characters.replay.players.character_files import write_character, 
 from actuated_characters.replay.players.controller_parameters import first_parameters
 from actuated_characters.replay.players.main import CONTROLLER, SIMULATOR
 from actuated_characters.replay.players.processes import (
+    ANSWER_TIMEOUT,
     Progress,
     Tell,
     child_processes,
@@ -58,25 +59,23 @@ def replay_commands(
         RunError: a process failed, and not because of what differed.
     """
     together, notes = read_world(path, world)
-    are_applied = make_inputs(together)[0].are_applied
-    failure: RunError | None = None
+    are_applied, failure = make_inputs(together)[0].are_applied, None
     session = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
     with child_processes() as children:
         file = children.directory / "states.npz"
-        playing = {"recording": str(path.absolute()), "world": world, "states": str(file)}
-        player = start_player(children, CONTROLLER, playing | session)
+        playing: dict[str, object] = {"world": world, "states": str(file)}
+        player = start_player(children, CONTROLLER, path, playing | session)
         parameters = _simulator_parameters(children.directory, together, are_applied)
         simulator = children.start_node(topics.SIM_NODE, parameters | session)
         try:
             wait_for_player(player, [simulator], progress, tell)
         except RunError as error:
-            failure = error
+            failure = error  # of what differs, if anything does
         found = _found_states(player, file, len(together))
     notes += [_APPLIED] if are_applied else []
     result = compare_world(together, found, tolerance, notes) if found else None
-    if failure is not None and (result is None or result.identical):
-        raise failure
-    assert result is not None
+    if result is None or (failure is not None and result.identical):
+        raise failure or RunError("the player has received no states")
     return result
 
 
@@ -136,15 +135,10 @@ def replay_states(
 ) -> CommandComparison:
     """Let a controller answer a bag's states, and compare its commands with the bag's.
 
-    Args:
-        path: A run's directory, or a bag.
-        progress: Is called with the number of states that are answered.
-        tell: Is called with what is waited for, if it takes long.
-        character: The name of the recording to play, where there are several.
-        settings: Parameters of `controller_node` in place of the recorded ones.
-        start: Start the bag's own controller, in a ROS domain that no other node is in. Without
-            it, one that the user starts is waited for in the present domain, in the character's
-            namespace.
+    The arguments are those of `replay_commands`, and the `character` to play, where there are
+    several; `settings` are parameters of `controller_node` in place of the recorded ones. `start`
+    starts the bag's controller, in a ROS domain that no other node is in; without it, one that the
+    user starts is waited for in the present domain, in the character's namespace.
 
     Raises:
         RecordingError: the bag cannot be read, or it has no commands.
@@ -158,25 +152,29 @@ def replay_states(
             raise ConfigurationError(f"parameter '{name}' is set by the recording")
     session = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
     with child_processes(own=start) as children:
-        file = children.directory / "commands.npz"
-        playing: dict[str, object] = {
-            "recording": str(path.absolute()),
-            "character": recording.name,
-            "commands": str(file),
-            "repeat_requests": start,
-            "fixed": sorted(settings),
-            **session,
-        }
+        others = []
         if start:
             parameters = _controller_parameters(children.directory, recording) | settings | session
-            others = [children.start_node(topics.CONTROLLER_NODE, parameters)]
-            player = start_player(children, SIMULATOR, playing)
-        else:
-            others, playing["start_timeout"] = [], 0.0
-            player = start_player(children, SIMULATOR, playing, recording.name)
+            others.append(children.start_node(topics.CONTROLLER_NODE, parameters))
+        file = children.directory / "commands.npz"
+        playing = _player_parameters(recording, settings, start) | {"commands": str(file)} | session
+        namespace = "" if start else recording.name
+        player = start_player(children, SIMULATOR, path, playing, namespace)
         wait_for_player(player, others, progress, tell)
         with np.load(file) as arrays:
             return compare_commands(recording, arrays["commands"])
+
+
+def _player_parameters(
+    recording: Recording, settings: Mapping[str, object], start: bool
+) -> dict[str, object]:
+    """The parameters of a player in the simulator's place."""
+    return {
+        "character": recording.name,
+        "repeat_requests": start,
+        "fixed": sorted(settings),
+        "start_timeout": ANSWER_TIMEOUT if start else 0.0,
+    }
 
 
 def _controller_parameters(directory: Path, recording: Recording) -> dict[str, object]:

@@ -72,11 +72,16 @@ def child_processes(*, own: bool = True) -> Iterator[Children]:
 
 
 def start_player(
-    children: Children, place: str, parameters: Mapping[str, object], namespace: str = ""
+    children: Children,
+    place: str,
+    bag: Path,
+    parameters: Mapping[str, object],
+    namespace: str = "",
 ) -> Child:
-    """Start a player in the place of the `CONTROLLER` or the `SIMULATOR`."""
+    """Start a player of a bag in the place of the `CONTROLLER` or the `SIMULATOR`."""
+    playing = {"recording": str(bag.absolute()), **parameters}
     remap = ["-r", f"__ns:=/{namespace}"] if namespace else []
-    return children.start_node("player", parameters, *remap, arguments=[place], any_node=True)
+    return children.start_node("player", playing, *remap, arguments=[place], any_node=True)
 
 
 def wait_for_player(player: Child, others: Sequence[Child], progress: Progress, tell: Tell) -> None:
