@@ -58,6 +58,13 @@ def differences(layout: JointLayout, start: FloatArray, end: FloatArray) -> Floa
     return result
 
 
+def different_bits(one: FloatArray, other: FloatArray) -> BoolArray:
+    """Where two arrays of one shape are not the same doubles: -0.0 is not 0.0, NaN is NaN."""
+    bits = (np.ascontiguousarray(values).view(np.int64) for values in (one, other))
+    different: BoolArray = np.not_equal(*bits) & ~(np.isnan(one) & np.isnan(other))
+    return different
+
+
 def distances(layout: JointLayout, start: FloatArray, end: FloatArray) -> FloatArray:
     """Distance (r, b) of each vector between two positions (r, n), rad or m."""
     if not layout.size:

@@ -1,17 +1,32 @@
-"""What differs between what was recorded and what has come of it again."""
+"""Compares states, contacts and balls with the recorded ones: to the last bit, or by a tolerance.
+
+States are given as arrays by quantity, `States`. Row k is the state k of the recording; its effort
+is the one that was applied in the tick before, NaN in an episode's first state.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
+from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics import error_measures
+from actuated_characters.metrics.error_measures import different_bits
+from actuated_characters.metrics.run_metrics import StateHash
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.projectiles import BallStates
+from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import WrenchArrays
+from msgs_config.shared_parameters import RATE
 
 POSITION, VELOCITY, EFFORT = "position", "velocity", "effort"
+QUANTITIES = (EFFORT, POSITION, VELOCITY)  # of equal ticks the effort differs first: it is a cause
+
+States: TypeAlias = Mapping[str, FloatArray]
+"""Arrays (m, n) of m states of n degrees of freedom by quantity: rad, m, rad/s, m/s, N m, N."""
 
 _UNITS = {POSITION: ("rad", "m"), VELOCITY: ("rad/s", "m/s"), EFFORT: ("N m", "N")}
 _WRENCH = tuple(f"{axis} of the contact {part}" for part in ("force", "torque") for axis in "xyz")
@@ -25,20 +40,20 @@ _MOTION = (
 
 @dataclass(frozen=True)
 class Difference:
-    """The first thing that is not what it was; `str` of it is one line."""
+    """A number that is not the recorded one; `str` of it is one line."""
 
-    tick: int  # of the message in which it stands
-    stamp_ns: int  # likewise
+    tick: int  # of the message that has the number
+    stamp_ns: int  # of the same message
     quantity: str  # such as "position"
-    name: str  # the degree of freedom or the link
+    name: str  # of the degree of freedom, link or ball
     recorded: float
-    found: float  # the second time
-    sentence: str  # what is said of it, without tick and character
+    found: float  # in the replay
+    sentence: str  # describes it, without tick and character
     character: str = ""  # `Recording.name`
 
     @property
     def apart(self) -> float:
-        """By how much they differ, in their unit; 0 for what differs in the sign of zero alone."""
+        """`found - recorded`, in their unit; 0 for what differs in the sign of zero alone."""
         return self.found - self.recorded
 
     def __str__(self) -> str:
@@ -49,12 +64,12 @@ class Difference:
 
 @dataclass(frozen=True)
 class ReplayResult:
-    """What has come of a replay."""
+    """The outcome of a replay."""
 
     difference: Difference | None  # the first one, None if all is identical or within tolerance
     states: int  # that were compared, of each character
     episodes: int
-    state_hashes: Mapping[str, str]  # of the states that have come, by `Recording.name`
+    state_hashes: Mapping[str, str]  # of the replayed states, by `Recording.name`
     largest: Mapping[str, float] = field(default_factory=dict)  # differences by unit
     notes: Sequence[str] = ()  # what could not be compared, and why
 
@@ -64,15 +79,14 @@ class ReplayResult:
         return self.difference is None
 
 
+def clock_of(recording: Recording) -> TickClock:
+    """The clock of the recorded simulator."""
+    return TickClock(int(recording.parameters[RATE.name]))
+
+
 def same_bits(one: FloatArray, other: FloatArray) -> bool:
     """Whether two arrays are the same doubles: -0.0 is not 0.0, and NaN is itself."""
     return one.tobytes() == other.tobytes()
-
-
-def differing(one: FloatArray, other: FloatArray) -> list[int]:
-    """Indices of the entries (n,) whose bits differ."""
-    bits = (np.ascontiguousarray(values).view(np.int64) for values in (one, other))
-    return np.flatnonzero(np.not_equal(*bits)).tolist()
 
 
 def unit_of(layout: JointLayout, index: int, quantity: str) -> str:
@@ -82,51 +96,132 @@ def unit_of(layout: JointLayout, index: int, quantity: str) -> str:
     return _UNITS[quantity][joint.type is JointType.PRISMATIC or floating]
 
 
-def compare_states(
-    layout: JointLayout,
-    tick: int,
-    stamp_ns: int,
-    recorded: tuple[FloatArray, FloatArray],
-    found: tuple[FloatArray, FloatArray],
-    character: str = "",
-) -> Difference | None:
-    """The first entry of position and velocity (n,) whose bits differ, None if there is none."""
-    for quantity, before, now in zip((POSITION, VELOCITY), recorded, found, strict=True):
-        if not same_bits(before, now):
-            index = differing(before, now)[0]
-            return state_difference(layout, tick, stamp_ns, quantity, index, before, now, character)
-    return None
+def compare_world(
+    together: Sequence[Recording],
+    found: Sequence[States],
+    tolerance: float | None = None,
+    notes: Sequence[str] = (),
+) -> ReplayResult:
+    """Compare replayed states of the characters of a world with their recordings.
 
-
-def state_difference(
-    layout: JointLayout,
-    tick: int,
-    stamp_ns: int,
-    quantity: str,
-    index: int,
-    recorded: FloatArray,
-    found: FloatArray,
-    character: str = "",
-) -> Difference:
-    """A difference of one entry of positions or velocities (n,)."""
-    name, unit = layout.dof_names[index], unit_of(layout, index, quantity)
-    before, now = float(recorded[index]), float(found[index])
-    apart = float(differences(layout, quantity, recorded, found)[index])
-    sentence = (
-        f"{quantity} of '{name}' was {before!r} {unit} in the recording and is {now!r} {unit} now: "
-        f"{apart:.3g} {unit} apart"
+    Args:
+        together: The recordings, which begin with the same state.
+        found: The replayed states of each, the first one first.
+        tolerance: Largest difference that is accepted, in rad, m, rad/s and m/s, of positions and
+            velocities alone; None: every bit has to be the same, those of efforts too.
+        notes: Of the result.
+    """
+    count = min(len(states[POSITION]) for states in found)
+    compared = QUANTITIES if tolerance is None else (POSITION, VELOCITY)
+    pairs = [
+        (recording, {each: states[each][:count] for each in compared if each in states})
+        for recording, states in zip(together, found, strict=True)
+    ]
+    differences = [first_difference(*pair, tolerance=tolerance) for pair in pairs]
+    return ReplayResult(
+        difference=min(filter(None, differences), key=lambda each: each.tick, default=None),
+        states=count,
+        episodes=int((together[0].episode_rows < count).sum()),
+        state_hashes={
+            recording.name: _hash(recording, states)
+            for recording, states in zip(together, found, strict=True)
+        },
+        largest={} if tolerance is None else _largest_differences(pairs),
+        notes=notes,
     )
-    return Difference(tick, stamp_ns, quantity, name, before, now, sentence, character)
 
 
-def differences(
+def first_difference(
+    recording: Recording, found: States, *, first_row: int = 0, tolerance: float | None = None
+) -> Difference | None:
+    """The first state that is not the recorded one, None if there is none.
+
+    Of that state it is the first degree of freedom whose bits differ; or with a `tolerance` (rad,
+    m, rad/s, m/s) the one that is farthest from the recorded. Rotations are compared as rotations.
+
+    Args:
+        recording: What was recorded.
+        found: The replayed states; quantities that are not there are not compared.
+        first_row: Row in the recording of the first of them.
+        tolerance: Largest difference that is accepted; None: every bit has to be the same.
+    """
+    differences = []
+    for quantity, values in found.items():
+        recorded = _values(recording, quantity, slice(first_row, first_row + len(values)))
+        if tolerance is None and same_bits(recorded, values):
+            continue
+        apart = _apart(recording.layout, quantity, recorded, values)
+        beyond = np.abs(apart)  # NaN is beyond any tolerance
+        differs = different_bits(recorded, values) if tolerance is None else ~(beyond <= tolerance)
+        rows = np.flatnonzero(differs.any(axis=1))
+        if len(rows):
+            row = int(rows[0])
+            entry = int(np.argmax((differs if tolerance is None else beyond)[row]))
+            numbers = (float(array[row, entry]) for array in (recorded, values, apart))
+            at = (first_row + row, entry)
+            differences.append(_state_difference(recording, quantity, at, *numbers))
+    return min(differences, key=lambda each: each.tick, default=None)
+
+
+def _state_difference(
+    recording: Recording,
+    quantity: str,
+    at: tuple[int, int],
+    recorded: float,
+    found: float,
+    apart: float,
+) -> Difference:
+    """The difference of a number in a row and column of a recording."""
+    row, entry = at
+    name, unit = recording.layout.dof_names[entry], unit_of(recording.layout, entry, quantity)
+    stamp_ns = int(recording.stamps_ns[row])
+    sentence = (
+        f"{quantity} of '{name}' was {recorded!r} {unit} in the recording and is {found!r} {unit} "
+        f"now: {apart:.3g} {unit} apart"
+    )
+    tick = clock_of(recording).tick(stamp_ns)
+    return Difference(tick, stamp_ns, quantity, name, recorded, found, sentence, recording.name)
+
+
+def _values(recording: Recording, quantity: str, rows: slice) -> FloatArray:
+    """A quantity (m, n) of some states as recorded; an effort is that of the tick before."""
+    if quantity == EFFORT:
+        return np.vstack((np.full((1, recording.layout.size), np.nan), recording.effort))[rows]
+    return recording.position[rows] if quantity == POSITION else recording.velocity[rows]
+
+
+def _apart(
     layout: JointLayout, quantity: str, recorded: FloatArray, found: FloatArray
 ) -> FloatArray:
-    """From what was recorded to what is found (..., n); positions' rotations as rotations."""
-    if quantity != POSITION:
-        difference: FloatArray = found - recorded
-        return difference
-    return layout.difference(layout.configuration(recorded), layout.configuration(found))
+    """From what was recorded to what is found (m, n), in the quantity's units."""
+    if quantity == POSITION:
+        return error_measures.differences(layout, recorded, found)
+    difference: FloatArray = found - recorded
+    return difference
+
+
+def _largest_differences(pairs: Sequence[tuple[Recording, States]]) -> dict[str, float]:
+    """The largest difference of the first states of recordings, by its unit."""
+    largest: dict[str, float] = {}
+    for recording, found in pairs:
+        layout = recording.layout
+        for quantity, values in found.items():
+            recorded = _values(recording, quantity, slice(len(values)))
+            sizes = np.abs(_apart(layout, quantity, recorded, values)).max(axis=0, initial=0.0)
+            for entry, size in enumerate(sizes.tolist()):
+                unit = unit_of(layout, entry, quantity)
+                largest[unit] = max(size, largest.get(unit, 0.0))
+    return largest
+
+
+def _hash(recording: Recording, found: States) -> str:
+    """The hash of replayed states with the recorded stamps."""
+    state_hash = StateHash()
+    for stamp_ns, position, velocity in zip(
+        recording.stamps_ns.tolist(), found[POSITION], found[VELOCITY], strict=False
+    ):
+        state_hash.add(StampedState(stamp_ns, position, velocity, None))
+    return state_hash.hexdigest()
 
 
 def compare_contacts(
@@ -136,16 +231,17 @@ def compare_contacts(
 
     def difference(link: str, what: str, before: float, now: float) -> Difference:
         sentence = f"{what} on '{link}' was {before!r} in the recording and is {now!r} now"
-        return Difference(
-            tick, recorded.stamp_ns, "contact", link, before, now, sentence, character
-        )
+        stamp_ns = recorded.stamp_ns
+        return Difference(tick, stamp_ns, "contact", link, before, now, sentence, character)
 
+    if recorded.links == found.links and np.array_equal(recorded.wrenches, found.wrenches):
+        return None
     for link in recorded.links + found.links:
         touched = link in recorded.links, link in found.links
         if touched[0] != touched[1]:
-            return difference(link, "the number of contacts", *(float(each) for each in touched))
-    for row, link in enumerate(recorded.links):
-        before, now = recorded.wrenches[row], found.wrenches[found.links.index(link)]
+            return difference(link, "the number of contacts", *map(float, touched))
+    for before, link in zip(recorded.wrenches, recorded.links, strict=True):
+        now = found.wrenches[found.links.index(link)]
         if not np.array_equal(before, now):
             axis = int(np.argmax(before != now))
             return difference(link, _WRENCH[axis], float(before[axis]), float(now[axis]))
@@ -153,17 +249,18 @@ def compare_contacts(
 
 
 def compare_balls(tick: int, recorded: BallStates, found: FloatArray) -> Difference | None:
-    """The first ball that moves otherwise (m, 13), or is not there; None if there is none."""
-    count = len(recorded.motion)
-    if count != len(found):
-        sentence = f"there were {count} balls in the recording and are {len(found)} now"
-        return Difference(
-            tick, recorded.stamp_ns, "ball", "", float(count), float(len(found)), sentence
+    """The first number of the balls' motion (m, 13) that differs, or their number; None if none."""
+    name, before, now = "", float(len(recorded.motion)), float(len(found))
+    sentence = f"there were {before:.0f} balls in the recording and are {now:.0f} now"
+    if before == now:
+        places = np.argwhere(different_bits(recorded.motion, found)).tolist()
+        if not places:
+            return None
+        ball, column = places[0]
+        name, before, now = (
+            recorded.names[ball],
+            *(float(motion[ball, column]) for motion in (recorded.motion, found)),
         )
-    if same_bits(recorded.motion, found):
-        return None
-    index = differing(recorded.motion.ravel(), found.ravel())[0]
-    name, what = recorded.names[index // len(_MOTION)], _MOTION[index % len(_MOTION)]
-    before, now = float(recorded.motion.flat[index]), float(found.flat[index])
-    sentence = f"'{name}': {what} was {before!r} in the recording and is {now!r} now"
+        what = _MOTION[column]
+        sentence = f"'{name}': {what} was {before!r} in the recording and is {now!r} now"
     return Difference(tick, recorded.stamp_ns, "ball", name, before, now, sentence)

@@ -1,38 +1,36 @@
 """Replays a recording without ROS: the torques and pushes that really acted, tick by tick."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.replay.comparison import (
+    POSITION,
+    VELOCITY,
     Difference,
     ReplayResult,
+    States,
     compare_balls,
     compare_contacts,
-    compare_states,
+    compare_world,
+    first_difference,
 )
-from actuated_characters.replay.completeness import check_pushes, check_throws, first_uncommanded
-from actuated_characters.replay.tolerance import compare_within
+from actuated_characters.replay.effort_check import first_uncommanded
 from actuated_characters.replay.world import (
-    common_rows,
-    left_out,
+    check_pushes,
+    check_throws,
+    cut_world,
+    make_pushes,
     make_simulation,
-    pushes_of,
     worlds,
 )
-from msgs_config.arrays import IntArray
 from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
-from msgs_config.messages.wrenches import WrenchArrays, select
+from msgs_config.messages.wrenches import select
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.wrenches import ExternalWrench
-
-Progress = Callable[[int], None]
-"""Is told how many ticks are done, of all worlds together."""
 
 _PROGRESS_TICKS = 100
 
@@ -41,24 +39,24 @@ def replay(
     recordings: Sequence[Recording],
     *,
     tolerance: float | None = None,
-    progress: Progress = lambda done: None,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> ReplayResult:
     """Simulate a bag's recordings again, and compare every state; contacts too, where recorded.
 
     Args:
         recordings: All of a bag, see `read_recordings`.
-        tolerance: How far a position or a velocity may be from the recorded one (rad, m, rad/s,
-            m/s), on another machine than the one that recorded; None: not by one bit.
-        progress: See `Progress`.
+        tolerance: Largest difference of a position or velocity that is accepted (rad, m, rad/s,
+            m/s), for another machine than the recording's; None: every bit has to be the same.
+        progress: Is called with the number of ticks that are done, of all worlds together.
 
     Raises:
-        RecordingError: the recording lacks what a replay needs; says what.
+        RecordingError: the recording lacks what a replay needs; the message names it.
         ActuatedCharactersError: a file of the character cannot be used.
     """
     results: list[ReplayResult] = []
     for together in worlds(recordings):
         done = sum(result.states - 1 for result in results)
-        results.append(_WorldReplay(together, tolerance).run(progress, done))
+        results.append(_replay_world(together, tolerance, progress, done))
         if results[-1].difference is not None:
             break
     return _joined(results)
@@ -66,7 +64,7 @@ def replay(
 
 def tick_count(recordings: Sequence[Recording]) -> int:
     """How many ticks a replay takes, of all worlds together."""
-    return sum(common_rows(together)[1] - 1 for together in worlds(recordings))
+    return sum(len(cut_world(together)[0][0].effort) for together in worlds(recordings))
 
 
 def _joined(results: Sequence[ReplayResult]) -> ReplayResult:
@@ -87,98 +85,78 @@ def _joined(results: Sequence[ReplayResult]) -> ReplayResult:
     )
 
 
-@dataclass(frozen=True)
-class _Part:
-    """One character's part in the replay of a world."""
+def _replay_world(
+    whole: Sequence[Recording], tolerance: float | None, progress: Callable[[int], None], done: int
+) -> ReplayResult:
+    """Replay all ticks of a world, or until something differs; `done` were done before."""
+    together, notes = cut_world(whole)
+    notes += [note for recording in together for note in check_pushes(recording)]
+    notes += check_throws(together[0])
+    uncommanded, more = first_uncommanded(whole)
+    stamps_ns, last = together[0].stamps_ns, len(together[0].effort)
+    if uncommanded is not None and uncommanded.stamp_ns > stamps_ns[-1]:
+        uncommanded = None
+    if uncommanded is not None:  # then what comes before it is of interest alone
+        last = int(np.searchsorted(stamps_ns, uncommanded.stamp_ns)) - 1
+    with make_simulation(together, int(stamps_ns[0])) as simulation:
+        world = _ReplayedWorld(together, simulation, is_exact=tolerance is None)
+        difference = world.simulate(last, lambda row: progress(done + row))
+    result = compare_world(together, world.found(), tolerance, (*notes, *more))
+    return replace(result, difference=difference or result.difference or uncommanded)
 
-    recording: Recording
-    first: int  # row of the first state that is replayed
-    links: tuple[str, ...]
-    hash: StateHash = field(default_factory=StateHash)
-    states: list[StampedState] = field(default_factory=list)  # kept where a tolerance is given
 
+class _ReplayedWorld:
+    """A simulation of recorded characters, whose rows are those of all the recordings."""
 
-class _WorldReplay:
-    """The replay of the characters of one world. An offset counts states from the first one."""
-
-    def __init__(self, together: Sequence[Recording], tolerance: float | None) -> None:
-        rows, count = common_rows(together)
-        self._together, self._tolerance = together, tolerance
-        self._parts = [
-            _Part(recording, row, tuple(link.name for link in recording.character.links))
-            for recording, row in zip(together, rows, strict=True)
+    def __init__(
+        self, together: Sequence[Recording], simulation: Simulation, *, is_exact: bool
+    ) -> None:
+        self._simulation, self._is_exact = simulation, is_exact
+        self._characters = [
+            (recording, simulated, list[StampedState]())
+            for recording, simulated in zip(together, simulation.characters, strict=True)
         ]
-        lead, first = together[0], rows[0]
-        self._stamps_ns: IntArray = lead.stamps_ns[first : first + count]
-        offsets = {row - first for row in lead.episode_rows.tolist()}
-        self._begins = {offset for offset in offsets if 0 <= offset < count}
+        self._lead = together[0]  # of which balls and resets are taken
 
-    def run(self, progress: Progress, done: int) -> ReplayResult:
-        """Replay all ticks, or until something differs; `done` is what was done before."""
-        ticks = len(self._stamps_ns) - 1
-        notes = left_out(self._together, [part.first for part in self._parts])
-        notes += [
-            note
-            for part in self._parts
-            for note in check_pushes(part.recording, range(part.first, part.first + ticks))
+    def found(self) -> list[States]:
+        """The states so far, of each character."""
+        return [
+            {
+                POSITION: np.array([s.position for s in states]).reshape(-1, recording.layout.size),
+                VELOCITY: np.array([s.velocity for s in states]).reshape(-1, recording.layout.size),
+            }
+            for recording, _, states in self._characters
         ]
-        notes += check_throws(self._together[0])
-        uncommanded, more = first_uncommanded(self._together)
-        if uncommanded is not None and uncommanded.stamp_ns > self._stamps_ns[-1]:
-            uncommanded = None
-        last = ticks
-        if uncommanded is not None:  # then what comes before it is of interest alone
-            last = int(np.searchsorted(self._stamps_ns, uncommanded.stamp_ns)) - 1
-        largest: dict[str, float] = {}
-        with make_simulation(self._together, int(self._stamps_ns[0])) as simulation:
-            states, difference = self._simulate(
-                simulation, last, lambda offset: progress(done + offset)
-            )
-            if self._tolerance is not None and difference is None:
-                difference, largest = self._compare_within(simulation, self._tolerance)
-        return ReplayResult(
-            difference=difference or uncommanded,
-            states=states,
-            episodes=len(self._begins),
-            state_hashes={part.recording.name: part.hash.hexdigest() for part in self._parts},
-            largest=largest,
-            notes=(*notes, *more),
+
+    def simulate(self, last: int, progress: Callable[[int], None]) -> Difference | None:
+        """Simulate up to the state of row `last`, or to the first that differs by a bit."""
+        resets = set(self._lead.episode_rows[1:].tolist())
+        for row in range(last + 1):
+            if row in resets:
+                self._simulation.reset()
+            elif row and (diverged := self._step(row - 1)) is not None:
+                return diverged
+            for _, simulated, states in self._characters:
+                states.append(simulated.state)
+            if self._is_exact and (difference := self._compare(row)) is not None:
+                return difference
+            if row % _PROGRESS_TICKS == 0 or row == last:
+                progress(row)
+        return None
+
+    def _step(self, row: int) -> Difference | None:
+        """Take the tick that begins with the state of a row; a difference if it diverges."""
+        simulation, lead = self._simulation, self._lead
+        recordings = [recording for recording, _, _ in self._characters]
+        simulation.watches_contacts = self._is_exact and any(
+            each.contacts and each.contacts[row] is not None for each in recordings
         )
-
-    def _simulate(
-        self, simulation: Simulation, last: int, progress: Progress
-    ) -> tuple[int, Difference | None]:
-        """Replay up to the state of offset `last`; the number of states and what differs."""
-        for offset in range(last + 1):
-            if offset and offset in self._begins:
-                simulation.reset()
-            elif offset:
-                diverged = self._step(simulation, offset - 1)
-                if diverged is not None:
-                    return offset, diverged
-            difference = self._compare_balls(simulation, offset)
-            for part, actor in zip(self._parts, simulation.characters, strict=True):
-                difference = self._compare(simulation, part, actor, offset) or difference
-                if difference is not None:
-                    return offset + 1, difference
-            if offset % _PROGRESS_TICKS == 0 or offset == last:
-                progress(offset)
-        return last + 1, None
-
-    def _step(self, simulation: Simulation, offset: int) -> Difference | None:
-        """Take the tick that begins with the state of an offset; says so if that ends badly."""
-        efforts, pushes = [], []
-        simulation.watches_contacts = False
-        for part in self._parts:
-            row, recording = part.first + offset, part.recording
-            efforts.append(recording.effort[row])
-            pushes.append(_pushes(part, row, simulation.tick))
-            if recording.contacts and recording.contacts[row] is not None:
-                simulation.watches_contacts = self._tolerance is None
-        lead = self._parts[0]
-        throws = lead.recording.throws[lead.first + offset] if lead.recording.throws else ()
         try:
-            simulation.step(efforts, pushes, throws)
+            simulation.step(
+                [recording.effort[row] for recording in recordings],
+                [make_pushes(recording, row, simulation.tick) for recording in recordings],
+                lead.throws[row] if lead.throws else (),
+            )
         except SimulationError as error:
             tick = simulation.tick + 1
             sentence = f"the recording went on, but the replay {error}"
@@ -186,67 +164,28 @@ class _WorldReplay:
             return Difference(tick, stamp_ns, "state", "", np.nan, np.nan, sentence)
         return None
 
-    def _compare(
-        self, simulation: Simulation, part: _Part, actor: SimulatedCharacter, offset: int
+    def _compare(self, row: int) -> Difference | None:
+        """What differs in the state of a row, and in the contacts of the tick before it."""
+        for recording, simulated, _ in self._characters:
+            found = {
+                POSITION: simulated.state.position[None],
+                VELOCITY: simulated.state.velocity[None],
+            }
+            difference = first_difference(recording, found, first_row=row)
+            difference = difference or self._compare_contacts(recording, simulated, row)
+            if difference is not None:
+                return difference
+        balls = self._lead.balls[row] if self._lead.balls else None
+        if balls is None:
+            return None
+        return compare_balls(self._simulation.tick, balls, self._simulation.ball_motion())
+
+    def _compare_contacts(
+        self, recording: Recording, simulated: SimulatedCharacter, row: int
     ) -> Difference | None:
-        """What differs in one character's state, and in the contacts of the tick before it."""
-        part.hash.add(actor.state)
-        if self._tolerance is not None:
-            part.states.append(actor.state)
+        recorded = recording.contacts[row - 1] if recording.contacts and row else None
+        if recorded is None or (contacts := simulated.contacts) is None:
             return None
-        row, recording = part.first + offset, part.recording
-        return compare_states(
-            recording.layout,
-            simulation.tick,
-            actor.state.stamp_ns,
-            (recording.position[row], recording.velocity[row]),
-            (actor.state.position, actor.state.velocity),
-            recording.name,
-        ) or _compare_contacts(simulation, part, actor, row)
-
-    def _compare_balls(self, simulation: Simulation, offset: int) -> Difference | None:
-        """What differs in where the balls are, of which a tolerance says nothing."""
-        lead = self._parts[0]
-        recorded = lead.recording.balls[lead.first + offset] if lead.recording.balls else None
-        if recorded is None or self._tolerance is not None:
-            return None
-        return compare_balls(simulation.tick, recorded, simulation.ball_motion())
-
-    def _compare_within(
-        self, simulation: Simulation, tolerance: float
-    ) -> tuple[Difference | None, dict[str, float]]:
-        """The first difference of all characters beyond the tolerance, and the largest ones."""
-        found: list[Difference] = []
-        largest: dict[str, float] = {}
-        for part in self._parts:
-            difference, its = compare_within(
-                part.recording, part.first, part.states, tolerance, simulation.clock
-            )
-            found += [] if difference is None else [difference]
-            largest |= {unit: max(its[unit], largest.get(unit, 0.0)) for unit in its}
-        return min(found, key=lambda difference: difference.tick, default=None), largest
-
-
-def _pushes(part: _Part, row: int, tick: int) -> Sequence[ExternalWrench]:
-    applied = part.recording.applied_wrench[row] if part.recording.applied_wrench else None
-    if applied is None or not applied.links:
-        return ()
-    return pushes_of(part.recording.character, applied, tick)
-
-
-def _compare_contacts(
-    simulation: Simulation, part: _Part, actor: SimulatedCharacter, row: int
-) -> Difference | None:
-    """Compare what touched in the tick that led to the state of a row."""
-    recorded = part.recording.contacts[row - 1] if part.recording.contacts and row else None
-    if recorded is None or actor.contacts is None:
-        return None
-    contacts = actor.contacts
-    found = select(simulation.stamp_ns, part.links, contacts.wrenches, contacts.touching)
-    if _same_contacts(recorded, found):
-        return None
-    return compare_contacts(simulation.tick, recorded, found, part.recording.name)
-
-
-def _same_contacts(one: WrenchArrays, other: WrenchArrays) -> bool:
-    return one.links == other.links and np.array_equal(one.wrenches, other.wrenches)
+        links, simulation = [link.name for link in recording.character.links], self._simulation
+        found = select(simulation.stamp_ns, links, contacts.wrenches, contacts.touching)
+        return compare_contacts(simulation.tick, recorded, found, recording.name)

@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from actuated_characters.bags.recording import Recording, read_recording
-from actuated_characters.replay.comparison import ReplayResult
-from actuated_characters.replay.players.files import write_character, write_urdf
-from actuated_characters.replay.players.findings import CommandFindings, compare_commands
-from actuated_characters.replay.players.main import COMMANDS, STATES
+from actuated_characters.replay.command_comparison import CommandComparison, compare_commands
+from actuated_characters.replay.comparison import QUANTITIES, ReplayResult, States, compare_world
+from actuated_characters.replay.players.character_files import write_character, write_urdf
+from actuated_characters.replay.players.controller_parameters import first_parameters
+from actuated_characters.replay.players.main import CONTROLLER, SIMULATOR
 from actuated_characters.replay.players.processes import (
+    ANSWER_TIMEOUT,
     Progress,
     Tell,
-    session,
+    child_processes,
     start_player,
     wait_for_player,
 )
-from actuated_characters.replay.players.results import FoundStates, compare_found
-from actuated_characters.replay.players.script import make_scripts, read_world
-from actuated_characters.replay.players.steering import first_parameters
-from actuated_characters.replay.world import simulator_values
+from actuated_characters.replay.players.simulator_inputs import make_inputs
+from actuated_characters.replay.world import read_world, simulator_values
 from actuated_characters.runs.processes import Child
 from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.messages import topics
@@ -29,19 +29,8 @@ from msgs_config.messages.session import SESSION, make_session
 from msgs_config.shared_parameters import CHARACTER, PLACEMENT
 from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
 
-_OF_A_CHARACTER = (
-    PLACEMENT.name,
-    "commanded_joints",
-    "initial_position",
-    "initial_velocity",
-)
-_NOT_TO_BE_SET = (
-    CHARACTER.name,
-    PLACEMENT.name,
-    SESSION.name,
-    "rate",
-    "wait_for_subscribers",
-)
+_OF_A_CHARACTER = (PLACEMENT.name, "commanded_joints", "initial_position", "initial_velocity")
+_NOT_TO_BE_SET = (CHARACTER.name, PLACEMENT.name, SESSION.name, "rate", "wait_for_subscribers")
 _APPLIED = (
     "not every tick has its commands in the bag, so the efforts that were really applied were "
     "sent, to a simulator in lockstep without effort limits and without delay"
@@ -56,47 +45,42 @@ def replay_commands(
     tolerance: float | None = None,
     world: int = 0,
 ) -> ReplayResult:
-    """Let a bag take the controller's place: it answers a simulator as one was answered then.
-
-    The simulator is started with the parameters and the character that are in the bag.
+    """Start a bag's simulator, answer its states with the bag's commands, and compare the states.
 
     Args:
         path: A run's directory, or a bag.
-        progress: Is told the number of states that have come.
-        tell: Is told what is waited for, if it takes long.
-        tolerance: Largest difference that is none, in rad, m, rad/s and m/s; None: not a bit.
+        progress: Is called with the number of states so far.
+        tell: Is called with what is waited for, if it takes long.
+        tolerance: See `compare_world`.
         world: Which of the bag's worlds, where there are several; counted from 0.
 
     Raises:
-        RecordingError: the bag cannot be read, or its world not be rebuilt.
+        RecordingError: the bag cannot be read, or its world cannot be built again.
         RunError: a process failed, and not because of what differed.
     """
     together, notes = read_world(path, world)
-    scripts = make_scripts(together)
-    applies = scripts[0].applies
-    failure: RunError | None = None
-    own = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
-    with session() as run:
-        file = run.directory / "states.npz"
-        playing = {"recording": str(path.absolute()), "world": world, "states": str(file)}
-        player = start_player(run, COMMANDS, playing | own)
-        parameters = _simulator_parameters(run.directory, together, applies) | own
-        simulator = run.start_node(topics.SIM_NODE, parameters)
+    are_applied, failure = make_inputs(together)[0].are_applied, None
+    session = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
+    with child_processes() as children:
+        file = children.directory / "states.npz"
+        playing: dict[str, object] = {"world": world, "states": str(file)}
+        player = start_player(children, CONTROLLER, path, playing | session)
+        parameters = _simulator_parameters(children.directory, together, are_applied)
+        simulator = children.start_node(topics.SIM_NODE, parameters | session)
         try:
             wait_for_player(player, [simulator], progress, tell)
         except RunError as error:
-            failure = error
+            failure = error  # of what differs, if anything does
         found = _found_states(player, file, len(together))
-    notes += [_APPLIED] if applies else []
-    result = compare_found(together, found, tolerance, notes) if found else None
-    if failure is not None and (result is None or result.identical):
-        raise failure
-    assert result is not None
+    notes += [_APPLIED] if are_applied else []
+    result = compare_world(together, found, tolerance, notes) if found else None
+    if result is None or (failure is not None and result.identical):
+        raise failure or RunError("the player has received no states")
     return result
 
 
 def _simulator_parameters(
-    directory: Path, together: Sequence[Recording], applies: bool
+    directory: Path, together: Sequence[Recording], are_applied: bool
 ) -> dict[str, object]:
     """The recorded simulator's parameters, for one that waits for each command."""
     first = simulator_values(together[0])
@@ -108,11 +92,13 @@ def _simulator_parameters(
         parameters[CHARACTERS.name] = [recording.world.name for recording in together]
     for number, recording in enumerate(together):
         prefix = f"{recording.world.name}." if recording.world.name else ""
-        file = write_character(directory / f"{number}", recording.character, lift_limits=applies)
+        file = write_character(
+            directory / f"{number}", recording.character, lift_limits=are_applied
+        )
         values = simulator_values(recording)
         parameters[prefix + CHARACTER.name] = str(file)
         parameters |= {prefix + name: values[name] for name in _OF_A_CHARACTER}
-    if applies:
+    if are_applied:
         parameters["command_delay_ticks"] = 0
     return parameters | {
         "mode": "lockstep",
@@ -126,16 +112,14 @@ def _simulator_parameters(
     }
 
 
-def _found_states(player: Child, file: Path, characters: int) -> list[FoundStates]:
-    """What a player has heard; nothing if it had not begun to listen."""
+def _found_states(player: Child, file: Path, characters: int) -> list[States]:
+    """The states that a player has received; none if it had not begun to listen."""
     player.end(signal.SIGINT)  # it may still wait for a simulator that has failed
     if not file.is_file():
         return []
     with np.load(file) as arrays:
         return [
-            FoundStates(
-                *(arrays[f"{what}_{number}"] for what in ("position", "velocity", "effort"))
-            )
+            {quantity: arrays[f"{quantity}_{number}"] for quantity in QUANTITIES}
             for number in range(characters)
         ]
 
@@ -148,17 +132,13 @@ def replay_states(
     character: str | None = None,
     settings: Mapping[str, object] | None = None,
     start: bool = True,
-) -> CommandFindings:
-    """Let a bag take the simulator's place: a controller answers what one has answered then.
+) -> CommandComparison:
+    """Let a controller answer a bag's states, and compare its commands with the bag's.
 
-    Args:
-        path: A run's directory, or a bag.
-        progress: Is told the number of states that are answered.
-        tell: Is told what is waited for, if it takes long.
-        character: The name of the recording to play, where there are several.
-        settings: Parameters of `controller_node` in place of the recorded ones.
-        start: Start the bag's own controller, in an unused ROS domain. Without it,
-            another one is waited for on the present domain, in the character's namespace.
+    The arguments are those of `replay_commands`, and the `character` to play, where there are
+    several; `settings` are parameters of `controller_node` in place of the recorded ones. `start`
+    starts the bag's controller, in a ROS domain that no other node is in; without it, one that the
+    user starts is waited for in the present domain, in the character's namespace.
 
     Raises:
         RecordingError: the bag cannot be read, or it has no commands.
@@ -170,29 +150,34 @@ def replay_states(
     for name in _NOT_TO_BE_SET:
         if name in settings:
             raise ConfigurationError(f"parameter '{name}' is set by the recording")
-    with session(own=start) as run:
-        file = run.directory / "commands.npz"
-        playing: dict[str, object] = {
-            "recording": str(path.absolute()),
-            "character": recording.name,
-            "commands": str(file),
-            "steers": start,
-            "fixed": sorted(settings),
-            SESSION.name: make_session(f"/{topics.SIM_NODE}"),
-        }
+    session = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
+    with child_processes(own=start) as children:
         others = []
         if start:
-            parameters = first_parameters(recording) | settings
-            parameters |= {
-                CHARACTER.name: str(write_character(run.directory, recording.character)),
-                "wait_for_subscribers": 1,
-                SESSION.name: playing[SESSION.name],
-            }
-            others.append(run.start_node(topics.CONTROLLER_NODE, parameters))
-        else:
-            playing["start_patience"] = 0.0
+            parameters = _controller_parameters(children.directory, recording) | settings | session
+            others.append(children.start_node(topics.CONTROLLER_NODE, parameters))
+        file = children.directory / "commands.npz"
+        playing = _player_parameters(recording, settings, start) | {"commands": str(file)} | session
         namespace = "" if start else recording.name
-        player = start_player(run, STATES, playing, namespace)
+        player = start_player(children, SIMULATOR, path, playing, namespace)
         wait_for_player(player, others, progress, tell)
         with np.load(file) as arrays:
             return compare_commands(recording, arrays["commands"])
+
+
+def _player_parameters(
+    recording: Recording, settings: Mapping[str, object], start: bool
+) -> dict[str, object]:
+    """The parameters of a player in the simulator's place."""
+    return {
+        "character": recording.name,
+        "repeat_requests": start,
+        "fixed": sorted(settings),
+        "start_timeout": ANSWER_TIMEOUT if start else 0.0,
+    }
+
+
+def _controller_parameters(directory: Path, recording: Recording) -> dict[str, object]:
+    """The recorded controller's parameters, for one that waits for the player."""
+    own_file = {CHARACTER.name: str(write_character(directory, recording.character))}
+    return first_parameters(recording) | own_file | {"wait_for_subscribers": 1}

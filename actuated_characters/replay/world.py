@@ -1,19 +1,17 @@
-"""Builds the world of a recording again, from what the recording says of it."""
+"""Builds the world of a recording again, and checks that the recording has what that needs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
+from pathlib import Path
 
 import numpy as np
 
-from actuated_characters.bags.recording import Recording
-from msgs_config.arrays import IntArray
-from msgs_config.character.model import Character
+from actuated_characters.bags.recording import Recording, read_recordings
+from actuated_characters.replay.comparison import clock_of
 from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.parameters import Values, resolve
-from msgs_config.shared_parameters import RATE
 from msgs_config.versions import describe_changes, installed_versions
 from sim_node.parameters import (
     PARAMETERS,
@@ -62,12 +60,58 @@ def simulator_values(recording: Recording) -> Values:
     try:
         return resolve(PARAMETERS + character_parameters(recording.character), given)
     except ActuatedCharactersError as error:
+        reason = f"the recording's simulator cannot be built again: {error}"
         changes = describe_changes(recording.versions, installed_versions())
-        raise RecordingError(
-            "; ".join(
-                filter(None, [f"the recording's simulator cannot be built again: {error}", changes])
+        raise RecordingError("; ".join(filter(None, (reason, changes)))) from error
+
+
+def of_character(recording: Recording) -> str:
+    """For messages: whose recording it is, where there are several."""
+    return f" of {recording.name}" if recording.name else ""
+
+
+def check_pushes(recording: Recording) -> list[str]:
+    """Check that the recording has the pushes that acted in each tick; returns notes.
+
+    Raises:
+        RecordingError: there were pushes, and it does not have all that acted.
+    """
+    of = of_character(recording)
+    if not recording.applied_wrench:
+        if recording.pushes_sent:
+            raise RecordingError(
+                f"the recording has pushes{of} ({recording.pushes_sent} messages on "
+                "'external_wrench'), but not which of them acted: nothing on 'applied_wrench'"
             )
-        ) from error
+        return [f"the recording has no 'applied_wrench'{of}: replayed without pushes"]
+    if recording.pushes_sent and None in recording.applied_wrench:
+        gaps = [row for row, pushes in enumerate(recording.applied_wrench) if pushes is None]
+        raise RecordingError(
+            f"the recording lacks which pushes acted{of} in {len(gaps)} ticks, the first "
+            f"time at {recording.stamps_ns[gaps[0] + 1]} ns: nothing on 'applied_wrench' there"
+        )
+    return []
+
+
+def check_throws(recording: Recording) -> list[str]:
+    """Check that the recording has the throw of each ball; returns notes.
+
+    Raises:
+        RecordingError: there were balls, and it does not have how they were thrown.
+    """
+    thrown = sum(map(len, recording.throws))
+    balls = max((len(each.names) for each in recording.balls if each is not None), default=0)
+    if balls > thrown:
+        raise RecordingError(
+            f"the recording has {balls} balls on 'thrown', but does not say how each was thrown: "
+            f"{thrown} messages on 'applied_throw'"
+        )
+    if thrown or not recording.throws_sent:
+        return []
+    return [
+        f"the recording has {recording.throws_sent} messages on 'throw', and nothing on "
+        "'applied_throw': replayed without balls"
+    ]
 
 
 def make_simulation(together: Sequence[Recording], first_stamp_ns: int) -> Simulation:
@@ -80,13 +124,13 @@ def make_simulation(together: Sequence[Recording], first_stamp_ns: int) -> Simul
         ActuatedCharactersError: the engine refuses a file.
     """
     values = [simulator_values(recording) for recording in together]
-    roles = [
+    setups = [
         _unlimited(make_character_setup(recording.character, own, recording.world.name))
         for recording, own in zip(together, values, strict=True)
     ]
     settings = _settings(together[0], values[0])
     first_tick = TickClock(settings.rate_hz).tick(first_stamp_ns)
-    return Simulation(roles, settings, first_tick)
+    return Simulation(setups, settings, first_tick)
 
 
 def _settings(recording: Recording, values: Values) -> SimulationSettings:
@@ -101,32 +145,45 @@ def _settings(recording: Recording, values: Values) -> SimulationSettings:
     return replace(settings, world=world, command_delay_ticks=0)
 
 
-def _unlimited(role: CharacterSetup) -> CharacterSetup:
-    links = tuple(
-        replace(link, joint=replace(link.joint, effort_limit=inf)) for link in role.character.links
-    )
-    return replace(role, character=replace(role.character, links=links))
+def _unlimited(setup: CharacterSetup) -> CharacterSetup:
+    """A character whose efforts are not clipped."""
+    character = setup.character
+    links = tuple(replace(e, joint=replace(e.joint, effort_limit=inf)) for e in character.links)
+    return replace(setup, character=replace(character, links=links))
 
 
-def pushes_of(character: Character, applied: WrenchArrays, tick: int) -> list[ExternalWrench]:
-    """The pushes that acted during the tick that begins at `tick`, in their order.
+def make_pushes(recording: Recording, row: int, tick: int) -> list[ExternalWrench]:
+    """The pushes that acted during the tick of a row, which begins at `tick`, in their order.
 
     Raises:
         RecordingError: a link does not exist.
     """
-    rows = {link.name: row for row, link in enumerate(character.links)}
+    applied = recording.applied_wrench[row] if recording.applied_wrench else None
+    if applied is None or not applied.links:
+        return []
+    links = recording.character.links
+    rows = {link.name: number for number, link in enumerate(links)}
     pushes = []
     for number, name in enumerate(applied.links):
         if name not in rows:
             raise RecordingError(f"a push of tick {tick}: {one_of('link', name, list(rows))}")
-        centre = character.links[rows[name]].inertial_pose.position
+        centre = links[rows[name]].inertial_pose.position
         point = applied.points[number] if len(applied.points) else np.array(centre)
         pushes.append(ExternalWrench(rows[name], applied.wrenches[number], point, tick, 1))
     return pushes
 
 
-def common_rows(together: Sequence[Recording]) -> tuple[list[int], int]:
-    """Where the characters of a world begin in their recordings, and the number of states in all.
+def read_world(path: Path, number: int = 0) -> tuple[list[Recording], list[str]]:
+    """Read the recordings of one of a bag's worlds, cut to the states that all have; and notes.
+
+    Raises:
+        ActuatedCharactersError: the bag cannot be read, or its worlds are not whole.
+    """
+    return cut_world(worlds(read_recordings(path))[number])
+
+
+def cut_world(together: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Cut the recordings of a world to the states that all have; returns them, and notes.
 
     They begin with the first state of an episode that all have. A recorder that was stopped may
     have one state more of one than of another.
@@ -135,7 +192,7 @@ def common_rows(together: Sequence[Recording]) -> tuple[list[int], int]:
         RecordingError: there is no episode whose first state all have, the resets differ, or one
             of them ends before the others.
     """
-    begins = [set(_begin_stamps(recording).tolist()) for recording in together]
+    begins = [set(each.stamps_ns[each.episode_rows].tolist()) for each in together]
     common = set.intersection(*begins)
     if not common:
         raise RecordingError("the characters of one world have no episode in common")
@@ -149,21 +206,11 @@ def common_rows(together: Sequence[Recording]) -> tuple[list[int], int]:
             f"the recording of {short.name} ends at {_last_tick(short)}, that of {whole.name}, in "
             f"the same world, at {_last_tick(whole)}: they cannot be simulated together"
         )
-    last_ns = int(together[0].stamps_ns[rows[0] + count - 1])
-    resets = [{stamp for stamp in each if first_ns <= stamp <= last_ns} for each in begins]
+    cut = [each.rows(slice(row, row + count)) for each, row in zip(together, rows, strict=True)]
+    resets = [each.episode_rows.tolist() for each in cut]
     if any(each != resets[0] for each in resets):
         raise RecordingError("the characters of one world were reset at different ticks")
-    return rows, count
-
-
-def _last_tick(recording: Recording) -> str:
-    last_ns = int(recording.stamps_ns[-1])
-    return f"tick {TickClock(int(recording.parameters[RATE.name])).tick(last_ns)}"
-
-
-def left_out(together: Sequence[Recording], rows: Sequence[int]) -> list[str]:
-    """Notes on the first states of characters that begin later; see `common_rows`."""
-    return [
+    return cut, [
         f"the first {row} states of {recording.name} were left out: the others of its world have "
         "no episode that begins so early"
         for recording, row in zip(together, rows, strict=True)
@@ -171,6 +218,5 @@ def left_out(together: Sequence[Recording], rows: Sequence[int]) -> list[str]:
     ]
 
 
-def _begin_stamps(recording: Recording) -> IntArray:
-    stamps: IntArray = recording.stamps_ns[recording.episode_rows]
-    return stamps
+def _last_tick(recording: Recording) -> str:
+    return f"tick {clock_of(recording).tick(int(recording.stamps_ns[-1]))}"

@@ -19,7 +19,12 @@ _TYPES = {
 }
 
 
-def rewrite(bag: Path, target: Path, change: Callable[[RecordedMessage], bytes | None]) -> Path:
+def rewrite(
+    bag: Path,
+    target: Path,
+    change: Callable[[RecordedMessage], bytes | None],
+    rename: Callable[[str], str] = str,
+) -> Path:
     """Copy a bag's messages as `change` makes them, without those of which it makes None."""
     with BagWriter(target) as writer:
         added = set[str]()
@@ -27,11 +32,12 @@ def rewrite(bag: Path, target: Path, change: Callable[[RecordedMessage], bytes |
             raw = change(message)
             if raw is None:
                 continue
-            if message.topic not in added:
-                topic = _TYPES[message.topic.rpartition("/")[2]]
-                writer.add_topic(message.topic, topic.message_type, topic.qos)
-                added.add(message.topic)
-            writer.write(message.topic, raw, message.log_time_ns)
+            name = rename(message.topic)
+            if name not in added:
+                topic = _TYPES[name.rpartition("/")[2]]
+                writer.add_topic(name, topic.message_type, topic.qos)
+                added.add(name)
+            writer.write(name, raw, message.log_time_ns)
     return target
 
 

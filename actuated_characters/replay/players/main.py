@@ -1,4 +1,4 @@
-"""The process of a player: `python -m actuated_characters.replay.players.main commands|states`."""
+"""The process of a player: `python -m actuated_characters.replay.players.main PLACE`."""
 
 import sys
 from collections.abc import Callable
@@ -6,25 +6,25 @@ from typing import NoReturn
 
 from msgs_config.runtime.process import RunnableNode, limit_threads, run_node
 
-COMMANDS, STATES = "commands", "states"
+CONTROLLER, SIMULATOR = "controller", "simulator"
+"""The places that a bag can take."""
 
 
 def main() -> NoReturn:
     """Run a player until it has played."""
     limit_threads()
-    run_node(_load_commands if sys.argv.pop(1) == COMMANDS else _load_states)
+    place = sys.argv.pop(1)
+    run_node(lambda: _load(place))
 
 
-def _load_commands() -> Callable[[], RunnableNode]:
-    from actuated_characters.replay.players.recorded_controller import CommandPlayer
+def _load(place: str) -> Callable[[], RunnableNode]:
+    if place == CONTROLLER:
+        from actuated_characters.replay.players.recorded_controller import RecordedController
 
-    return CommandPlayer
+        return RecordedController
+    from actuated_characters.replay.players.recorded_simulator import RecordedSimulator
 
-
-def _load_states() -> Callable[[], RunnableNode]:
-    from actuated_characters.replay.players.recorded_simulator import StatePlayer
-
-    return StatePlayer
+    return RecordedSimulator
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The processes of a replay through topics: nodes and a player, in a ROS domain of their own."""
+"""The processes of a replay through topics, and the lines by which a player reports to it."""
 
 import os
 import tempfile
@@ -7,23 +7,61 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from actuated_characters.replay.players.base import TICK, WAITING
 from actuated_characters.runs.processes import Child, Children
 from actuated_characters.runs.ros_domain import own_domain
 from msgs_config.errors import RunError
 
-_POLL_PERIOD = 0.05  # s
+ANSWER_TIMEOUT = 60.0
+"""s that an answer may take, on a machine that may be busy with other things."""
 
 Progress = Callable[[int], None]
-"""Is told the number of states so far."""
+"""Is called with the number of states so far."""
 
 Tell = Callable[[str], None]
-"""Is told a line, such as what is waited for."""
+"""Is called with a line for the user, such as what is waited for."""
+
+_WAITING, _STATE = "waiting for ", "state "  # begin the lines of a player's reports
+_POLL_PERIOD = 0.05  # s
+_WAITING_PERIOD = 2.0  # s between reports
+_STATE_PERIOD = 0.1  # s between reports
+
+
+class PlayerReport:
+    """Prints how far a player is and what it waits for, and gives up when that takes too long."""
+
+    def __init__(self) -> None:
+        self._next_state = 0.0  # s, by the monotonic clock
+        self.begin_wait()
+
+    def begin_wait(self) -> None:
+        """Begin to wait for something."""
+        self._since = time.monotonic()
+        self._next_line = self._since + _WAITING_PERIOD
+
+    def tell_wait(self, what: Callable[[], str], timeout: float = ANSWER_TIMEOUT) -> None:
+        """Print what is waited for, each 2 s; `timeout` in s, which may be infinite.
+
+        Raises:
+            RunError: it has taken longer.
+        """
+        now = time.monotonic()
+        if now > self._since + timeout:
+            raise RunError(f"waited {timeout:g} s for {what()}")
+        if now > self._next_line:
+            self._next_line = now + _WAITING_PERIOD
+            print(f"{_WAITING}{what()}", flush=True)
+
+    def tell_state(self, count: int) -> None:
+        """Print the number of states so far, ten times a second at the most."""
+        now = time.monotonic()
+        if now > self._next_state:
+            self._next_state = now + _STATE_PERIOD
+            print(f"{_STATE}{count}", flush=True)
 
 
 @contextmanager
-def session(*, own: bool = True) -> Iterator[Children]:
-    """Processes on a ROS domain of their own; or, unless `own`, on the present one."""
+def child_processes(*, own: bool = True) -> Iterator[Children]:
+    """Processes in a ROS domain that no other node is in; or, unless `own`, in the present one."""
     with ExitStack() as stack:
         directory = stack.enter_context(tempfile.TemporaryDirectory())
         environment = {**os.environ, "ROS_LOG_DIR": directory}
@@ -34,27 +72,32 @@ def session(*, own: bool = True) -> Iterator[Children]:
 
 
 def start_player(
-    children: Children, kind: str, parameters: Mapping[str, object], namespace: str = ""
+    children: Children,
+    place: str,
+    bag: Path,
+    parameters: Mapping[str, object],
+    namespace: str = "",
 ) -> Child:
-    """Start a player of `COMMANDS` or `STATES`."""
+    """Start a player of a bag in the place of the `CONTROLLER` or the `SIMULATOR`."""
+    playing = {"recording": str(bag.absolute()), **parameters}
     remap = ["-r", f"__ns:=/{namespace}"] if namespace else []
-    return children.start_node("player", parameters, *remap, arguments=[kind], any_node=True)
+    return children.start_node("player", playing, *remap, arguments=[place], any_node=True)
 
 
 def wait_for_player(player: Child, others: Sequence[Child], progress: Progress, tell: Tell) -> None:
     """Wait until a player has played.
 
     Raises:
-        RunError: it, or one of the others, has failed; with its last words.
+        RunError: it, or one of the others, has failed; with the last error that it logged.
     """
     while True:
-        ended = player.exit_code is not None  # asked before, so that nothing it says is missed
+        has_ended = player.exit_code is not None  # before its last lines are read
         for line in player.read_lines():
-            if line.startswith(WAITING):
+            if line.startswith(_WAITING):
                 tell(line)
-            elif line.startswith(TICK):
-                progress(int(line.removeprefix(TICK)))
-        if ended:
+            elif line.startswith(_STATE):
+                progress(int(line.removeprefix(_STATE)))
+        if has_ended:
             break
         for other in others:
             if other.exit_code:

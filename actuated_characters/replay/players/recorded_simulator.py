@@ -1,4 +1,4 @@
-"""`sim_node`, but it is a bag that speaks: a state, and the next one when that is answered."""
+"""The node `sim_node` as a bag: it publishes a state, and the next one when that is answered."""
 
 import math
 import time
@@ -13,18 +13,16 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from actuated_characters.bags.recording import CommandArrays, read_recording
-from actuated_characters.replay.players.base import PATIENCE, Ticks, Watch
-from actuated_characters.replay.players.findings import commanded, merged
-from actuated_characters.replay.players.session import NewSession
-from actuated_characters.replay.players.steering import parameter_changes
-from actuated_characters.replay.players.stream import (
-    AROUND,
-    STEERING,
-    RecordedTick,
-    read_stream,
+from actuated_characters.replay.command_comparison import merge_commands, recorded_commands
+from actuated_characters.replay.players.controller_parameters import parameter_changes
+from actuated_characters.replay.players.processes import ANSWER_TIMEOUT, PlayerReport
+from actuated_characters.replay.players.simulator_outputs import (
+    REQUESTS,
+    TICK_TOPICS,
+    SessionRewriter,
+    read_rare_messages,
     read_ticks,
 )
-from msgs_config.arrays import BoolArray
 from msgs_config.errors import MessageError, RecordingError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, encode_clock
@@ -35,6 +33,7 @@ from msgs_config.messages.session import (
     make_session,
     read_session,
 )
+from msgs_config.messages.topics import Topic
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
@@ -43,26 +42,26 @@ from msgs_config.runtime.ros_parameters import declare, given_parameters
 
 PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
-    Parameter("character", "", "whose states, where there are several"),
-    Parameter("commands", "commands.npz", "where the commands go that answer them"),
+    Parameter("character", "", "name of the recording to play, where there are several"),
+    Parameter("commands", "commands.npz", "where the commands go that answer the states"),
     Parameter(
-        "steers",
+        "repeat_requests",
         True,
-        "send what steered the controller then: parameters, trajectories and strengths",
+        "repeat what the controller was asked for then: parameters, trajectories and strengths",
     ),
     Parameter(
         "fixed", [], "parameters of controller_node that are not changed as they were", texts=True
     ),
     SESSION,
-    Parameter("start_patience", PATIENCE, "wait this long for a controller; 0: forever", unit="s"),
+    Parameter("start_timeout", ANSWER_TIMEOUT, "for a controller; 0: no limit", unit="s"),
 ]
 
 _REPUBLISH_PERIOD = 0.5  # s, as the simulator's
 _ACKNOWLEDGED = Duration(seconds=10)  # until the controller has a trajectory or strengths
 
 
-class StatePlayer(Node):
-    """Publishes recorded states in lockstep with the controller that answers them."""
+class RecordedSimulator(Node):
+    """Publishes recorded states, in lockstep with the controller that answers them."""
 
     def __init__(self) -> None:
         """Read the recording, and offer the simulator's topics.
@@ -75,147 +74,144 @@ class StatePlayer(Node):
         declare(self, PARAMETERS, values)
         self._file = Path(values.text("commands"))
         self._session = given_session(values) or make_session(self.get_fully_qualified_name())
-        self._said = NewSession(self._session)
+        self._rewriter = SessionRewriter(self._session)
         path = Path(values.text("recording"))
-        self._start_patience = values.number("start_patience") or math.inf
+        self._start_timeout = values.number("start_timeout") or math.inf
         self._recording = read_recording(path, values.text("character") or None)
-        self._stream = read_stream(path, self._recording)
+        self._rare = read_rare_messages(path, self._recording)
         self._ticks = read_ticks(path, self._recording)
-        self._expected = ~np.isnan(commanded(self._recording))  # (t + 1, n)
+        self._expected = ~np.isnan(recorded_commands(self._recording))  # (t + 1, n)
         if not self._expected.any():
             raise RecordingError(f"recording {path} has no commands to compare others with")
         self._received = np.full(self._expected.shape, np.nan)
-        self._steers = values.flag("steers")
+        self._repeats = values.flag("repeat_requests")
         fixed = values.texts("fixed")
-        self._changes = parameter_changes(self._recording, fixed) if self._steers else {}
-        self._runs_on = self._recording.parameters.get("mode") == "realtime"
+        self._changes = parameter_changes(self._recording, fixed) if self._repeats else {}
+        self._is_realtime = self._recording.parameters.get("mode") == "realtime"
         self._decoder, self._once_logger = JointStateDecoder(), OnceLogger(self)
+        self._report = PlayerReport()
         self._open_topics()
 
     def _open_topics(self) -> None:
-        self._configuration = topics.create_publisher(self, topics.CONFIGURATION)
-        self._episode = topics.create_publisher(self, topics.EPISODE)
-        self._clock_topic = topics.create_publisher(self, topics.CLOCK)
-        self._around = {topic.name: topics.create_publisher(self, topic) for topic in AROUND}
-        self._steering = {
-            topic.name: topics.create_publisher(self, topic)
-            for topic in STEERING
-            if self._steers and topic.name in self._stream.steered
+        rare = (topics.CONFIGURATION, topics.EPISODE)
+        self._outputs = {
+            topic.name: topics.create_publisher(self, topic) for topic in (*rare, *TICK_TOPICS)
         }
-        self._setting = self.create_client(
+        self._clock_topic = topics.create_publisher(self, topics.CLOCK)
+        self._requests = {
+            topic.name: topics.create_publisher(self, topic)
+            for topic in REQUESTS
+            if self._repeats and topic.name in self._rare.requested
+        }
+        self._parameter_client = self.create_client(
             SetParametersAtomically, f"{topics.CONTROLLER_NODE}/set_parameters_atomically"
         )
         self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
-        self._state = topics.create_publisher(self, topics.JOINT_STATES)
 
     def run(self, stop: StopSignal) -> None:
         """Play until the last state is answered, or until `stop`; then write the commands.
 
         Raises:
-            RunError: no answer comes, or the controller does not take a parameter.
+            RunError: no answer comes, or the controller does not accept a parameter.
         """
-        self._stop, self._spinner = stop, PollingExecutor(self)
+        self._stop, self._executor = stop, PollingExecutor(self)
         try:
-            self._configuration.publish(self._said.configuration(self._stream.configuration))
+            self._publish(topics.CONFIGURATION, self._rare.configuration)
             self._wait(
-                self._is_heard,
+                self._is_subscribed,
                 lambda: (
-                    f"a controller that subscribes to {self._state.topic_name} and publishes "
-                    f"{self.resolve_topic_name(topics.JOINT_TORQUES.name)}"
+                    f"a controller that subscribes to {self._outputs['joint_states'].topic_name} "
+                    f"and publishes {self.resolve_topic_name(topics.JOINT_TORQUES.name)}"
                 ),
-                self._start_patience,
+                self._start_timeout,
             )
-            ticks = Ticks()
-            for row, tick in enumerate(self._ticks):
+            for row, messages in enumerate(self._ticks):
                 if stop:
                     break
-                self._play(row, tick)
-                ticks.tell(row + 1)
+                self._play(row, messages)
+                self._report.tell_state(row + 1)
         finally:
-            self._spinner.close()
+            self._executor.close()
             np.savez(self._file, commands=self._received)
 
-    def _is_heard(self) -> bool:
+    def _publish(self, topic: Topic, raw: bytes) -> bytes:
+        """Publish a message of the bag in this node's session; returns it."""
+        own = self._rewriter.rewrite(topic, raw)
+        self._outputs[topic.name].publish(own)
+        return own
+
+    def _is_subscribed(self) -> bool:
         """Whether there is a controller, and all that it is sent will reach it."""
-        publishers = [self._state, *self._steering.values()]
-        if self._changes and not self._setting.service_is_ready():
+        publishers = [self._outputs[topics.JOINT_STATES.name], *self._requests.values()]
+        if self._changes and not self._parameter_client.service_is_ready():
             return False
         answers = self.count_publishers(topics.JOINT_TORQUES.name)
         return bool(answers) and all(each.get_subscription_count() for each in publishers)
 
-    def _play(self, row: int, tick: RecordedTick) -> None:
-        """Publish a state, and wait for what answers it."""
-        wanted = self._expected[row]
-        begins = row in self._stream.episodes
-        if self._runs_on and not wanted.any() and not begins:
+    def _play(self, row: int, messages: list[tuple[Topic, bytes]]) -> None:
+        """Publish the messages of a tick, its state at the end, and wait for the answer."""
+        is_answered = bool(self._expected[row].any())
+        begins = row in self._rare.episodes
+        if self._is_realtime and not is_answered and not begins:
             return  # the controller never saw it: it took the newest one
-        if self._steers:
-            self._send_steering(row)
-        stamp_ns = int(self._recording.stamps_ns[row])
+        if self._repeats:
+            self._send_requests(row)
         if begins:
-            self._episode.publish(self._said.episode(self._stream.episodes[row]))
+            self._publish(topics.EPISODE, self._rare.episodes[row])
+        stamp_ns = int(self._recording.stamps_ns[row])
         self._clock_topic.publish(encode_clock(stamp_ns))
-        for name, raw in tick.around:
-            self._around[name].publish(self._said.beside_state(name, raw))
-        raw_state = self._said.state(tick.state)
-        self._state.publish(raw_state)
-        if not wanted.any():
-            return  # it was not answered then either, or the answer was lost
-        self._wait_for_answer(row, stamp_ns, raw_state)
-        for change in self._changes.get(row, ()):
-            self._set(change)
+        *_, raw_state = [self._publish(topic, raw) for topic, raw in messages]
+        if is_answered:  # else it was not answered then either, or the answer not recorded
+            self._wait_for_answer(row, stamp_ns, raw_state)
+            for change in self._changes.get(row, ()):
+                self._set(change)
 
-    def _wait_for_answer(self, row: int, stamp_ns: int, raw: bytes) -> None:
+    def _wait_for_answer(self, row: int, stamp_ns: int, raw_state: bytes) -> None:
         """Take commands until they cover what was commanded; the state is sent again meanwhile.
 
         A controller that was started for this answers at once with all that it has.
         """
         next_time = time.monotonic() + _REPUBLISH_PERIOD
+        received, layout = self._received[row], self._recording.layout
 
-        def missing() -> BoolArray:
-            lacks: BoolArray = self._expected[row] & np.isnan(self._received[row])
-            return lacks
+        def missing() -> list[str]:
+            lacks = np.flatnonzero(self._expected[row] & np.isnan(received))
+            return [layout.dof_names[entry] for entry in lacks]
 
         def is_answered() -> bool:
             nonlocal next_time
             while (command := self._take(stamp_ns)) is not None:
-                found = merged(self._recording.layout, (command,))
-                first = np.isnan(self._received[row])
-                self._received[row, first] = found[first]
-                if self._steers or not missing().any():
+                first = np.isnan(received)
+                received[first] = merge_commands(layout, (command,))[first]
+                if self._repeats or not missing():
                     return True
             if time.monotonic() > next_time:
                 next_time = time.monotonic() + _REPUBLISH_PERIOD
-                self._state.publish(raw)
+                self._outputs[topics.JOINT_STATES.name].publish(raw_state)
             return False
 
-        names = self._recording.layout.dof_names
         self._wait(
             is_answered,
-            lambda: (
-                f"commands that answer the state of {stamp_ns} ns, of "
-                + _some([name for name, lacks in zip(names, missing(), strict=True) if lacks])
-            ),
-            PATIENCE,
+            lambda: f"commands that answer the state of {stamp_ns} ns, of {_some(missing())}",
         )
 
     def _take(self, stamp_ns: int) -> CommandArrays | None:
         """The next command that answers a state, if one is there."""
         while (raw := self._torques.take()) is not None:
-            self._spinner.received()
+            self._executor.received()
             try:
                 command = self._decoder.decode(raw)
             except MessageError as error:
-                self._once_logger.log_once(f"command ignored: {error}")
+                self._once_logger.log_once(f"command rejected: {error}")
                 continue
             is_own = read_session(command.frame_id) in (self._session, ANONYMOUS)
             if is_own and command.stamp_ns == stamp_ns:
                 return CommandArrays(command.names, command.effort, 0)
         return None
 
-    def _send_steering(self, row: int) -> None:
-        for name, message in self._stream.steering.get(row, ()):
-            publisher = self._steering[name]
+    def _send_requests(self, row: int) -> None:
+        for name, message in self._rare.requests.get(row, ()):
+            publisher = self._requests[name]
             publisher.publish(message)
             if not publisher.wait_for_all_acked(_ACKNOWLEDGED):
                 raise RunError(f"controller_node did not acknowledge a message on '{name}'")
@@ -225,23 +221,27 @@ class StatePlayer(Node):
         parameters = [
             RosParameter(name, value=value).to_parameter_msg() for name, value in change.items()
         ]
-        future = self._setting.call_async(SetParametersAtomically.Request(parameters=parameters))
+        request = SetParametersAtomically.Request(parameters=parameters)
+        future = self._parameter_client.call_async(request)
         names = _some(list(change))
-        self._wait(future.done, lambda: f"controller_node to take {names}", PATIENCE)
+        self._wait(future.done, lambda: f"controller_node to accept {names}")
         response = future.result() if future.done() else None  # not done when it is to stop
         if response is not None and not response.result.successful:
-            raise RunError(f"controller_node does not take {names}: {response.result.reason}")
+            raise RunError(f"controller_node rejected {names}: {response.result.reason}")
 
     def _wait(
-        self, condition: Callable[[], bool], what: Callable[[], str], patience: float
+        self,
+        condition: Callable[[], bool],
+        what: Callable[[], str],
+        timeout: float = ANSWER_TIMEOUT,
     ) -> None:
-        watch = Watch(patience)
+        self._report.begin_wait()
         while not self._stop and not condition():
-            self._spinner.rest()
-            watch.look(what)
+            self._executor.rest()
+            self._report.tell_wait(what, timeout)
 
 
 def _some(names: list[str]) -> str:
-    """Names as a sentence has them, not too many."""
+    """At most three names, and the number of the others, for a message."""
     shown = ", ".join(f"'{name}'" for name in names[:3])
     return f"{shown} and {len(names) - 3} more" if len(names) > 3 else shown

@@ -134,7 +134,7 @@ def _first_difference(
     (recording, rows), earliest = first, None
     for quantity in _QUANTITIES:
         ours, theirs = _values(first, quantity), _values(second, quantity)
-        differs = _different_bits(ours, theirs)
+        differs = error_measures.different_bits(ours, theirs)
         if not differs.any():
             continue
         amounts = _amounts(recording, quantity, ours, theirs)
@@ -162,13 +162,6 @@ def _first_difference(
     return None if earliest is None else earliest[1]
 
 
-def _different_bits(ours: FloatArray, theirs: FloatArray) -> BoolArray:
-    """Where (c, n) two arrays differ; -0.0 is not 0.0, and a missing value is itself."""
-    both_missing = np.isnan(ours) & np.isnan(theirs)
-    different: BoolArray = (ours.view(np.int64) != theirs.view(np.int64)) & ~both_missing
-    return different
-
-
 def _values(of: _Rows, quantity: str) -> FloatArray:
     """A quantity (c, n) of some states; a state's effort is that of the tick before."""
     recording, rows = of
@@ -193,7 +186,7 @@ def _growth(first: _Rows, second: _Rows) -> Growth:
     ours, theirs = _values(first, "position"), _values(second, "position")
     apart = error_measures.distances(recording.layout, ours, theirs)
     # equal positions are 0 apart, although a rotation's logarithm leaves rounding errors
-    apart[~_different_bits(ours, theirs).any(axis=1)] = 0.0
+    apart[~error_measures.different_bits(ours, theirs).any(axis=1)] = 0.0
     kinds, stamps = error_measures.vector_kinds(recording.layout), recording.stamps_ns[rows]
     unknown = np.full((len(apart), 1), np.nan)  # for characters without a joint of the kind
 

@@ -11,7 +11,7 @@ from std_msgs.msg import Header, String
 
 from actuated_characters.recorder.session_filter import Heard, SessionFilter, find_session
 from actuated_characters.recorder.topics import RecordedTopic
-from actuated_characters.replay.players.session import NewSession
+from actuated_characters.replay.players.simulator_outputs import SessionRewriter
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS, episode_text
@@ -129,7 +129,7 @@ def test_a_state_in_another_session_has_the_same_numbers_to_the_bit(
     encoder = JointStateEncoder(["c", "a", "b"], frame_id)
     raw = encoder.encode(4_166_666, values, values[::-1].copy())
 
-    found = deserialize_message(NewSession(ONE).state(raw), JointState)
+    found = deserialize_message(SessionRewriter(ONE).rewrite(topics.JOINT_STATES, raw), JointState)
 
     assert found.header.frame_id == ONE
     assert (stamp_ns(found), list(found.name)) == (4_166_666, ["c", "a", "b"])
@@ -139,16 +139,16 @@ def test_a_state_in_another_session_has_the_same_numbers_to_the_bit(
 
 
 def test_what_comes_with_a_state_is_said_in_the_session_too_also_of_older_bags() -> None:
-    said = NewSession(ONE)
+    session = SessionRewriter(ONE)
     wrench = WrenchArrays.of_rows(5, ["chest"], [np.arange(6.0)], [])
     older = String(data=json.dumps({"character": "lift"}))
 
-    contacts = decode_wrenches(said.beside_state("contacts", encode_wrenches(wrench)))
-    odometry = said.beside_state("odom", b"anything")
-    episode = deserialize_message(
-        said.episode(bytes(serialize_message(Header(frame_id="2")))), Header
-    )
-    configuration = deserialize_message(said.configuration(bytes(serialize_message(older))), String)
+    contacts = decode_wrenches(session.rewrite(topics.CONTACTS, encode_wrenches(wrench)))
+    odometry = session.rewrite(topics.ODOM, b"anything")
+    old_episode = bytes(serialize_message(Header(frame_id="2")))
+    episode = deserialize_message(session.rewrite(topics.EPISODE, old_episode), Header)
+    raw = session.rewrite(topics.CONFIGURATION, bytes(serialize_message(older)))
+    configuration = deserialize_message(raw, String)
 
     assert contacts.frame_id == ONE
     assert contacts.wrenches.tolist() == wrench.wrenches.tolist()

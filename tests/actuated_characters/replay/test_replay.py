@@ -13,20 +13,18 @@ from actuated_characters.bags.recording import (
     CommandArrays,
     RecordedWorld,
     Recording,
-    read_recording,
     read_recordings,
 )
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.run_metrics import StateHash
-from actuated_characters.replay.commands import check_commands
-from actuated_characters.replay.comparison import Difference, differing, unit_of
-from actuated_characters.replay.players.script import read_world
+from actuated_characters.replay.comparison import Difference
+from actuated_characters.replay.effort_check import check_commands
 from actuated_characters.replay.replay import replay, tick_count
-from actuated_characters.replay.world import common_rows, left_out
-from msgs_config.arrays import FloatArray
+from actuated_characters.replay.world import cut_world, read_world
 from msgs_config.errors import RecordingError
 from msgs_config.messages import configuration
 from msgs_config.messages.wrenches import WrenchArrays
+from msgs_config.versions import installed_versions
 from sim_node.parameters import make_settings
 from tests.support.bags import (
     CONFIGURATION,
@@ -37,7 +35,7 @@ from tests.support.bags import (
     said_states,
     write_bag,
 )
-from tests.support.rewriting import flipped
+from tests.support.recordings import changed, commanding, recording_of, with_parameters
 
 WALK = {"reference": "clip", "clip": "walk"}
 TICKS = 48
@@ -51,42 +49,12 @@ def made() -> Made:
 @pytest.fixture(scope="module")
 def walk(made: Made, tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """A walk with the commands that led to it, and with no pushes."""
-    bag = write_bag(tmp_path_factory.mktemp("walk") / "bag", made.messages())
-    return with_commands(read_recording(bag))
+    return recording_of(made, tmp_path_factory.mktemp("walk"))
 
 
 @pytest.fixture(scope="module")
 def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    made = make_run("pendulum", 0.1)
-    bag = write_bag(tmp_path_factory.mktemp("pendulum") / "bag", made.messages())
-    return with_commands(read_recording(bag))
-
-
-def with_commands(recording: Recording) -> Recording:
-    """With commands that are what was applied, and with no pushes in any tick."""
-    names = recording.layout.dof_names
-    sent = [(CommandArrays(names, effort, 0),) for effort in recording.effort]
-    nothing = tuple(WrenchArrays.of_rows(int(s), [], [], []) for s in recording.stamps_ns[1:])
-    return replace(recording, commands=(*sent, ()), applied_wrench=nothing)
-
-
-def changed(values: FloatArray, row: int, index: int, bit: int = 0) -> FloatArray:
-    """A copy of rows with one bit of one number flipped."""
-    copy = values.copy()
-    copy[row] = flipped(copy[row], index, bit)
-    return copy
-
-
-def commanding(recording: Recording, row: int, *efforts: FloatArray) -> Recording:
-    """With other commands for the state of a row."""
-    commands = list(recording.commands)
-    commands[row] = tuple(CommandArrays(recording.layout.dof_names, e, 0) for e in efforts)
-    return replace(recording, commands=tuple(commands))
-
-
-def given(recording: Recording, **parameters: object) -> Recording:
-    """With other parameters of the simulator."""
-    return replace(recording, parameters={**recording.parameters, **parameters})
+    return recording_of(make_run("pendulum", 0.1), tmp_path_factory.mktemp("pendulum"))
 
 
 def difference_of(recording: Recording) -> Difference | None:
@@ -132,34 +100,21 @@ def test_one_bit_of_a_state_is_found(walk: Recording, quantity: str, row: int) -
     assert f"tick {row + 1}" in str(difference) and repr(difference.recorded) in str(difference)
 
 
-def test_the_sign_of_zero_is_a_bit(walk: Recording) -> None:
-    zeros = np.zeros(3)
-
-    assert differing(zeros, -zeros) == [0, 1, 2]
-    assert differing(np.full(3, np.nan), np.full(3, np.nan)) == []
-
-
-def test_an_effort_that_was_another_one_changes_the_states(walk: Recording) -> None:
-    index = walk.layout.dof_names.index("right_knee")
+@pytest.mark.parametrize(
+    ("entry", "change", "said"),
+    [("right_knee", 1.0, ""), ("chest_x", np.inf, "the replay diverged at tick 22")],
+)
+def test_an_effort_that_was_another_one_changes_the_states(
+    walk: Recording, entry: str, change: float, said: str
+) -> None:
     effort = walk.effort.copy()
-    effort[20, index] += 1.0
-    nobody = replace(walk, effort=effort, commands=((),) * (TICKS + 1))
+    effort[20, walk.layout.dof_names.index(entry)] += change
 
-    result = replay([nobody])
+    result = replay([replace(walk, effort=effort, commands=((),) * (TICKS + 1))])
 
     assert result.difference is not None and result.difference.tick == 22
+    assert said in str(result.difference)
     assert any("no commands" in note for note in result.notes)
-
-
-def test_an_effort_that_is_no_number_is_no_traceback(walk: Recording) -> None:
-    effort = walk.effort.copy()
-    effort[20, 7] = np.inf
-    nobody = replace(walk, effort=effort, commands=((),) * (TICKS + 1))
-
-    difference = replay([nobody]).difference
-
-    assert difference is not None and difference.tick == 22
-    assert "the replay diverged at tick 22" in str(difference)
 
 
 def test_contacts_are_compared_where_they_were_recorded(walk: Recording) -> None:
@@ -182,44 +137,12 @@ def test_within_a_tolerance_the_largest_differences_are_told(walk: Recording) ->
     other = replace(walk, velocity=velocity)
 
     result = replay([other], tolerance=1e-6)
+    beyond = replay([other], tolerance=1e-8).difference
 
     assert result.difference is None
     assert result.largest["m/s"] == pytest.approx(1e-7, rel=1e-6)
     assert result.largest["m"] == result.largest["rad/s"] == 0.0
-
-
-def test_beyond_it_the_first_one_is_named(walk: Recording) -> None:
-    velocity = walk.velocity.copy()
-    velocity[30, walk.layout.dof_names.index("root_x")] += 1e-5
-    velocity[31, walk.layout.dof_names.index("root_y")] += 1e-3
-
-    difference = replay([replace(walk, velocity=velocity)], tolerance=1e-6).difference
-
-    assert difference is not None
-    assert (difference.tick, difference.name) == (31, "root_x")
-
-
-def test_rotations_are_compared_as_rotations(walk: Recording) -> None:
-    entries = walk.layout.joint("root").rotation
-    position = walk.position.copy()
-    turn = position[10, entries]
-    angle = np.linalg.norm(turn)
-    position[10, entries] = turn * (1.0 - 2.0 * np.pi / angle)  # the same one, the other way round
-
-    result = replay([replace(walk, position=position)], tolerance=1e-9)
-
-    assert result.difference is None
-
-
-def test_units_are_those_of_the_joints(walk: Recording) -> None:
-    names, layout = walk.layout.dof_names, walk.layout
-
-    def unit(name: str, quantity: str) -> str:
-        return unit_of(layout, names.index(name), quantity)
-
-    assert unit("root_z", "position") == "m" and unit("root_rz", "position") == "rad"
-    assert unit("root_y", "effort") == "N" and unit("right_knee", "effort") == "N m"
-    assert unit("chest_x", "velocity") == "rad/s"
+    assert beyond is not None and (beyond.tick, beyond.name) == (31, "root_x")
 
 
 # Commands
@@ -251,13 +174,13 @@ def test_what_limits_and_delays_have_made_of_a_command_is_known(pendulum: Record
     commands = [np.array([(-1) ** row * 3.0 * limit]) for row in range(len(pendulum.effort))]
     delayed = [np.zeros(1)] * 2 + [np.sign(effort) * limit for effort in commands[:-2]]
     sent = tuple((CommandArrays(("hinge",), effort, 0),) for effort in commands)
-    late = given(
+    late = with_parameters(
         replace(pendulum, effort=np.array(delayed), commands=(*sent, ())), command_delay_ticks=2
     )
 
     assert np.isfinite(limit)
     assert difference_of(late) is None
-    difference = difference_of(given(late, command_delay_ticks=1))
+    difference = difference_of(with_parameters(late, command_delay_ticks=1))
     assert difference is not None and difference.tick == 3
     assert "commanded and clipped" in str(difference)
 
@@ -297,12 +220,12 @@ def test_what_a_timeout_filled_in_is_known(walk: Recording, action: str) -> None
         effort[row] = effort[8] if action == "hold" else 0.0
     silent = commanding(commanding(replace(walk, effort=effort), 9), 10)
 
-    assert difference_of(given(silent, on_timeout=action)) is None
-    assert check_commands(given(silent, on_timeout=action)).silent_stamps_ns == ()
-    paused = check_commands(given(silent, on_timeout="pause"))
+    assert difference_of(with_parameters(silent, on_timeout=action)) is None
+    assert check_commands(with_parameters(silent, on_timeout=action)).silent_stamps_ns == ()
+    paused = check_commands(with_parameters(silent, on_timeout="pause"))
     assert paused.silent_stamps_ns == tuple(walk.stamps_ns[9:11].tolist())
     wrong = replace(silent, effort=changed(effort, 10, walk.layout.dof_names.index("right_knee")))
-    difference = difference_of(given(wrong, on_timeout=action))
+    difference = difference_of(with_parameters(wrong, on_timeout=action))
     assert difference is not None and (difference.tick, difference.name) == (12, "right_knee")
 
 
@@ -320,7 +243,7 @@ def test_in_real_time_a_command_is_held_until_it_is_too_old(
         commands=commands,
         unstamped_commands=() if stamped else (command,),
     )
-    held = given(held, mode="realtime", command_timeout=5.5 / 240.0)
+    held = with_parameters(held, mode="realtime", command_timeout=5.5 / 240.0)
 
     assert difference_of(held) is None
     before = replace(held, effort=effort.copy())
@@ -335,7 +258,7 @@ def test_commands_that_never_acted_cannot_be_checked(walk: Recording) -> None:
     assert difference_of(commanding(walk, TICKS, walk.effort[0])) is None  # for the last state
     assert difference_of(commanding(walk, TICKS - 1, walk.effort[0])) is not None
     late = np.vstack((np.zeros((1, walk.layout.size)), walk.effort[:-1]))
-    delayed = given(replace(walk, effort=late), command_delay_ticks=1)
+    delayed = with_parameters(replace(walk, effort=late), command_delay_ticks=1)
     assert difference_of(delayed) is None
     assert difference_of(commanding(delayed, TICKS - 1, walk.effort[0])) is None
     assert difference_of(commanding(delayed, TICKS - 2, walk.effort[0])) is not None
@@ -381,7 +304,6 @@ def two_of_one_world(path: Path, left: slice, right: slice) -> Path:
 def test_a_state_more_of_one_character_is_left_out(tmp_path: Path) -> None:
     bag = two_of_one_world(tmp_path / "bag", slice(0, 24), slice(0, 25))
 
-    assert common_rows(read_recordings(bag)) == ([0, 0], 24)
     together, notes = read_world(bag)
     assert [len(each.stamps_ns) for each in together] == [24, 24] and notes == []
 
@@ -407,10 +329,9 @@ def test_states_before_the_first_common_episode_are_told(pendulum: Recording) ->
         effort=effort[rows],
     )
 
-    begins, count = common_rows([early, late])
+    cut, (note,) = cut_world([early, late])
 
-    assert (begins, count) == ([10, 0], len(pendulum.stamps_ns) - 10)
-    (note,) = left_out([early, late], begins)
+    assert [each.stamps_ns.tolist() for each in cut] == [late.stamps_ns.tolist()] * 2
     assert note.startswith("the first 10 states of early were left out")
 
 
@@ -437,18 +358,23 @@ def test_terrain_lies_in_the_recording(tmp_path: Path) -> None:
     flat = replace(recordings[0], world=RecordedWorld())
     with pytest.raises(RecordingError, match="lacks its terrain"):
         replay([flat])
-    assert replay([given(flat, terrain="plane")]).difference is not None
+    assert replay([with_parameters(flat, terrain="plane")]).difference is not None
 
 
 @pytest.mark.parametrize(
     ("parameters", "reason"),
-    [({"rate": "often"}, "cannot be built again"), ({"turbo": 1}, "unknown parameter")],
+    [
+        ({"rate": "often"}, "cannot be built again"),
+        ({"turbo": 1}, r"unknown parameter 'turbo'.*; recorded with numpy 99\.0 \(now "),
+    ],
 )
-def test_a_simulator_of_another_kind_is_told(
+def test_a_simulator_of_another_kind_or_version_is_told(
     pendulum: Recording, parameters: Mapping[str, object], reason: str
 ) -> None:
+    newer = replace(pendulum, versions={**installed_versions(), "numpy": "99.0"})
+
     with pytest.raises(RecordingError, match=reason):
-        replay([given(pendulum, **parameters)])
+        replay([with_parameters(newer, **parameters)])
 
 
 def test_pushes_act_again(pendulum: Recording) -> None:

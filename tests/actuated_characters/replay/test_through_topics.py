@@ -8,7 +8,6 @@ import signal
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,35 +18,22 @@ from rclpy.context import Context
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from actuated_characters.bags.reader import RecordedMessage, read_messages
-from actuated_characters.bags.recording import (
-    CommandArrays,
-    ControllerSettings,
-    Recording,
-    read_recording,
-)
-from actuated_characters.bags.writer import BagWriter
+from actuated_characters.bags.reader import RecordedMessage
+from actuated_characters.bags.recording import read_recording
 from actuated_characters.cli import main
-from actuated_characters.replay.players.base import Watch
-from actuated_characters.replay.players.files import write_character
-from actuated_characters.replay.players.findings import (
-    CommandFindings,
-    commanded,
-    compare_commands,
-    merged,
+from actuated_characters.replay.command_comparison import CommandComparison, recorded_commands
+from actuated_characters.replay.players.controller_parameters import (
+    first_parameters,
+    parameter_changes,
 )
-from actuated_characters.replay.players.results import FoundStates, compare_found
-from actuated_characters.replay.players.script import make_scripts
-from actuated_characters.replay.players.steering import first_parameters, parameter_changes
-from actuated_characters.replay.players.stream import STEERING, read_stream
+from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.replay.through_topics import replay_commands, replay_states
 from actuated_characters.runs.run_directory import SUMMARY, read_figures
-from msgs_config.character.file import CHARACTERS_DIRECTORY, shipped_characters
-from msgs_config.character.loading import load_character
-from msgs_config.errors import RecordingError, RunError
+from msgs_config.character.file import CHARACTERS_DIRECTORY
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
-from tests.support.physics import DATA, character
+from msgs_config.messages.joint_state import JointStateDecoder
+from tests.support.physics import character
+from tests.support.rewriting import rewrite, with_flipped_effort
 from tests.support.ros import Client, Processes, SimulatorClient, wait_until, wrench_message
 
 pytestmark = pytest.mark.slow
@@ -85,6 +71,17 @@ def recorded(directory: Path, **parameters: object) -> Iterator[Processes]:
 # Recordings
 
 
+def weakened(folder: Path, name: str, joint: str, limit: float) -> str:
+    """The file of a character whose joint has an effort limit, in N m."""
+    content = yaml.safe_load((CHARACTERS_DIRECTORY / f"{name}.yaml").read_text())
+    if (CHARACTERS_DIRECTORY / content["urdf"]).is_file():  # else it is a package's
+        content["urdf"] = str(CHARACTERS_DIRECTORY / content["urdf"])
+    content["joints"][joint]["effort_limit"] = limit
+    file = folder / f"{name}.yaml"
+    file.write_text(yaml.safe_dump(content))
+    return str(file)
+
+
 @pytest.fixture(scope="module")
 def walk(folder: Path) -> Path:
     """A walk with assistance, by the command `run`."""
@@ -96,10 +93,7 @@ def walk(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def eventful(folder: Path, context: Context) -> Path:
     """Late and clipped commands, pushes, changed gains, pauses, a reset, trajectories."""
-    content = yaml.safe_load((CHARACTERS_DIRECTORY / "humanoid.yaml").read_text())
-    content["joints"]["chest"]["effort_limit"] = CHEST_LIMIT
-    own = folder / "weak.yaml"
-    own.write_text(yaml.safe_dump(content))
+    own = weakened(folder, "humanoid", "chest", CHEST_LIMIT)
     client = SimulatorClient(context)
     trajectories = client.speak(topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE))
     strengths = client.speak(topics.STRENGTH.of(topics.CONTROLLER_NODE))
@@ -122,7 +116,7 @@ def eventful(folder: Path, context: Context) -> Path:
 
     with recorded(folder / "eventful") as processes:
         simulator = processes.simulator(
-            str(own),
+            own,
             commanded_joints=["root", *character("humanoid").layout.actuated_joint_names],
             rate=RATE,
             command_delay_ticks=DELAY,
@@ -131,7 +125,7 @@ def eventful(folder: Path, context: Context) -> Path:
             max_ticks=TICKS,
             wait_for_subscribers=4,
         )
-        processes.controller(str(own), rate=RATE, reference="clip", wait_for_subscribers=2)
+        processes.controller(own, rate=RATE, reference="clip", wait_for_subscribers=2)
         client.spin_until(
             lambda: trajectories.get_subscription_count() == 2, "who hears trajectories"
         )
@@ -188,18 +182,14 @@ def foreign(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def realtime(folder: Path, context: Context) -> Path:
     """The pendulum by the wall clock, its commands clipped."""
-    content = yaml.safe_load((CHARACTERS_DIRECTORY / "pendulum.yaml").read_text())
-    content["urdf"] = str(CHARACTERS_DIRECTORY / content["urdf"])
-    content["joints"]["hinge"]["effort_limit"] = 2.0
-    own = folder / "weak_pendulum.yaml"
-    own.write_text(yaml.safe_dump(content))
+    own = weakened(folder, "pendulum", "hinge", 2.0)
     client = Client(context)
     states = client.listen(topics.JOINT_STATES)
     with recorded(folder / "realtime") as processes:
         simulator = processes.simulator(
-            str(own), mode="realtime", wait_for_subscribers=3, command_delay_ticks=1
+            own, mode="realtime", wait_for_subscribers=3, command_delay_ticks=1
         )
-        processes.controller(str(own), wait_for_subscribers=2)
+        processes.controller(own, wait_for_subscribers=2)
 
         def driven() -> bool:
             return sum(map(any, (message.effort for message in states.messages))) > 60
@@ -234,29 +224,8 @@ def by_commands(path: Path, **options: Any) -> Any:
     return replay_commands(path, progress=lambda _: None, tell=print, **options)
 
 
-def by_states(path: Path, **options: Any) -> CommandFindings:
+def by_states(path: Path, **options: Any) -> CommandComparison:
     return replay_states(path, progress=lambda _: None, tell=print, **options)
-
-
-def rewritten(source: Path, target: Path, change: Callable[[str, bytes], bytes | None]) -> Path:
-    """A copy of a run's bag, each message as `change(topic, raw)` gives it; without it if None."""
-    with BagWriter(target) as bag:
-        known = {}
-        for message in read_messages(source / "bag"):
-            if message.topic not in known:
-                topic = next(t for t in all_topics() if f"/{t.name.lstrip('/')}" == message.topic)
-                known[message.topic] = topic
-                bag.add_topic(message.topic, topic.message_type, topic.qos)
-            raw = change(message.topic, message.raw)
-            if raw is not None:
-                bag.write(message.topic, raw, message.log_time_ns)
-    return target
-
-
-def all_topics() -> list[topics.Topic]:
-    plain = [value for value in vars(topics).values() if isinstance(value, topics.Topic)]
-    nodes = (topics.SIM_NODE, topics.CONTROLLER_NODE)
-    return plain + [topic.of(node) for topic in plain for node in nodes]
 
 
 # The bag in the controller's place
@@ -314,20 +283,18 @@ def test_two_characters_of_one_world_come_again(pair: Path) -> None:
 def test_one_bit_of_one_command_is_found_with_its_tick_and_joint(
     walk: Path, tmp_path: Path
 ) -> None:
-    recording = read_recording(walk)
     row, dof = 40, "right_knee"
-    decoder = JointStateDecoder()
+    stamp_ns = int(read_recording(walk).stamps_ns[row])
+    changed = with_flipped_effort(
+        walk / "bag",
+        tmp_path / "bag",
+        topic="joint_torques",
+        stamp_ns=stamp_ns,
+        name=dof,
+        bit=0,
+    )
 
-    def change(topic: str, raw: bytes) -> bytes:
-        if topic != "/joint_torques":
-            return raw
-        sent = decoder.decode(raw)
-        if sent.stamp_ns != recording.stamps_ns[row]:
-            return raw
-        sent.effort.view(np.int64)[sent.names.index(dof)] ^= 1
-        return JointStateEncoder(sent.names).encode(sent.stamp_ns, effort=sent.effort)
-
-    result = by_commands(rewritten(walk, tmp_path / "bag", change))
+    result = by_commands(changed)
 
     assert result.difference is not None
     assert (result.difference.tick, result.difference.name) == (row + 2, dof)
@@ -335,20 +302,15 @@ def test_one_bit_of_one_command_is_found_with_its_tick_and_joint(
     assert 0.0 < abs(result.difference.apart) < 1e-12
 
 
-def renamed(pair: Path, target: Path, keep: Callable[[RecordedMessage], bool]) -> Path:
-    """A copy of two characters' run, below a namespace, with some of its messages."""
+def renamed(pair: Path, target: Path, change: Callable[[RecordedMessage], bytes | None]) -> Path:
+    """A copy of two characters' run, below a namespace, with messages as they are changed."""
     shutil.copytree(pair, target, ignore=shutil.ignore_patterns("bag"))
-    with BagWriter(target / "bag") as bag:
-        known = set[str]()
-        for message in filter(keep, read_messages(pair / "bag")):
-            own = message.topic.startswith(("/left/", "/right/"))
-            name = f"/lab{message.topic}" if own else message.topic
-            if name not in known:
-                known.add(name)
-                last = name.rpartition("/")[2]
-                topic = next(t for t in all_topics() if t.name.rpartition("/")[2] == last)
-                bag.add_topic(name, topic.message_type, topic.qos)
-            bag.write(name, message.raw, message.log_time_ns)
+    rewrite(
+        pair / "bag",
+        target / "bag",
+        change,
+        lambda topic: f"/lab{topic}" if topic.startswith(("/left/", "/right/")) else topic,
+    )
     return target
 
 
@@ -357,11 +319,12 @@ def test_a_state_more_of_one_character_is_no_difference_from_its_summary(
 ) -> None:
     last_ns, decoder = read_recording(pair, "left").stamps_ns[-1], JointStateDecoder()
 
-    def keep(message: RecordedMessage) -> bool:
+    def change(message: RecordedMessage) -> bytes | None:
         is_state = message.topic == "/left/joint_states"
-        return not (is_state and decoder.decode(message.raw).stamp_ns == last_ns)
+        is_last = is_state and decoder.decode(message.raw).stamp_ns == last_ns
+        return None if is_last else message.raw
 
-    run = renamed(pair, tmp_path / "run", keep)
+    run = renamed(pair, tmp_path / "run", change)
     (run / "left" / SUMMARY).unlink()  # of all its states
 
     assert main(["replay", str(run)]) == 0
@@ -370,7 +333,7 @@ def test_a_state_more_of_one_character_is_no_difference_from_its_summary(
 def test_the_summaries_are_found_below_any_namespace(
     pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run = renamed(pair, tmp_path / "run", lambda message: True)
+    run = renamed(pair, tmp_path / "run", lambda message: message.raw)
     assert main(["replay", str(run)]) == 0
     summary = json.loads((run / "right" / SUMMARY).read_text())
     (run / "right" / SUMMARY).write_text(json.dumps({**summary, "state_hash": "another"}))
@@ -397,14 +360,14 @@ def test_changed_gains_laws_and_trajectories_come_again(eventful: Path) -> None:
     recording = read_recording(eventful)
     changes = parameter_changes(recording)
     assert sum(map(len, changes.values())) == 5
-    stream = read_stream(eventful, recording)
-    assert stream.steered == {topic.name for topic in STEERING}
-    assert sum(map(len, stream.steering.values())) == 4
+    rare = read_rare_messages(eventful, recording)
+    assert rare.requested == {topic.name for topic in REQUESTS}
+    assert sum(map(len, rare.requests.values())) == 4
 
-    findings = by_states(eventful)
+    comparison = by_states(eventful)
 
-    assert findings.identical, str(findings.first)
-    assert findings.states >= TICKS - 1
+    assert comparison.identical, str(comparison.first)
+    assert comparison.states >= TICKS - 1
 
 
 def test_a_gain_that_is_not_changed_as_it_was_is_found_at_its_first_tick(eventful: Path) -> None:
@@ -416,56 +379,39 @@ def test_a_gain_that_is_not_changed_as_it_was_is_found_at_its_first_tick(eventfu
         if any(change.get("gains.chest.p") == 700.0 for change in each)
     ]
 
-    findings = by_states(eventful, settings={"gains.chest.p": first})
+    comparison = by_states(eventful, settings={"gains.chest.p": first})
 
-    assert findings.first is not None and findings.largest is not None
-    assert findings.first.tick == row + 2  # of the next state; the first row is that of tick 1
-    largest = {joint.name: joint.largest for joint in findings.joints}
+    assert comparison.first is not None and comparison.largest is not None
+    assert comparison.first.tick == row + 2  # of the next state; the first row is that of tick 1
+    largest = {joint.name: joint.largest for joint in comparison.joints}
     assert largest["chest"] > 0.1
-    assert not findings.within(0.5 * findings.largest_difference)
-    assert findings.within(findings.largest_difference)
+    assert not comparison.within(0.5 * comparison.largest_difference)
+    assert comparison.within(comparison.largest_difference)
 
 
 def test_each_character_of_a_world_can_be_answered(pair: Path) -> None:
-    findings = by_states(pair, character="right")
+    comparison = by_states(pair, character="right")
 
-    assert findings.identical and findings.states >= 40
+    assert comparison.identical and comparison.states >= 40
 
 
 def test_states_that_the_controller_never_saw_are_left_out(realtime: Path) -> None:
     recording = read_recording(realtime)
     answered = sum(map(bool, recording.commands))
 
-    findings = by_states(realtime)
+    comparison = by_states(realtime)
 
-    assert findings.identical, str(findings.first)
-    assert findings.states == answered > 10
+    assert comparison.identical, str(comparison.first)
+    assert comparison.states == answered > 10
 
 
 def test_a_controller_that_drives_less_is_told(walk: Path) -> None:
-    findings = by_states(walk, settings={"root_assistance": False})
+    comparison = by_states(walk, settings={"root_assistance": False})
 
-    assert not findings.identical and not findings.within(1e9)
-    assert findings.lacking == tuple(f"root_{entry}" for entry in ("x", "y", "z", "rx", "ry", "rz"))
-
-
-def test_where_only_the_sign_of_zero_differs_the_largest_difference_is_that(walk: Path) -> None:
-    recording = read_recording(walk)
-    entry, rest = 7, recording.layout.dof_names[6:]  # nothing commands the root
-    sent = [
-        tuple(CommandArrays(rest, merged(recording.layout, each)[6:], 0) for each in [commands])
-        for commands in recording.commands
-    ]
-    sent[5][0].efforts[entry - 6] = 0.0
-    recording = replace(recording, commands=tuple(sent))
-    received = commanded(recording)
-    received[5, entry] = -0.0
-
-    findings = compare_commands(recording, received)
-
-    assert not findings.identical and findings.within(0.0)
-    assert findings.largest is not None and findings.largest == findings.first
-    assert findings.largest.dof_name == recording.layout.dof_names[entry]
+    assert not comparison.identical and not comparison.within(1e9)
+    assert comparison.lacking == tuple(
+        f"root_{entry}" for entry in ("x", "y", "z", "rx", "ry", "rz")
+    )
 
 
 # A bag that begins in the middle of an episode
@@ -477,11 +423,12 @@ def late(eventful: Path, folder: Path) -> Path:
     decoder = JointStateDecoder()
     stamps = read_recording(eventful).stamps_ns
 
-    def change(topic: str, raw: bytes) -> bytes | None:
-        stamped = topic in ("/joint_states", "/joint_torques")
-        return None if stamped and decoder.decode(raw).stamp_ns < stamps[20] else raw
+    def change(message: RecordedMessage) -> bytes | None:
+        stamped = message.topic in ("/joint_states", "/joint_torques")
+        is_early = stamped and decoder.decode(message.raw).stamp_ns < stamps[20]
+        return None if is_early else message.raw
 
-    return rewritten(eventful, folder / "late", change)
+    return rewrite(eventful / "bag", folder / "late", change)
 
 
 def test_the_second_episode_alone_comes_again(late: Path, eventful: Path) -> None:
@@ -499,10 +446,10 @@ def test_its_controller_begins_with_what_was_in_force_then(late: Path) -> None:
     assert first_parameters(recording)["law"] == "zero"
     assert first_parameters(recording)["gains.chest.p"] == 700.0
 
-    findings = by_states(late)
+    comparison = by_states(late)
 
-    assert findings.identical, str(findings.first)
-    assert findings.states >= len(recording.stamps_ns) - 1
+    assert comparison.identical, str(comparison.first)
+    assert comparison.states >= len(recording.stamps_ns) - 1
 
 
 # The command
@@ -578,10 +525,12 @@ def test_another_controller_is_found_at_its_first_answer(
     processes.python(str(EXAMPLE), "--ros-args", "-p", "target:=1.1")
 
     recording = read_recording(foreign)
-    answered = ~np.isnan(commanded(recording)).all(axis=1)  # the recorder may join a bit late
-    first_ns = recording.stamps_ns[np.argmax(answered)]
+    answered = ~np.isnan(recorded_commands(recording)).all(
+        axis=1
+    )  # the recorder may join a bit late
+    time = recording.stamps_ns[np.argmax(answered)] / 1e9
     assert process.wait() == 1
-    assert f"({first_ns} ns): command of 'hinge' is" in process.stderr
+    assert f"({time:.9f} s): command of 'hinge' is" in process.stderr
     assert "largest difference: tick" in process.stdout
 
 
@@ -630,247 +579,3 @@ def living(mark: str) -> dict[int, str]:
             except OSError:  # it has ended, or is somebody else's
                 continue
     return found
-
-
-# Waiting
-
-
-def test_what_is_waited_for_is_told_every_two_seconds_and_then_given_up(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    now = 100.0
-    monkeypatch.setattr("actuated_characters.replay.players.base.time.monotonic", lambda: now)
-    watch = Watch()
-    told = []
-    for now in np.arange(100.0, 160.1, 0.5):  # the clock
-        watch.look(lambda: "an answer")
-        told += [now] * bool(capsys.readouterr().out)
-
-    assert told[0] <= 102.5 and told[-1] >= 157.5 and np.diff(told).max() <= 2.5
-    now = 160.5
-    with pytest.raises(RunError, match=r"^waited 60 s for an answer$"):
-        watch.look(lambda: "an answer")
-
-
-# What is sent
-
-
-def command(layout: Any, joints: list[str], value: float) -> CommandArrays:
-    entries = np.flatnonzero(layout.mask(joints))
-    names = tuple(layout.dof_names[entry] for entry in entries)
-    return CommandArrays(names, np.full(len(names), value), 0)
-
-
-def test_commands_are_sent_until_they_cover_the_tick(walk: Path) -> None:
-    recording = read_recording(walk)
-    joints = list(recording.parameters["commanded_joints"])
-    legs, rest = joints[:4], joints[4:]
-    sent = [command(recording.layout, part, 1.0) for part in (legs, legs, rest, legs)]
-    unknown = CommandArrays(("nose",), np.ones(1), 0)
-    not_finite = command(recording.layout, legs, np.nan)
-
-    (script,) = make_scripts(
-        [replace(recording, commands=((unknown, not_finite, *sent),) * len(recording.stamps_ns))]
-    )
-
-    assert not script.applies
-    assert script.commands == ((sent[0], sent[2]),) * 120  # a repeated one is not needed
-
-
-def test_after_a_conflict_the_commands_that_were_asked_for_anew_count(walk: Path) -> None:
-    recording = read_recording(walk)
-    joints = list(recording.parameters["commanded_joints"])
-    legs, rest = joints[:4], joints[4:]
-    sent = [
-        command(recording.layout, legs, 1.0),
-        command(recording.layout, legs, 2.0),  # somebody else's: it pauses
-        command(recording.layout, rest, 3.0),
-    ]
-
-    (script,) = make_scripts(
-        [replace(recording, commands=(tuple(sent),) * len(recording.stamps_ns))]
-    )
-
-    assert script.commands[0] == (sent[1], sent[2])
-
-
-def test_one_tick_without_its_commands_lets_the_applied_efforts_decide(walk: Path) -> None:
-    recording = read_recording(walk)
-    lacking = (*recording.commands[:50], (), *recording.commands[51:])
-
-    (script,) = make_scripts([replace(recording, commands=lacking)])
-
-    assert script.applies
-    for tick in (0, 50, 119):
-        (sent,) = script.commands[tick]
-        entries = recording.layout.indices(sent.names)
-        assert sent.efforts.tobytes() == recording.effort[tick, entries].tobytes()
-
-
-def test_pushes_that_nobody_knows_the_effect_of_are_an_error(walk: Path) -> None:
-    recording = replace(read_recording(walk), pushes_sent=2, applied_wrench=())
-
-    with pytest.raises(RecordingError, match="2 messages on 'external_wrench'"):
-        make_scripts([recording])
-
-
-def test_a_recording_without_commanded_joints_says_what_to_do(walk: Path) -> None:
-    recording = read_recording(walk)
-    limp = replace(recording, parameters={**recording.parameters, "commanded_joints": []})
-
-    with pytest.raises(RecordingError, match="without --through-topics"):
-        make_scripts([limp])
-
-
-# What is compared
-
-
-def test_any_bit_of_any_command_is_found(walk: Path) -> None:
-    recording = read_recording(walk)
-    rng = np.random.default_rng(5)
-    said = np.array([merged_by_hand(recording, row) for row in range(120)])
-    assert compare_commands(recording, said).identical
-    for _ in range(20):
-        row, entry, bit = int(rng.integers(120)), int(rng.integers(34)), int(rng.integers(52))
-        changed = said.copy()
-        changed.view(np.int64)[row, entry] ^= 1 << bit
-
-        findings = compare_commands(recording, changed)
-
-        assert findings.first is not None and findings.first == findings.largest
-        name = recording.layout.dof_names[entry]
-        assert (findings.first.tick, findings.first.dof_name) == (row + 1, name)
-        assert findings.first.received == changed[row, entry]
-        assert findings.largest_difference == abs(changed[row, entry] - said[row, entry])
-
-
-def merged_by_hand(recording: Recording, row: int) -> Any:
-    (sent,) = recording.commands[row]
-    effort = dict(zip(sent.names, sent.efforts, strict=True))
-    return [effort[name] for name in recording.layout.dof_names]
-
-
-def test_a_ball_joints_difference_is_the_length_of_a_vector(walk: Path) -> None:
-    recording = read_recording(walk)
-    said = np.array([merged_by_hand(recording, row) for row in range(10)])
-    chest = recording.layout.joint("chest").entries
-    said[4, chest] += [3.0, 4.0, 12.0]
-
-    findings = compare_commands(recording, said)
-
-    (found,) = [joint for joint in findings.joints if joint.name == "chest"]
-    assert found.largest == pytest.approx(13.0) and found.mean == pytest.approx(1.3)
-    assert [joint.largest for joint in findings.joints if joint.name != "chest"] == [0.0] * 13
-
-
-def found_again(recording: Recording) -> FoundStates:
-    first = np.full((1, recording.layout.size), np.nan)
-    effort = np.concatenate((first, recording.effort))
-    return FoundStates(recording.position.copy(), recording.velocity.copy(), effort)
-
-
-def test_of_states_that_came_back_any_bit_is_found_at_its_tick(walk: Path) -> None:
-    recording = read_recording(walk)
-    rng = np.random.default_rng(6)
-    for quantity in ("position", "velocity", "effort") * 5:
-        found, row, entry = found_again(recording), int(rng.integers(1, 121)), int(rng.integers(34))
-        getattr(found, quantity).view(np.int64)[row, entry] ^= 1 << int(rng.integers(52))
-        found.velocity[row + 1 :] += 1.0  # what it leads to comes later
-
-        result = compare_found([recording], [found])
-
-        assert result.difference is not None
-        assert result.difference.quantity == quantity
-        assert result.difference.tick == row + 1
-        assert result.difference.name == recording.layout.dof_names[entry]
-
-
-def test_within_a_tolerance_the_largest_differences_are_told(walk: Path) -> None:
-    recording = read_recording(walk)
-    found = found_again(recording)
-    found.velocity[60] += 1e-6
-    found.effort[30] += 1e-3  # what is applied may be another one, if the states are not
-
-    assert compare_found([recording], [found], tolerance=1e-5).identical
-    result = compare_found([recording], [found], tolerance=1e-7)
-
-    assert result.difference is not None
-    assert (result.difference.tick, result.difference.quantity) == (61, "velocity")
-    expected = {"rad": 0.0, "m": 0.0, "rad/s": 1e-6, "m/s": 1e-6}
-    assert result.largest == pytest.approx(expected, abs=1e-12)
-
-
-def test_a_turn_by_more_than_pi_is_a_small_difference(walk: Path) -> None:
-    """A rotation vector jumps at norm pi; rotations are compared as rotations."""
-    recording = read_recording(walk)
-    chest = recording.layout.joint("chest").entries
-    position = recording.position.copy()
-    position[:, chest] = [np.pi - 1e-6, 0.0, 0.0]
-    turned = replace(recording, position=position)
-    found = found_again(turned)
-    found.position[:, chest] = [-np.pi + 1e-6, 0.0, 0.0]
-
-    assert compare_found([turned], [found], tolerance=3e-6).identical
-    assert not compare_found([turned], [found], tolerance=1e-6).identical
-
-
-# What a controller is given
-
-
-def settings_of(**values: float | None) -> dict[str, Any]:
-    return {"gains.a.p": 1.0, "effort_limit.a": None, **values}
-
-
-def test_a_controllers_parameters_are_those_before_its_first_answer(walk: Path) -> None:
-    recording = read_recording(walk)
-    stamps = recording.stamps_ns.tolist()
-    said = (
-        ControllerSettings(settings_of(), None),
-        ControllerSettings(settings_of(**{"gains.a.p": 2.0}), None),
-        ControllerSettings(settings_of(**{"gains.a.p": 3.0}), stamps[5]),
-        ControllerSettings(settings_of(**{"gains.a.p": 4.0, "effort_limit.a": 9.0}), stamps[5]),
-        ControllerSettings(settings_of(**{"gains.a.p": 4.0, "effort_limit.a": None}), stamps[9]),
-    )
-    steered = replace(recording, controller=said)
-
-    assert first_parameters(steered) == {"gains.a.p": 2.0, "effort_limit.a": np.inf}
-    changes = parameter_changes(steered)
-    assert changes == {
-        5: [{"gains.a.p": 3.0}, {"gains.a.p": 4.0, "effort_limit.a": 9.0}],
-        9: [{"effort_limit.a": np.inf}],
-    }
-    assert parameter_changes(steered, ["gains.a.p"])[5] == [{"effort_limit.a": 9.0}]
-
-
-def test_a_controller_that_is_not_in_the_bag_cannot_be_started(walk: Path) -> None:
-    with pytest.raises(RecordingError, match="use --no-start"):
-        first_parameters(replace(read_recording(walk), controller=()))
-
-
-# Characters as files
-
-
-@pytest.mark.parametrize("name", [*shipped_characters(), str(DATA / "turned_frames_y_up.yaml")])
-def test_a_character_that_is_written_is_the_same_when_it_is_read(name: str, tmp_path: Path) -> None:
-    original = load_character(name)
-
-    file = write_character(tmp_path / "new", original)
-
-    again = load_character(str(file))
-    assert again.name == original.name
-    assert again.links == original.links
-    assert again.gains == original.gains and again.clips == original.clips
-    assert again.rest_position == original.rest_position and again.feet == original.feet
-    loading = original.loading
-    for field in ("scale", "fixed_base", "inertia_from_file", "self_collision"):
-        assert getattr(again.loading, field) == getattr(loading, field)
-
-
-def test_limits_are_lifted_and_nothing_else(tmp_path: Path) -> None:
-    original = character("humanoid")
-
-    again = load_character(str(write_character(tmp_path, original, lift_limits=True)))
-
-    assert (again.effort_limits() >= 1e300).all()
-    assert again.gains == original.gains and again.mass == original.mass
-    assert again.rest_position == original.rest_position

@@ -1,51 +1,33 @@
-"""How a controller's commands differ from the recorded ones. No ROS in here."""
+"""Compares a controller's commands with the recorded ones."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from actuated_characters.bags.recording import CommandArrays, Recording
+from actuated_characters.metrics.error_measures import different_bits
+from actuated_characters.replay.comparison import EFFORT, Difference, clock_of
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.layout import JointLayout
-from msgs_config.messages.clock import TickClock
-from msgs_config.shared_parameters import RATE
-
-
-@dataclass(frozen=True)
-class CommandDifference:
-    """A command that is not what was recorded."""
-
-    tick: int
-    stamp_ns: int
-    dof_name: str
-    recorded: float  # N m or N
-    received: float
-
-    def __str__(self) -> str:
-        difference = abs(self.received - self.recorded)
-        return (
-            f"tick {self.tick} ({self.stamp_ns} ns): command of '{self.dof_name}' is "
-            f"{self.received!r}, recorded is {self.recorded!r}, {difference:.3g} apart"
-        )
 
 
 @dataclass(frozen=True)
 class JointDifference:
-    """The differences of one joint's effort over all ticks that were compared."""
+    """The differences of one joint's effort over all ticks that were compared, N m or N."""
 
     name: str
-    mean: float  # N m or N, of the size of the difference
+    mean: float  # of the size of the difference
     largest: float
     recorded: float  # the mean size of what was recorded, to compare the two with
 
 
 @dataclass(frozen=True)
-class CommandFindings:
-    """What a comparison of commands has found."""
+class CommandComparison:
+    """The outcome of a comparison of commands."""
 
     states: int  # to which the answers were compared
-    first: CommandDifference | None  # the first that is not the same to the last bit
-    largest: CommandDifference | None
+    first: Difference | None  # the first that is not the same to the last bit
+    largest: Difference | None
     joints: tuple[JointDifference, ...]  # of the joints that are commanded
     lacking: tuple[str, ...]  # degrees of freedom that were commanded then, and are not now
 
@@ -61,55 +43,49 @@ class CommandFindings:
     @property
     def largest_difference(self) -> float:
         """By how much a command differs at the most, N m or N."""
-        return 0.0 if self.largest is None else abs(self.largest.received - self.largest.recorded)
+        return 0.0 if self.largest is None else abs(self.largest.apart)
 
 
-def merged(layout: JointLayout, commands: tuple[CommandArrays, ...]) -> FloatArray:
-    """The effort (n,) that commands say together, the first of each counts; NaN where none does.
+def merge_commands(layout: JointLayout, commands: tuple[CommandArrays, ...]) -> FloatArray:
+    """The effort (n,) that commands add up to, of equal entries the first; NaN where none is.
 
-    What the simulator would not take, an unknown name or a number that is not finite, says nothing.
+    What the simulator would reject, an unknown name or a number that is not finite, is left out.
     """
     effort = np.full(layout.size, np.nan)
-    places = places_of(layout)
+    indices = {name: index for index, name in enumerate(layout.dof_names)}
     for command in commands:
         for name, value in zip(command.names, command.efforts.tolist(), strict=False):
-            place = places.get(name)
-            if place is not None and np.isnan(effort[place]) and np.isfinite(value):
-                effort[place] = value
+            index = indices.get(name)
+            if index is not None and np.isnan(effort[index]) and np.isfinite(value):
+                effort[index] = value
     return effort
 
 
-def places_of(layout: JointLayout) -> dict[str, int]:
-    """Where each degree of freedom stands in the layout's arrays."""
-    return {name: place for place, name in enumerate(layout.dof_names)}
-
-
-def commanded(recording: Recording) -> FloatArray:
+def recorded_commands(recording: Recording) -> FloatArray:
     """The commands (t + 1, n) that answer each state of a recording, NaN where there are none."""
-    if not recording.commands:
-        return np.full(recording.position.shape, np.nan)
-    return np.array([merged(recording.layout, commands) for commands in recording.commands])
+    return np.array([merge_commands(recording.layout, each) for each in recording.commands])
 
 
-def compare_commands(recording: Recording, received: FloatArray) -> CommandFindings:
-    """Compare what answered the states now, (r, n) with NaN where nothing did, with the recorded.
+def compare_commands(recording: Recording, received: FloatArray) -> CommandComparison:
+    """Compare the answers to the states (r, n), NaN where there is none, with the recorded ones.
 
     Only what both have is compared: the states that were answered, up to the last one received.
     """
     rows = min(len(received), len(recording.stamps_ns))
-    recorded, received = commanded(recording)[:rows], received[:rows]
+    recorded, received = recorded_commands(recording)[:rows], received[:rows]
     both = ~np.isnan(recorded) & ~np.isnan(received)
     answered = ~np.isnan(received).all(axis=1, keepdims=True)
     lacks = np.flatnonzero((answered & ~np.isnan(recorded) & ~both).any(axis=0))
-    differs = both & (recorded.view(np.int64) != np.ascontiguousarray(received).view(np.int64))
+    differs = both & different_bits(recorded, received)
     apart = np.where(both, np.abs(received - recorded), 0.0)
     first = largest = None
     if differs.any():
-        first = _difference(recording, recorded, received, int(np.argmax(differs)))
-        largest = _difference(
-            recording, recorded, received, int(np.argmax(np.where(differs, apart, -1.0)))
+        sizes = np.where(differs, apart, -1.0)
+        first, largest = (
+            _difference(recording, recorded, received, int(np.argmax(each)))
+            for each in (differs, sizes)
         )
-    return CommandFindings(
+    return CommandComparison(
         states=int(both.any(axis=1).sum()),
         first=first,
         largest=largest,
@@ -120,16 +96,15 @@ def compare_commands(recording: Recording, received: FloatArray) -> CommandFindi
 
 def _difference(
     recording: Recording, recorded: FloatArray, received: FloatArray, flat: int
-) -> CommandDifference:
+) -> Difference:
     row, entry = divmod(flat, recorded.shape[1])
-    stamp_ns = int(recording.stamps_ns[row])
-    return CommandDifference(
-        tick=TickClock(int(recording.parameters[RATE.name])).tick(stamp_ns),
-        stamp_ns=stamp_ns,
-        dof_name=recording.layout.dof_names[entry],
-        recorded=float(recorded[row, entry]),
-        received=float(received[row, entry]),
+    stamp_ns, name = int(recording.stamps_ns[row]), recording.layout.dof_names[entry]
+    before, now = float(recorded[row, entry]), float(received[row, entry])
+    sentence = (
+        f"command of '{name}' is {now!r}, recorded is {before!r}, {abs(now - before):.3g} apart"
     )
+    tick = clock_of(recording).tick(stamp_ns)
+    return Difference(tick, stamp_ns, EFFORT, name, before, now, sentence, recording.name)
 
 
 def _by_joint(

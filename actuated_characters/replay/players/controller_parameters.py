@@ -1,4 +1,4 @@
-"""How a recorded controller was steered: its parameters at the start, and their changes."""
+"""The parameters of a recorded controller: at its start, and their changes."""
 
 import math
 from collections.abc import Collection
@@ -14,7 +14,7 @@ def first_parameters(recording: Recording) -> dict[str, Any]:
     """The parameters of a recording's controller before its first answer.
 
     Raises:
-        RecordingError: the bag does not say them.
+        RecordingError: the bag does not have them.
     """
     if not recording.controller:
         raise RecordingError(
@@ -33,9 +33,9 @@ def first_parameters(recording: Recording) -> dict[str, Any]:
 def parameter_changes(
     recording: Recording, fixed: Collection[str] = ()
 ) -> dict[int, list[dict[str, Any]]]:
-    """What was changed after the answer to each state, one change after another, by its row.
+    """The changes after the answer to each state, one after another, by its row.
 
-    The parameters that are `fixed` stay as they are.
+    Parameters that are `fixed` are left out.
     """
     rows = {stamp: row for row, stamp in enumerate(recording.stamps_ns.tolist())}
     changes: dict[int, list[dict[str, Any]]] = {}

@@ -47,7 +47,7 @@ def write_urdf(file: Path, loading: UrdfOptions) -> Path:
 
 
 def _content(character: Character) -> dict[str, Any]:
-    """What the character's file says; nothing if it is a URDF alone."""
+    """The content of the character's file; nothing if it is a URDF alone."""
     if not character.file_text:
         return {}
     content = files.parse_yaml_mapping(character.file, character.file_text, CharacterError)

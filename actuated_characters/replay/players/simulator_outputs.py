@@ -1,0 +1,165 @@
+"""What a bag sends in the simulator's place: its messages, in another session."""
+
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header, String
+from trajectory_msgs.msg import JointTrajectory
+
+from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.recording import Recording, find_bag
+from msgs_config.errors import RecordingError
+from msgs_config.messages import topics
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, decode
+from msgs_config.messages.session import episode_text
+from msgs_config.messages.topics import Topic
+from msgs_config.messages.wrenches import decode_wrenches, encode_wrenches
+
+TICK_TOPICS = (topics.CONTACTS, topics.APPLIED_WRENCH, topics.ODOM, topics.JOINT_STATES)
+"""What the simulator publishes at each tick; its state is the last."""
+
+REQUESTS = tuple(
+    topic.of(topics.CONTROLLER_NODE) for topic in (topics.JOINT_TRAJECTORY, topics.STRENGTH)
+)
+"""What a controller is asked for while it works."""
+
+_ACTIVE = tuple(  # what the controller publishes of each request that it has accepted
+    topic.of(topics.CONTROLLER_NODE) for topic in (topics.ACTIVE_TRAJECTORY, topics.ACTIVE_STRENGTH)
+)
+_CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
+
+Request: TypeAlias = "JointTrajectory | JointState"
+
+
+@dataclass
+class RareMessages:
+    """The messages that are not of each tick, by the row of the state that they come before."""
+
+    configuration: bytes = b""  # the simulator's, before all states
+    episodes: dict[int, bytes] = field(default_factory=dict)
+    requests: dict[int, list[tuple[str, Request]]] = field(default_factory=dict)  # topic, message
+
+    @property
+    def requested(self) -> set[str]:
+        """The names of the topics of `REQUESTS` that have messages."""
+        return {name for messages in self.requests.values() for name, _ in messages}
+
+
+class SessionRewriter:
+    """Names a session in serialised messages; their numbers stay the same to the bit."""
+
+    def __init__(self, session: str) -> None:
+        self._session = session
+        self._decoder = JointStateDecoder()
+        self._encoder = lru_cache(maxsize=16)(lambda names: JointStateEncoder(names, session))
+
+    def rewrite(self, topic: Topic, raw: bytes) -> bytes:
+        """A message of the simulator; one of a topic that names no session stays as it is.
+
+        Raises:
+            MessageError: the bytes are no message of the topic.
+        """
+        if topic is topics.JOINT_STATES:
+            state = self._decoder.decode(raw)
+            arrays = (state.position, state.velocity, state.effort)
+            return self._encoder(state.names).encode(state.stamp_ns, *arrays)
+        if topic in (topics.CONTACTS, topics.APPLIED_WRENCH):
+            return encode_wrenches(replace(decode_wrenches(raw), frame_id=self._session))
+        if topic is topics.EPISODE:
+            header = decode(raw, Header)
+            number = header.frame_id.partition(" ")[0]  # of older bags it is all that is there
+            header.frame_id = episode_text(int(number) if number.isdecimal() else 1, self._session)
+            return bytes(serialize_message(header))
+        if topic is topics.CONFIGURATION:
+            content = {**json.loads(decode(raw, String).data), "session": self._session}
+            return bytes(serialize_message(String(data=json.dumps(content, allow_nan=False))))
+        return raw
+
+
+def read_ticks(path: Path, recording: Recording) -> Iterator[list[tuple[Topic, bytes]]]:
+    """The messages of each tick of a recording in order, each tick once, its state at the end.
+
+    Raises:
+        RecordingError: the bag cannot be read, or has become another one.
+    """
+    found = {_name(recording, topic): topic for topic in TICK_TOPICS}
+    decoder, row, messages = JointStateDecoder(), 0, list[tuple[Topic, bytes]]()
+    for message in read_messages(find_bag(path)):
+        if row == len(recording.stamps_ns):
+            return
+        topic = found.get(message.topic)
+        if topic is None or _raw_stamp_ns(message.raw) < recording.stamps_ns[row]:
+            continue  # another topic, or what was published again
+        if topic is not topics.JOINT_STATES:
+            messages.append((topic, message.raw))
+        elif decoder.decode(message.raw).stamp_ns == recording.stamps_ns[row]:
+            row += 1
+            yield [*messages, (topic, message.raw)]
+            messages = []
+    if row < len(recording.stamps_ns):
+        raise RecordingError(f"recording {path} has changed while it was read")
+
+
+def _raw_stamp_ns(raw: bytes) -> int:
+    """The stamp of a serialised message that begins with a header."""
+    seconds, nanoseconds = struct.unpack_from("<iI" if raw[1] & 1 else ">iI", raw, 4)
+    return int(seconds) * NANOSECONDS_PER_SECOND + int(nanoseconds)
+
+
+def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
+    """Read the messages of a recording that are not of each tick.
+
+    The trajectories and strengths are those that its controller accepted, each with the stamp that
+    it began at; of an older bag, which does not have these, those that were sent.
+
+    Raises:
+        RecordingError: the bag cannot be read.
+    """
+    rare, kept = RareMessages(), dict[str, list[tuple[int, Request]]]()
+    types = {_name(recording, topic): topic.message_type for topic in (*REQUESTS, *_ACTIVE)}
+    for message in read_messages(find_bag(path)):
+        if message.topic == _name(recording, _CONFIGURATION):
+            rare.configuration = message.raw
+        elif message.topic == _name(recording, topics.EPISODE):
+            stamp_ns = _raw_stamp_ns(message.raw)
+            rare.episodes[int(np.searchsorted(recording.stamps_ns, stamp_ns))] = message.raw
+        elif message.topic in types:
+            content = decode(message.raw, types[message.topic])
+            kept.setdefault(message.topic, []).append((message.log_time_ns, content))
+    for topic, active in zip(REQUESTS, _ACTIVE, strict=True):
+        sent = kept.get(_name(recording, active)) or kept.get(_name(recording, topic), [])
+        for published_ns, content in sent:
+            row = _row(recording, published_ns, content.header)
+            if row is not None:
+                rare.requests.setdefault(row, []).append((topic.name, content))
+    return rare
+
+
+def _row(recording: Recording, published_ns: int, header: Header) -> int | None:
+    """The state before whose answer a message came; None if there is none.
+
+    The controller published what it accepted before that answer, but two topics of a bag that
+    another recorder has written may be out of order: it came before it began, too.
+    """
+    stamps = recording.stamps_ns
+    answered = np.array([c[0].published_ns if c else 0 for c in recording.commands])
+    later = np.flatnonzero(answered >= published_ns)
+    row = int(later[0]) if len(later) else len(stamps)
+    start_ns = header.stamp.sec * NANOSECONDS_PER_SECOND + header.stamp.nanosec
+    if start_ns:
+        row = min(row, int(np.searchsorted(stamps, start_ns, side="right")) - 1)
+    return row if 0 <= row < len(stamps) else None
+
+
+def _name(recording: Recording, topic: Topic) -> str:
+    """A topic's name in the bag."""
+    return f"/{topic.under(recording.name).name}"
