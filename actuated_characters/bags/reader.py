@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 from rclpy.serialization import deserialize_message
 
-from actuated_characters.bags import limits, metadata, storage
-from actuated_characters.bags.definitions import find_message_type
-from actuated_characters.bags.mcap_file import McapFile
-from actuated_characters.bags.sqlite_file import SqliteFile
+from actuated_characters.bags.format import limits, metadata, storage
+from actuated_characters.bags.format.definitions import find_message_type
+from actuated_characters.bags.format.mcap_file import McapFile
+from actuated_characters.bags.format.sqlite_file import SqliteFile
 from msgs_config.errors import RecordingError, one_of
 
 

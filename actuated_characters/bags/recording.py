@@ -8,10 +8,10 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from actuated_characters.bags.format.storage import SUFFIXES
 from actuated_characters.bags.plans import PlanArrays
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rebuilding import RecordedWorld
-from actuated_characters.bags.storage import SUFFIXES
 from actuated_characters.bags.tracks import (
     CONFIGURATION,
     CharacterTimeline,

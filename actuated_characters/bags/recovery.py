@@ -7,10 +7,10 @@ from pathlib import Path
 from std_msgs.msg import String
 
 from actuated_characters.bags.directory_lock import DirectoryLock, find_writer
-from actuated_characters.bags.metadata import METADATA
+from actuated_characters.bags.format.metadata import METADATA
+from actuated_characters.bags.format.storage import reason
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rewriting import Contents, Progress, rewrite, storage_files
-from actuated_characters.bags.storage import reason
 from actuated_characters.metrics.collector import CONFIGURATION, HEARD, MetricsCollector
 from actuated_characters.runs.run_directory import BAG, SUMMARY, figures_directory, write_figures
 from msgs_config.errors import ActuatedCharactersError, RecordingError

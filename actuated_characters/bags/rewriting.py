@@ -13,11 +13,11 @@ from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from actuated_characters.bags import limits, storage
-from actuated_characters.bags.definitions import MessageDefinition
-from actuated_characters.bags.mcap_file import McapFile
-from actuated_characters.bags.metadata import METADATA
-from actuated_characters.bags.storage import CDR, SUFFIXES, StoredMessage, StoredTopic
+from actuated_characters.bags.format import limits, storage
+from actuated_characters.bags.format.definitions import MessageDefinition
+from actuated_characters.bags.format.mcap_file import McapFile
+from actuated_characters.bags.format.metadata import METADATA
+from actuated_characters.bags.format.storage import CDR, SUFFIXES, StoredMessage, StoredTopic
 from actuated_characters.bags.writer import BagWriter
 from msgs_config.errors import RecordingError
 

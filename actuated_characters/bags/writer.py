@@ -25,9 +25,9 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.rosbag2.storage_mcap import McapWriter
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 
-from actuated_characters.bags.definitions import MessageDefinition, read_definition
 from actuated_characters.bags.directory_lock import DirectoryLock
-from actuated_characters.bags.storage import (
+from actuated_characters.bags.format.definitions import MessageDefinition, read_definition
+from actuated_characters.bags.format.storage import (
     COMPRESSIONS,
     LATEST_NS,
     MCAP,

@@ -9,7 +9,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from actuated_characters.bags.storage import COMPRESSIONS, MCAP, NONE, STORAGES
+from actuated_characters.bags.format.storage import COMPRESSIONS, MCAP, NONE, STORAGES
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, MetricsCollector
 from actuated_characters.recorder.session_filter import Heard, SessionFilter, find_session

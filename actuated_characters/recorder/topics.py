@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.validate_topic_name import validate_topic_name
 
-from actuated_characters.bags.definitions import find_message_type
+from actuated_characters.bags.format.definitions import find_message_type
 from actuated_characters.metrics.collector import HEARD
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages import topics

@@ -12,10 +12,10 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from std_msgs.msg import String
 
-from actuated_characters.bags.metadata import METADATA, load_metadata
+from actuated_characters.bags.format.metadata import METADATA, load_metadata
+from actuated_characters.bags.format.storage import MCAP, SUFFIXES
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.recording import find_bag
-from actuated_characters.bags.storage import MCAP, SUFFIXES
 from msgs_config.errors import MessageError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND

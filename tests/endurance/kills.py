@@ -32,8 +32,8 @@ from rich.console import Console  # noqa: E402
 from rich.table import Table  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
 
+from actuated_characters.bags.format.storage import COMPRESSIONS  # noqa: E402
 from actuated_characters.bags.recovery import recover  # noqa: E402
-from actuated_characters.bags.storage import COMPRESSIONS  # noqa: E402
 from actuated_characters.runs.plan import make_plan  # noqa: E402
 from actuated_characters.runs.processes import Child  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402

@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from actuated_characters.bags.definitions import read_definition
+from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.writer import BagWriter
 from msgs_config.errors import RecordingError

@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 from std_msgs.msg import String
 
 from actuated_characters import cli
-from actuated_characters.bags.definitions import read_definition
+from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recovery import recover
 from actuated_characters.bags.writer import BagWriter

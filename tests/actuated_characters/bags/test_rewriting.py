@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
 
-from actuated_characters.bags.definitions import read_definition
+from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recovery import recover
 from msgs_config.errors import RecordingError

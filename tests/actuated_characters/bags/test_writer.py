@@ -29,7 +29,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from std_msgs.msg import String
 
-from actuated_characters.bags.definitions import read_definition
+from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.writer import BagWriter
 from msgs_config.errors import ConfigurationError, RecordingError

@@ -5,8 +5,8 @@ from collections.abc import Collection, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
 
-from actuated_characters.bags import limits
-from actuated_characters.bags.storage import StoredMessage, StoredTopic
+from actuated_characters.bags.format import limits
+from actuated_characters.bags.format.storage import StoredMessage, StoredTopic
 
 _LONGEST_ROW = limits.MOST_OF_MESSAGE + 1024  # bytes
 

@@ -14,8 +14,8 @@ import pytest
 from lz4.frame import LZ4FrameCompressor
 from mcap.writer import CompressionType, IndexType
 
-from actuated_characters.bags import limits
-from actuated_characters.bags.limits import MIB
+from actuated_characters.bags.format import limits
+from actuated_characters.bags.format.limits import MIB
 from actuated_characters.bags.reader import read_messages
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import Said, texts, write_jazzy_db3, write_mcap, write_metadata

@@ -8,7 +8,7 @@ from pathlib import Path
 from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # as this Python has it
 
-from actuated_characters.bags.storage import ZSTD
+from actuated_characters.bags.format.storage import ZSTD
 
 MIB = 1 << 20
 MOST_OF_MESSAGE = 64 * MIB  # bytes; a large image has 50 million

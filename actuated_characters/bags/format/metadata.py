@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-from actuated_characters.bags.storage import CDR, MCAP, SUFFIXES, ZSTD, reason
+from actuated_characters.bags.format.storage import CDR, MCAP, SUFFIXES, ZSTD, reason
 from actuated_characters.runs.run_directory import BAG
 from msgs_config import files
 from msgs_config.errors import RecordingError, one_of

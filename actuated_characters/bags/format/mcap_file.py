@@ -20,8 +20,8 @@ from mcap.reader import FOOTER_SIZE
 from mcap.records import Channel, Chunk, ChunkIndex, Footer, Header, Schema, Statistics
 from mcap.stream_reader import StreamReader
 
-from actuated_characters.bags import limits
-from actuated_characters.bags.storage import StoredMessage, StoredTopic
+from actuated_characters.bags.format import limits
+from actuated_characters.bags.format.storage import StoredMessage, StoredTopic
 from msgs_config.errors import RecordingError
 
 _MAGIC = b"\x89MCAP0\r\n"
