@@ -9,7 +9,7 @@ import numpy as np
 
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.runs.execution import run_in_process, run_over_topics
-from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.plan import choose_reference, make_plan
 from actuated_characters.runs.run_directory import prepare_directory, read_figures
 from controller_node import parameters as controller_parameters
 from controller_node.references.base import Reference
@@ -48,7 +48,8 @@ class Controller:
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
         """
-        given = {**_choose_reference(more), **parameters, **more}
+        given = {**parameters, **more}
+        given = {**choose_reference(given), **given}
         self.character = placed(character, given)
         declared = controller_parameters.PARAMETERS
         own = controller_parameters.character_parameters(self.character, given)
@@ -271,8 +272,9 @@ def run(
     Raises:
         ActuatedCharactersError: a name or a value is wrong, or a process failed.
     """
-    motion = {**_choose_reference(reference), **reference}
-    plan = make_plan(character, duration, motion, simulator, controller)
+    plan = make_plan(character, duration, reference, simulator, controller)
+    if in_process and make_node_settings(plan.simulator).tick_period:
+        raise ConfigurationError("in_process takes neither 'mode' realtime nor a real_time_factor")
     directory = Path(output).absolute()
     prepare_directory(directory, overwrite=overwrite)
     if in_process:
@@ -281,12 +283,6 @@ def run(
         run_over_topics(plan, directory, write_bag=True, progress=_ignore)
     figures, _ = read_figures(directory)
     return figures
-
-
-def _choose_reference(given: Mapping[str, object]) -> dict[str, object]:
-    """The kind of reference of which a clip or keyframes are given."""
-    kinds = [name for name in ("clip", "keyframes") if name in given]
-    return {"reference": kinds[0]} if kinds else {}
 
 
 def _ignore(ticks: int) -> None:

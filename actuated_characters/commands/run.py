@@ -265,7 +265,7 @@ def _reference(options: argparse.Namespace) -> dict[str, object]:
         name = getattr(options, kind)
         if name is not None:
             return {"reference": kind, kind: name}
-    return {"reference": options.reference or "hold"}
+    return {} if options.reference is None else {"reference": options.reference}
 
 
 def _pushes(texts: list[str], plan: "Plan", found_in: "FoundWith | None") -> "list[PlannedPush]":

@@ -1,10 +1,12 @@
 """Tracking a motion by joint torques as a Gymnasium environment, `actuated_characters/Track-v0`.
 
-The reward is DeepMimic's without its end effectors (Peng et al. 2018, "DeepMimic", section 5.3):
+The reward is that of DeepMimic (Peng et al. 2018, "DeepMimic", section 5), where the weight of the
+end effectors, which it leaves out, goes to the centre of mass:
 `0.65 exp(-2 sum |q_d - q|^2) + 0.1 exp(-0.1 sum |v_d - v|^2) + 0.25 exp(-10 |c_d - c|^2)`, the sums
 over joints, c the centre of mass, d of the desired state at the new state's time.
 """
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -15,6 +17,7 @@ from gymnasium import spaces
 
 from actuated_characters.api import Controller, Simulation
 from actuated_characters.metrics.error_measures import is_lost
+from actuated_characters.runs.plan import SHARED
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -60,17 +63,22 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
             character: Name of one that ships, or path of its YAML or URDF file.
             duration: Of an episode, s.
             ticks_per_step: How long an action is held; at 240 Hz, 8 are 1/30 s.
-            random_start: Begin each episode at a random time of the reference.
+            random_start: Begin each episode at a random time, up to `duration`, of the reference.
             simulator: Parameters of `sim_node`, by name.
             reference: `controller_node`'s parameters of the motion: `clip="walk"`, for instance.
 
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
         """
-        if ticks_per_step < 1:
+        if not isinstance(ticks_per_step, int) or ticks_per_step < 1:
             raise ConfigurationError(f"ticks_per_step is {ticks_per_step}; it must be 1 or more")
-        rate = {"rate": simulator["rate"]} if "rate" in simulator else {}
-        controller = Controller(load_character(character), rate, **reference)
+        if not 0.0 < duration < math.inf:
+            raise ConfigurationError(f"duration is {duration} s; it must be a time above 0")
+        for name in ("initial_position", "initial_velocity", "initial_state"):
+            if name in simulator:
+                raise ConfigurationError(f"'{name}' is where the reference begins; leave it out")
+        shared = {name: simulator[name] for name in SHARED if name in simulator}
+        controller = Controller(load_character(character), shared, **reference)
         self._character, self._reference = controller.character, controller.reference
         self._layout = self._character.layout
         self._simulation = Simulation(self._character, controller.start, simulator)
@@ -95,6 +103,8 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Begin an episode; `options` may have `start`, the reference's time in s."""
         super().reset(seed=seed)
         self._start = float((options or {}).get("start", self._drawn_start()))
+        if not 0.0 <= self._start < math.inf:
+            raise ConfigurationError(f"start is {self._start} s; it must be 0 or later")
         first = self._reference.sample(self._start)
         start = StampedState(0, first.configuration.position, first.velocity, None)
         if not self._is_fresh or self._start:
@@ -103,7 +113,16 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         return self._observe(), self._info()
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
-        """Hold an action (a,) for `ticks_per_step` ticks; see the class for what comes back."""
+        """Hold an action (a,) for `ticks_per_step` ticks; see the class for what comes back.
+
+        Where the simulation diverges the observation is the one before.
+
+        Raises:
+            ConfigurationError: the action has another shape, or is not finite.
+        """
+        shape = self.action_space.shape
+        if np.shape(action) != shape or not np.isfinite(action).all():
+            raise ConfigurationError(f"an action must have shape {shape} and finite numbers")
         effort = np.zeros(self._layout.size)
         effort[self._actuated] = action
         self._is_fresh = False
@@ -111,7 +130,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
             for _ in range(self._ticks):
                 self._simulation.step(effort)
         except SimulationError:
-            return self._observe(), 0.0, True, False, {**self._info(), "diverged": True}
+            return self._seen, 0.0, True, False, {**self._info(), "diverged": True}
         reward, is_over = self._judge()
         is_complete = self._simulation.ticks >= round(self._duration * self._simulation.rate_hz)
         return self._observe(), reward, is_over, is_complete, self._info()
@@ -142,7 +161,8 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
             base = np.concatenate((state.position[2:3], *turned, state.velocity[3:_BASE]))
         difference = layout.difference(here, desired.configuration)
         own = (base, state.position[self._joints], state.velocity[self._joints])
-        return np.concatenate((*own, difference, desired.velocity))
+        self._seen = np.concatenate((*own, difference, desired.velocity))
+        return self._seen.copy()
 
     def _judge(self) -> tuple[float, bool]:
         """The reward of the present state, and whether the motion is lost."""

@@ -77,7 +77,14 @@ def make_plan(
         if name in simulator_given or name in controller_given:
             raise ConfigurationError(f"parameter '{name}' is set by {option}")
     simulator_given["character"] = character_name
+    for name in set(reference) & set(controller_given):
+        if reference[name] != controller_given[name]:
+            raise ConfigurationError(
+                f"'{name}' is {reference[name]} as the run's reference and "
+                f"{controller_given[name]} among controller_node's parameters; give one of them"
+            )
     controller_given = {**reference, **controller_given, "character": character_name}
+    controller_given = {**choose_reference(controller_given), **controller_given}
     character = placed(loaded or load_character(character_name), simulator_given)
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller, motion = _controller_values(character, controller_given)
@@ -89,6 +96,25 @@ def make_plan(
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings + simulator.warnings + controller.warnings
     return Plan(character, motion.reference, simulator, controller, warnings)
+
+
+def choose_reference(given: Mapping[str, object]) -> dict[str, object]:
+    """The parameter `reference` that a clip or keyframes among parameters mean.
+
+    Raises:
+        ConfigurationError: both are given, or a clip or keyframes beside another reference.
+    """
+    kinds = [name for name in ("clip", "keyframes") if given.get(name)]
+    chosen = given.get("reference")
+    if not kinds:
+        return {}
+    if len(kinds) == 2 and chosen not in kinds:
+        raise ConfigurationError("'clip' and 'keyframes' are given; give one of them")
+    if chosen is not None and chosen not in kinds:
+        raise ConfigurationError(
+            f"'{kinds[0]}' is given, but parameter 'reference' is {chosen}; leave out one of them"
+        )
+    return {} if chosen is not None else {"reference": kinds[0]}
 
 
 def _controller_values(character: Character, given: Mapping[str, object]) -> tuple[Values, Motion]:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -164,6 +165,9 @@ class Children:
 @contextmanager
 def _signals_held() -> Iterator[None]:
     """Keep signals for afterwards; a mask would hold them back from one thread alone."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals come to the main thread
+        return
     received: list[int] = []
     handlers = {
         number: signal.signal(number, lambda number, frame: received.append(number))

@@ -7,6 +7,7 @@ from builtin_interfaces.msg import Duration, Time
 from msgs_config.errors import MotionError
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.joint_state import decode
+from msgs_config.runtime.stamped_subscription import PastStampError
 
 _LARGEST = 2**25  # bytes of a message
 _LATEST_NS = 10**15  # after now
@@ -17,7 +18,8 @@ def decode_stamped(raw: bytes, message_type: type, what: str, state_ns: int) -> 
 
     Raises:
         MessageError: the bytes are no such message.
-        MotionError: it is too long, or its stamp is over or too late; begins with `what`.
+        PastStampError: its stamp is over; begins with `what`, as the next.
+        MotionError: it is too long, or its stamp is too late.
     """
     if len(raw) > _LARGEST:
         raise MotionError(f"{what}: it has {len(raw)} bytes; it must have {_LARGEST} or fewer")
@@ -25,7 +27,7 @@ def decode_stamped(raw: bytes, message_type: type, what: str, state_ns: int) -> 
     stamp = message.header.stamp
     start_ns = nanoseconds(stamp) or state_ns
     if start_ns < state_ns:
-        raise MotionError(
+        raise PastStampError(
             f"{what}: it begins at {start_ns} ns, which is over; it must be {state_ns} ns or "
             "later, or 0 for at once"
         )

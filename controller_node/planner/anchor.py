@@ -1,8 +1,8 @@
 """Where the reference stands: its place and heading give way to what it cannot absorb, and return.
 
 A push that moves the character by a step cannot be undone at once by its feet. So while it is
-perturbed the reference's world is moved and turned after the character, and later, slowly, back:
-a point p of it is at `R p + t` in the world, with R the turn about z by `yaw`.
+perturbed the reference's world is moved and turned after the character, and slowly back all the
+while: a point p of it is at `R p + t` in the world, with R the turn about z by `yaw`.
 """
 
 import math
@@ -100,7 +100,7 @@ class Anchor:
 
 
 def planar_state(position: FloatArray, velocity: FloatArray, centre: FloatArray) -> PlanarState:
-    """The balance of a state.
+    """How a state moves over the ground.
 
     Args:
         position: MuJoCo's (q,).

@@ -73,7 +73,7 @@ class StampedSubscription:
                 self.accepted += 1
             except (CommandError, LayoutError, MessageError, MotionError) as error:
                 self.rejected += 1
-                kind = f"{self._rejection}past" if isinstance(error, PastStampError) else ""
+                kind = f"past {self._topic.name}" if isinstance(error, PastStampError) else ""
                 self._once_logger.log_once(f"{self._rejection}{error}", kind)
 
     def _is_foreign(self, raw: bytes) -> bool:

@@ -86,6 +86,50 @@ def test_the_page_works() -> None:
     exec(code.removeprefix("python"), {})
 
 
+def test_what_diverges_ends_with_a_finite_observation() -> None:
+    environment = make(character="pendulum", simulator={"speed_limit": 1.0})
+    first, _ = environment.reset(seed=0)
+    assert np.isfinite(first).all()
+    terminated, info = False, {}
+    while not terminated:
+        observation, reward, terminated, _, info = environment.step(np.array([1000.0]))
+        assert environment.observation_space.contains(observation)
+    assert info["diverged"]
+    assert reward == 0.0
+    environment.close()
+
+
+def test_a_placed_reference_is_in_its_world() -> None:
+    environment = make(clip="walk", simulator={"placement": [2.0, 1.0, 0.0, 0.0]})
+    position = environment.simulation.state.position
+    plain = make(clip="walk").simulation.state.position
+    np.testing.assert_allclose(position[:3] - plain[:3], (2.0, 1.0, 0.0), atol=1e-12)
+    environment.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"duration": -1.0}, "duration is -1.0"),
+        ({"ticks_per_step": 1.5}, "ticks_per_step is 1.5"),
+        ({"simulator": {"initial_position": [1.0]}}, "'initial_position'"),
+    ],
+)
+def test_options_are_checked(options: dict[str, object], words: str) -> None:
+    with pytest.raises(ac.ActuatedCharactersError, match=words):
+        make(character="pendulum", **options)
+
+
+def test_actions_and_starts_are_checked() -> None:
+    environment = make(character="pendulum")
+    for wrong in (np.array([np.nan]), np.zeros(2), 5.0):
+        with pytest.raises(ac.ActuatedCharactersError, match="an action must have shape"):
+            environment.step(wrong)  # type: ignore[arg-type]
+    with pytest.raises(ac.ActuatedCharactersError, match="start is nan"):
+        environment.reset(options={"start": float("nan")})
+    environment.close()
+
+
 def test_a_mistake_is_one_clear_line() -> None:
     with pytest.raises(ac.ActuatedCharactersError, match="ticks_per_step is 0; it must be 1"):
         make(ticks_per_step=0)

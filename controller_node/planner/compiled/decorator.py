@@ -10,10 +10,18 @@ os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")  # its elementary functio
 
 import numba
 
+from controller_node.references import offsets
+from msgs_config.geometry import frames
+
 _CONFIG: Any = numba.config
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
-_SOURCES = (*_HERE.glob("*.py"), _HERE.parents[1] / "references" / "offsets.py")
+SOURCES = (
+    *_HERE.glob("*.py"),
+    Path(offsets.__file__),  # which functions come from: a test compares
+    Path(frames.__file__),
+)
+"""All files with functions that are compiled here."""
 
 
 def compiled(function: _Function) -> _Function:
@@ -47,4 +55,4 @@ def choose_cache_directory(sources: Iterable[Path], given: str = "") -> Path:
     return base / f"numba-{digest.hexdigest()[:16]}"
 
 
-_CACHE = choose_cache_directory(_SOURCES, _CONFIG.CACHE_DIR)
+_CACHE = choose_cache_directory(SOURCES, _CONFIG.CACHE_DIR)

@@ -157,6 +157,7 @@ def test_what_cannot_be_followed_is_refused_in_a_line_and_what_ran_goes_on(
     # Act: a good one after the bad ones says when they are through
     for message, _ in REFUSED.values():
         pendulum.send(message)
+    pendulum.send(trajectory(0.6, start_ns=2))  # over as well, which is logged once
     start_ns = pendulum.start(trajectory(TARGET))
 
     # Assert

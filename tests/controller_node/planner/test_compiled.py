@@ -1,8 +1,11 @@
 """What is compiled is compiled again when any of its sources changes."""
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
+
+from numba.core.registry import CPUDispatcher as Dispatcher
 
 from controller_node.planner.compiled import decorator, rollout
 from controller_node.planner.compiled.decorator import choose_cache_directory
@@ -34,6 +37,22 @@ def test_each_content_of_the_sources_has_its_directory(tmp_path: Path) -> None:
 
 def test_the_rollouts_are_kept_there() -> None:
     assert Path(rollout.roll_out.stats.cache_path).is_relative_to(decorator._CACHE)
+
+
+def test_every_compiled_function_is_of_a_source_that_counts() -> None:
+    names = [each.stem for each in Path(decorator.__file__).parent.glob("*.py")]
+    modules = [
+        importlib.import_module(f"controller_node.planner.compiled.{name}")
+        for name in names
+        if name != "__init__"
+    ]
+    functions = [
+        each for module in modules for each in vars(module).values() if isinstance(each, Dispatcher)
+    ]
+    files = {Path(each.py_func.__code__.co_filename) for each in functions}
+
+    assert len(functions) > 20
+    assert files <= set(decorator.SOURCES)
 
 
 def test_a_change_in_a_callee_of_another_file_counts(tmp_path: Path) -> None:
