@@ -70,13 +70,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
         """
-        if not isinstance(ticks_per_step, int) or ticks_per_step < 1:
-            raise ConfigurationError(f"ticks_per_step is {ticks_per_step}; it must be 1 or more")
-        if not 0.0 < duration < math.inf:
-            raise ConfigurationError(f"duration is {duration} s; it must be a time above 0")
-        for name in ("initial_position", "initial_velocity", "initial_state"):
-            if name in simulator:
-                raise ConfigurationError(f"'{name}' is where the reference begins; leave it out")
+        _check(duration, ticks_per_step, simulator)
         shared = {name: simulator[name] for name in SHARED if name in simulator}
         controller = Controller(load_character(character), shared, **reference)
         self._character, self._reference = controller.character, controller.reference
@@ -181,3 +175,14 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Time in s since the episode began, and of the reference."""
         elapsed = self._simulation.time
         return {"time": elapsed, "reference_time": self._start + elapsed}
+
+
+def _check(duration: float, ticks_per_step: int, simulator: Mapping[str, object]) -> None:
+    """Raise ConfigurationError if an option is wrong."""
+    if not isinstance(ticks_per_step, int) or ticks_per_step < 1:
+        raise ConfigurationError(f"ticks_per_step is {ticks_per_step}; it must be 1 or more")
+    if not 0.0 < duration < math.inf:
+        raise ConfigurationError(f"duration is {duration} s; it must be a time above 0")
+    for name in ("initial_position", "initial_velocity", "initial_state"):
+        if name in simulator:
+            raise ConfigurationError(f"'{name}' is where the reference begins; leave it out")

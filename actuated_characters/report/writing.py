@@ -56,8 +56,7 @@ def write_report(
     reports = _plan_reports(recordings, stills)
     done, total = 0, sum(len(report.makers) for report in reports)
     progress(done, total)
-    chapters: list[Chapter] = []
-    files: dict[str, bytes] = {}
+    chapters, files = list[Chapter](), dict[str, bytes]()
     for recording, report in zip(recordings, reports, strict=True):
         sections = []
         for make in report.makers:

@@ -77,14 +77,7 @@ def make_plan(
         if name in simulator_given or name in controller_given:
             raise ConfigurationError(f"parameter '{name}' is set by {option}")
     simulator_given["character"] = character_name
-    for name in set(reference) & set(controller_given):
-        if reference[name] != controller_given[name]:
-            raise ConfigurationError(
-                f"'{name}' is {reference[name]} as the run's reference and "
-                f"{controller_given[name]} among controller_node's parameters; give one of them"
-            )
-    controller_given = {**reference, **controller_given, "character": character_name}
-    controller_given = {**choose_reference(controller_given), **controller_given}
+    controller_given = {**_with_reference(reference, controller_given), "character": character_name}
     character = placed(loaded or load_character(character_name), simulator_given)
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller, motion = _controller_values(character, controller_given)
@@ -96,6 +89,20 @@ def make_plan(
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings + simulator.warnings + controller.warnings
     return Plan(character, motion.reference, simulator, controller, warnings)
+
+
+def _with_reference(
+    reference: Mapping[str, object], controller: Mapping[str, object]
+) -> dict[str, object]:
+    """The controller's parameters and those of the reference, which must not contradict them."""
+    for name in set(reference) & set(controller):
+        if reference[name] != controller[name]:
+            raise ConfigurationError(
+                f"'{name}' is {reference[name]} as the run's reference and {controller[name]} "
+                "among controller_node's parameters; give one of them"
+            )
+    given = {**reference, **controller}
+    return {**choose_reference(given), **given}
 
 
 def choose_reference(given: Mapping[str, object]) -> dict[str, object]:

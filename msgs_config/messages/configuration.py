@@ -36,10 +36,9 @@ def describe(
 ) -> str:
     """The JSON text: the character with its files, the parameters in force, and the versions.
 
-    `since_ns` is the stamp of the last state that was answered with other parameters, if any;
-    `probe` and `terrain` are a simulator's, `actuation` a controller's. `name` is the character's
-    in its world, where it is one of several: `characters`, in the order in which they entered it.
-    `session` is the simulator's; as a parameter it is left out, for it is of no influence.
+    `since_ns` is the stamp of the last state answered with other parameters; `probe` and `terrain`
+    are a simulator's, `actuation` a controller's. `name` is the character's among several,
+    `characters` in their world's order. `session`, the simulator's, is no parameter here.
 
     Raises:
         CharacterError: a mesh of the character or of the terrain cannot be read.
@@ -52,9 +51,7 @@ def describe(
         "session": session,
         "name": name,
         "characters": list(characters),
-        "joints": [
-            {"name": each.name, "type": each.type.value} for each in character.layout.joints
-        ],
+        "joints": [{"name": j.name, "type": j.type.value} for j in character.layout.joints],
         "effort_limits": [_finite(limit) for limit in character.effort_limits().tolist()],
         "mass": character.mass,
         **_describe_urdf(_TERRAIN, terrain),

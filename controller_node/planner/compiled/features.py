@@ -51,13 +51,11 @@ def write_features(
         joints: Where the joints are.
         watched: What else there is to look at.
     """
-    n = len(velocity)
-    last, root = 2 * n - 6, quaternion(position, 3)
+    last, root = 2 * len(velocity) - 6, quaternion(position, 3)
     turn = turn_between(quaternion(target, 3), root)
-    for i in range(3):
-        row[i] = turn[i]
+    row[0], row[1], row[2] = turn
     _write_joints(row, target, position, joints)
-    row[n - 3 : last] = velocity[3:]
+    row[last // 2 : last] = velocity[3:]
     _write_momentum(row[last:], position, velocity, mass, centre, root, tree, watched.mass)
     for k in range(len(watched.end_effectors)):
         for i in range(3):
