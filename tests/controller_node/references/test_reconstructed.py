@@ -174,7 +174,7 @@ def test_a_file_of_before_is_refused_in_a_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "reason"),
     [
-        ({"clip": "walk"}, "the clip 'walk' has none"),
+        ({"reference": "clip", "clip": "walk"}, "the clip 'walk' has none"),
         ({"reference": "hold"}, "has none"),
         ({"rate": 480}, "'rate' is 480; the plan in .* is for 240"),
         ({"behaviour": "reactive"}, "for the behaviour tracking"),
@@ -185,8 +185,8 @@ def test_what_cannot_be_played_is_said(
     tmp_path: Path, given: dict[str, object], reason: str
 ) -> None:
     file = written(tmp_path / "walk.json", some_plan())
-    reference = {"reference": "clip", "clip": str(file)}
+    motion = {} if "reference" in given else {"reference": "clip", "clip": str(file)}
 
     with pytest.raises(ConfigurationError, match=reason):
-        plan = make_plan("humanoid", 0.1, reference, {}, {"planner": "recorded", **given})
+        plan = make_plan("humanoid", 0.1, motion, {}, {"planner": "recorded", **given})
         next(iter(ticks_in_process(plan)))
