@@ -115,6 +115,8 @@ class Simulation:
         character: Character,
         start: StampedState | None = None,
         parameters: Mapping[str, object] = _NONE,
+        *,
+        watch_contacts: bool = True,
         **more: object,
     ) -> None:
         """Build the world.
@@ -123,6 +125,7 @@ class Simulation:
             character: As `load_character` gives it.
             start: Where it begins, such as a controller's `start`; None: in its rest pose.
             parameters: Of `sim_node`, by name (docs/parameters.md).
+            watch_contacts: Find out what touches, which takes a tenth of a step's time.
             more: The same for names without a dot, such as `gravity=3.71`.
 
         Raises:
@@ -138,7 +141,7 @@ class Simulation:
         setup = simulator_parameters.make_character_setup(character, self._values)
         settings = simulator_parameters.make_settings(self._values)
         self._simulation = simulation.Simulation([setup], settings)
-        self._simulation.watches_contacts = True
+        self._simulation.watches_contacts = watch_contacts
         self._pushes = WrenchQueue(character)
         self._hash = StateHash()
         self._first_tick = self._simulation.tick
@@ -175,7 +178,13 @@ class Simulation:
 
     @property
     def contacts(self) -> FloatArray:
-        """Net contact wrenches (links, 6) of the last tick: N and N m, world axes."""
+        """Net contact wrenches (links, 6) of the last tick: N and N m, world axes.
+
+        Raises:
+            ConfigurationError: the simulation does not watch contacts.
+        """
+        if not self._simulation.watches_contacts:
+            raise ConfigurationError("contacts are not watched; make it with watch_contacts=True")
         contacts = self._simulation.characters[0].contacts
         if contacts is None:
             return np.zeros((len(self.character.links), 6))

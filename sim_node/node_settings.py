@@ -16,7 +16,6 @@ class NodeSettings:
     tick_period: float  # s of wall time from tick to tick; 0: as fast as it goes
     max_ticks: int  # 0: no limit
     wait_for_subscribers: int
-    initial_state_timeout: float  # s of wall time; 0: no limit
     republish_period: float  # s of wall time
     lockstep_timeout: float  # s of wall time; 0: no limit
     on_timeout: str
@@ -24,7 +23,6 @@ class NodeSettings:
     command_timeout_ns: int  # of simulated time
     push_ticks: int  # that a push lasts
     display_ticks: int  # from markers to markers
-    step_count: int
 
 
 def make_node_settings(values: Values) -> NodeSettings:
@@ -42,7 +40,6 @@ def make_node_settings(values: Values) -> NodeSettings:
         tick_period=1.0 / (factor * rate) if factor else 0.0,
         max_ticks=values.integer("max_ticks"),
         wait_for_subscribers=values.integer("wait_for_subscribers"),
-        initial_state_timeout=values.number("initial_state_timeout"),
         republish_period=values.number("republish_period"),
         lockstep_timeout=values.number("lockstep_timeout"),
         on_timeout=values.text("on_timeout"),
@@ -50,5 +47,4 @@ def make_node_settings(values: Values) -> NodeSettings:
         command_timeout_ns=round(values.number("command_timeout") * NANOSECONDS_PER_SECOND),
         push_ticks=max(round(values.number("wrench_duration") * rate), 1),
         display_ticks=max(round(rate / values.number("display_rate")), 1),
-        step_count=values.integer("step_count"),
     )

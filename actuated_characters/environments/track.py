@@ -75,7 +75,9 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         controller = Controller(load_character(character), shared, **reference)
         self._character, self._reference = controller.character, controller.reference
         self._layout = self._character.layout
-        self._simulation = Simulation(self._character, controller.start, simulator)
+        self._simulation = Simulation(
+            self._character, controller.start, simulator, watch_contacts=False
+        )
         self._joints = slice(_BASE if self._layout.has_floating_base else 0, None)
         self._model = DynamicsModel(self._character)
         self._actuated = self._layout.mask(self._layout.actuated_joint_names)

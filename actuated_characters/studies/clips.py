@@ -90,25 +90,13 @@ def _track(runner: StudyRunner, clip: str) -> RunResult:
     return runner.run(RunSpec(clip, _CHARACTER, _DURATION, {"reference": "clip", "clip": clip}))
 
 
-def _on_the_ground(
-    character: Character, positions: FloatArray, besides: set[str]
-) -> tuple[str, ...]:
-    heights = clearances(character, positions)
-    return tuple(
-        name for name, height in heights.items() if name not in besides and height.min() < _TOUCH
-    )
-
-
 def _row(character: Character, clip: str, outcome: RunResult) -> Row:
     """A row of the table.
 
     A fall: below half of the height, or unexpected links on the ground.
     """
-    recording, errors, feet = (
-        outcome.recording,
-        joint_errors(outcome.recording),
-        set(character.feet),
-    )
+    recording, feet = outcome.recording, set(character.feet)
+    errors = joint_errors(recording)
     parents = {link.name: character.links[link.parent].name for link in character.links[1:]}
     # a shin reaches down to its ankle, and to the ground where the foot turns over
     legs = feet | {parents[foot] for foot in feet}

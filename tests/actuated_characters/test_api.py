@@ -143,6 +143,7 @@ def test_parameters_act_on_both_sides(pendulum: ac.Character) -> None:
         (lambda one: ac.Simulation(one, graviti=1.0), "graviti"),
         (lambda one: ac.Simulation(one).step(np.zeros(3)), r"shape \(3,\); it must be \(1,\)"),
         (lambda one: ac.Simulation(one).push("wing", (1.0, 0.0, 0.0)), "wing"),
+        (lambda one: ac.Simulation(one, watch_contacts=False).contacts, "watch_contacts=True"),
         (lambda _: ac.load_character("nobody"), "nobody"),
     ],
     ids=[
@@ -155,6 +156,7 @@ def test_parameters_act_on_both_sides(pendulum: ac.Character) -> None:
         "parameter",
         "effort",
         "link",
+        "contacts",
         "character",
     ],
 )

@@ -29,6 +29,8 @@ def test_gymnasiums_own_checker_passes(options: dict[str, object]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that efforts are in N m, not between -1 and 1
         check_env(environment)
+    observation, _ = environment.reset(seed=2)
+    assert environment.observation_space.contains(observation)
     environment.close()
 
 
@@ -83,7 +85,9 @@ def test_an_episode_is_truncated_after_its_duration_and_may_begin_anywhere() -> 
 def test_the_page_works() -> None:
     page = (Path(__file__).parents[2] / "docs" / "python.md").read_text("utf-8")
     (code,) = [part for part in page.split("```") if "import gymnasium" in part]
-    exec(code.removeprefix("python"), {})
+    names: dict[str, float] = {}
+    exec(code.removeprefix("python"), names)
+    assert 0.0 <= names["reward"] <= 1.0
 
 
 def test_what_diverges_ends_with_a_finite_observation() -> None:
