@@ -415,8 +415,12 @@ class SimulatorClient(Client):
             state = self.answer(state, dict(zip(motors, torques, strict=True)))
         return state
 
-    def reported(self, **expected: object) -> Any:
-        """The first report on /diagnostics with these values (as texts), once it has come."""
+    def reported(self, *, answering: JointState | None = None, **expected: object) -> Any:
+        """The first report on /diagnostics with these values (as texts), once it has come.
+
+        With a state to be `answering` it goes on from there meanwhile: pushes and throws are taken
+        between two ticks alone.
+        """
 
         def found() -> Any:
             for array_message in self.diagnostics.messages:
@@ -426,7 +430,14 @@ class SimulatorClient(Client):
                         return status
             return None
 
-        return self.spin_until(found, f"a report of {expected}")
+        def step() -> None:
+            nonlocal answering
+            if answering is None:
+                self._executor.spin_once(0.02)
+            else:
+                answering = self.answer(answering, {})
+
+        return wait_until(found, f"a report of {expected}", PATIENCE, step)
 
     def pause(self, paused: bool) -> SetBool.Response:
         """Call the simulator's service `~/pause`."""
