@@ -10,7 +10,7 @@ import numpy as np
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.runs.execution import run_in_process, run_over_topics
 from actuated_characters.runs.plan import choose_reference, make_plan
-from actuated_characters.runs.run_directory import prepare_directory, read_figures
+from actuated_characters.runs.run_directory import prepare_directory, read_metrics
 from controller_node import parameters as controller_parameters
 from controller_node.references.base import Reference
 from controller_node.references.factory import make_motion
@@ -94,7 +94,7 @@ class Controller:
         effort, reference = self._controller.compute_effort(state, self._episode_ns, contacts)
         return np.where(self._commanded, effort, 0.0), reference
 
-    def answer(self, message: "JointState") -> "JointState":
+    def compute_command(self, message: "JointState") -> "JointState":
         """The message for `joint_torques` that answers one of `joint_states`.
 
         Raises:
@@ -290,8 +290,8 @@ def run(
         run_in_process(plan, directory, progress=_ignore)
     else:
         run_over_topics(plan, directory, write_bag=True, progress=_ignore)
-    figures, _ = read_figures(directory)
-    return figures
+    metrics, _ = read_metrics(directory)
+    return metrics
 
 
 def _ignore(ticks: int) -> None:

@@ -148,14 +148,14 @@ def _over_topics(cast: SimulatorParameters, given: Mapping[str, object]) -> floa
         spinner = PollingExecutor(nodes.node)
         limp = [_LimpController(nodes, part) for part in cast.characters]
 
-        def answer() -> None:
-            answered = [controller.answer() for controller in limp]
+        def poll() -> None:
+            answered = [controller.poll() for controller in limp]
             if any(answered):
                 spinner.received()
             else:
                 spinner.rest()
 
-        nodes.wait_until(lambda: int(nodes.reports[-1]["tick"]) > ticks, answer)
+        nodes.wait_until(lambda: int(nodes.reports[-1]["tick"]) > ticks, poll)
         spinner.close()
         return float(nodes.reports[-1]["tick_us_p50"])
 
@@ -170,7 +170,7 @@ class _LimpController:
         self._encoder, self._zeros = JointStateEncoder(names), np.zeros(len(names))
         self._decoder = JointStateDecoder()
 
-    def answer(self) -> bool:
+    def poll(self) -> bool:
         """Answer a state if there is one; whether there was."""
         raw = self._states.take()
         if raw is None:

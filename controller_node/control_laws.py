@@ -3,7 +3,7 @@
 Errors are those of `JointLayout.difference`: in rad or m, a rotation's as a rotation vector in the
 child frame. Efforts are in N m or N, in the frames of docs/design.md. A law without stiffness or
 integral gain is the one with those gains at zero. A new law is a function of `LawContext`,
-`TrackingInput` and `GainArrays` under `@_LAWS.offer(NAME)`.
+`TrackingInput` and `GainArrays` under `@_LAWS.register(NAME)`.
 """
 
 from collections.abc import Callable
@@ -182,42 +182,42 @@ def make_law(name: str, context: LawContext) -> Law:
     return partial(_LAWS[name], context)
 
 
-@_LAWS.offer("stable_pd")
+@_LAWS.register("stable_pd")
 def _stable_pd(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     context.model.update(tracking.position, tracking.velocity)
     return _implicit(context, tracking, gains, 0.0)
 
 
-@_LAWS.offer("computed_torque")
+@_LAWS.register("computed_torque")
 def _computed_torque(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     context.model.update(tracking.position, tracking.velocity)
     inverse_dynamics = context.model.inverse_dynamics(tracking.now.acceleration)
     return _implicit(context, tracking, gains, inverse_dynamics)
 
 
-@_LAWS.offer("pd_gravity")
+@_LAWS.register("pd_gravity")
 def _pd_gravity(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     context.model.update(tracking.position, tracking.velocity)
     return _pd(context, tracking, gains) + context.model.gravity_force()
 
 
-@_LAWS.offer("pd")
+@_LAWS.register("pd")
 def _pd(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     return pd_effort(gains.stiffness, gains.damping, *_errors(context, tracking))
 
 
-@_LAWS.offer("p")
+@_LAWS.register("p")
 def _p(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     return pd_effort(gains.stiffness, np.zeros(context.layout.size), *_errors(context, tracking))
 
 
-@_LAWS.offer("feedforward")
+@_LAWS.register("feedforward")
 def _feedforward(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     assert context.series is not None
     return context.series.at(tracking.time)
 
 
-@_LAWS.offer("zero")
+@_LAWS.register("zero")
 def _zero(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     return np.zeros(context.layout.size)
 

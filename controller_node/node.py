@@ -11,7 +11,7 @@ from rclpy.node import Node
 from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import ModeReport
 from controller_node.interface.contact_subscription import ContactSubscription
-from controller_node.interface.publishers import Answer, Publishers
+from controller_node.interface.publishers import Publishers, Reply
 from controller_node.interface.simulators import Simulators, check_simulator
 from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.parameters import (
@@ -63,7 +63,7 @@ class ControllerNode(Node):
         for warning in self._character.warnings + self._values.warnings + motion.warnings:
             self.get_logger().warning(warning)
         self._controller = make_controller(self._character, motion.reference, self._values)
-        self._answer: Answer | None = None
+        self._last_reply: Reply | None = None
         self._is_answering = False
         self._upcoming: Values | None = None
         self._episode_ns: int | None = None
@@ -91,7 +91,7 @@ class ControllerNode(Node):
             if controller.needs_contacts
             else None
         )
-        self._waiting: bytes | None = None  # a state, for the contacts of its tick
+        self._pending_state: bytes | None = None  # a state, for the contacts of its tick
         self._published_mode: ModeReport | None = None
         self._published_outlook: Outlook | None = None
         # after them: a simulator that has found this subscription has found the others as well
@@ -105,7 +105,7 @@ class ControllerNode(Node):
 
     def _publish_configuration(self) -> None:
         """Publish the parameters in force, and since which state they are."""
-        since_ns = None if self._answer is None else self._answer.state.stamp_ns
+        since_ns = None if self._last_reply is None else self._last_reply.state.stamp_ns
         self._outputs.publish_configuration(
             configuration.describe(
                 self._character, self._values, since_ns, actuation=self._actuation
@@ -131,8 +131,8 @@ class ControllerNode(Node):
                     executor.serve()  # a flood of states must not keep services waiting
                     self._take_state(raw)
                     continue
-                if self._waiting is not None:
-                    self._take_state(self._waiting)
+                if self._pending_state is not None:
+                    self._take_state(self._pending_state)
                 executor.rest()
         finally:
             self._report(at_once=True)
@@ -175,9 +175,9 @@ class ControllerNode(Node):
         if not self._is_heard():
             return  # the simulator publishes the state again
         if self._is_answered(raw):
-            assert self._answer is not None
+            assert self._last_reply is not None
             self._counts["repeated"] += 1
-            self._outputs.publish(self._answer)
+            self._outputs.publish(self._last_reply)
             return
         try:
             state, frame_id = self._decode(raw)
@@ -193,9 +193,9 @@ class ControllerNode(Node):
         if self._contacts is not None:
             contacts = self._contacts.until(state.stamp_ns, episode_ns)
             if contacts is None:
-                self._waiting = raw
+                self._pending_state = raw
                 return  # the simulator publishes the contacts again, too
-        self._waiting = None
+        self._pending_state = None
         self._check_rate(state)
         self._stamped_topics.take(state.stamp_ns, episode_ns)
         self._answer_state(raw, state, episode_ns, contacts)
@@ -207,27 +207,25 @@ class ControllerNode(Node):
         self._is_answering = True
         effort, reference = self._controller.compute_effort(state, episode_ns, contacts)
         self._is_answering = False
-        self._answer = self._outputs.answer(raw, state, effort, reference)
+        self._last_reply = self._outputs.make_reply(raw, state, effort, reference)
         self._answer_times.add(time.perf_counter() - started)
         self._counts["answered"] += 1
         self._publish_mode_and_plan(state.stamp_ns)
-        self._outputs.publish(self._answer)
+        self._outputs.publish(self._last_reply)
         if self._upcoming is not None:
             self._take_parameters(self._upcoming)
 
     def _is_answered(self, raw: bytes) -> bool:
         """Whether a state, serialised, is the one that was answered last, of the same simulator."""
-        answer = self._answer
+        reply = self._last_reply
         return (
-            answer is not None
-            and answer.raw_state == raw
-            and answer.session == self._simulators.bound
+            reply is not None and reply.raw_state == raw and reply.session == self._simulators.bound
         )
 
     def _bind(self, frame_id: str) -> None:
         """Bind to the simulator of a usable state, if none is bound, and forget another one's."""
         if self._simulators.bind(frame_id):
-            self._episode_ns = self._waiting = None
+            self._episode_ns = self._pending_state = None
             self._outputs.bind(self._simulators.bound or ANONYMOUS)
             if self._contacts is not None:
                 self._contacts.restart()
@@ -244,19 +242,19 @@ class ControllerNode(Node):
 
     def _is_heard(self) -> bool:
         """Whether all that are to hear the first answer are there; later ones wait for none."""
-        if self._answer is not None:
+        if self._last_reply is not None:
             return True
         wanted = self._values.integer("wait_for_subscribers")
         return self._outputs.torque_subscribers >= wanted
 
     def _check_rate(self, state: StampedState) -> None:
         """Log if states come several ticks apart: their stamps fit any multiple of the rate."""
-        answer = self._answer
-        if answer is None or state.effort is None or self._simulators.runs_on:
+        reply = self._last_reply
+        if reply is None or state.effort is None or self._simulators.runs_on:
             return
         clock = self._controller.clock
-        apart = clock.tick(state.stamp_ns) - clock.tick(answer.state.stamp_ns)
-        if apart > 1 and answer.session == self._simulators.bound:
+        apart = clock.tick(state.stamp_ns) - clock.tick(reply.state.stamp_ns)
+        if apart > 1 and reply.session == self._simulators.bound:
             self._once_logger.log_once(
                 f"states come {apart} ticks of {clock.rate_hz} Hz apart; set 'rate' to the "
                 "simulator's"

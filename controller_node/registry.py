@@ -11,14 +11,14 @@ Maker = TypeVar("Maker")
 class Registry(Generic[Maker]):
     """Functions by name, each with the parameters that it reads.
 
-    A module offers its functions when it is imported: `@REFERENCES.offer("step", *PARAMETERS)`.
+    A module registers its functions when it is imported: `@REFERENCES.register("step", *PARAMETERS)`.
     """
 
     def __init__(self) -> None:
         self._makers: dict[str, Maker] = {}
         self._parameters: dict[str, tuple[Parameter, ...]] = {}
 
-    def offer(self, name: str, *parameters: Parameter) -> Callable[[Maker], Maker]:
+    def register(self, name: str, *parameters: Parameter) -> Callable[[Maker], Maker]:
         """Decorate the function of a name."""
 
         def add(maker: Maker) -> Maker:

@@ -61,7 +61,7 @@ class StrengthSchedule:
 
     def __init__(self, layout: JointLayout) -> None:
         self._in_force = Strengths(0, np.ones(len(layout.vector_starts)))
-        self._waiting: list[Strengths] = []
+        self._pending: list[Strengths] = []
 
     def add(self, strengths: Strengths) -> None:
         """Take strengths; of two of one stamp the later ones count.
@@ -69,13 +69,13 @@ class StrengthSchedule:
         Raises:
             MotionError: too many wait for their stamps.
         """
-        if len(self._waiting) >= _MOST_WAITING:
+        if len(self._pending) >= _MOST_WAITING:
             raise MotionError(f"strength: more than {_MOST_WAITING} are yet to begin")
-        self._waiting.append(strengths)
-        self._waiting.sort(key=lambda waiting: waiting.start_ns)  # stable
+        self._pending.append(strengths)
+        self._pending.sort(key=lambda strengths: strengths.start_ns)  # stable
 
     def at(self, stamp_ns: int) -> FloatArray:
         """The strengths (b,) at a stamp; stamps must not go back."""
-        while self._waiting and self._waiting[0].start_ns <= stamp_ns:
-            self._in_force = self._waiting.pop(0)
+        while self._pending and self._pending[0].start_ns <= stamp_ns:
+            self._in_force = self._pending.pop(0)
         return self._in_force.values

@@ -26,9 +26,9 @@ class PdController(Node):
         self.target = self.declare_parameter("target", 1.0).value  # rad; 0 hangs straight down
         self.wanted = self.declare_parameter("wait_for_subscribers", 1).value  # to joint_torques
         self.torques = self.create_publisher(JointState, "joint_torques", 10)
-        self.create_subscription(JointState, "joint_states", self.answer, 10)
+        self.create_subscription(JointState, "joint_states", self.on_state, 10)
 
-    def answer(self, state):
+    def on_state(self, state):
         """Publish the torque for a state; its stamp says which state that is."""
         if self.torques.get_subscription_count() < self.wanted:
             return  # the simulator publishes the state again

@@ -25,7 +25,7 @@ from sensor_msgs.msg import MultiDOFJointState
 REJECTED_AFTER = 1.0  # s of simulated time; a push that was not applied by then was rejected
 
 
-class Pusher(Node):
+class PerturbationNode(Node):
     """Publishes one push on `external_wrench`; reads `applied_wrench` until it is over."""
 
     def __init__(self, arguments):
@@ -127,10 +127,10 @@ def main():
     arguments = parse()
     rclpy.init()
     try:
-        pusher = Pusher(arguments)
-        while rclpy.ok() and not pusher.over.done():  # a wait without end may miss a SIGTERM
-            rclpy.spin_until_future_complete(pusher, pusher.over, timeout_sec=0.5)
-        return pusher.report() if pusher.over.done() else 1
+        node = PerturbationNode(arguments)
+        while rclpy.ok() and not node.over.done():  # a wait without end may miss a SIGTERM
+            rclpy.spin_until_future_complete(node, node.over, timeout_sec=0.5)
+        return node.report() if node.over.done() else 1
     except (KeyboardInterrupt, ExternalShutdownException):
         return 1
     except RuntimeError:  # rcl's own, where a signal comes just before a wait

@@ -38,9 +38,9 @@ class StepResponse(Node):
         self.samples = []  # (time since the step s, height m)
         self.done = Future()
         self.torques = self.create_publisher(JointState, "joint_torques", 10)
-        self.create_subscription(JointState, "joint_states", self.answer, 10)
+        self.create_subscription(JointState, "joint_states", self.on_state, 10)
 
-    def answer(self, state):
+    def on_state(self, state):
         """Publish the effort for a state."""
         time = state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
         entry = state.name.index("height")

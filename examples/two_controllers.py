@@ -82,9 +82,9 @@ class PartController(Node):
         super().__init__(f"{part}_controller")
         self.goals = GOALS[part]
         self.torques = self.create_publisher(JointState, "joint_torques", 10)
-        self.create_subscription(JointState, "joint_states", self.answer, 10)
+        self.create_subscription(JointState, "joint_states", self.on_state, 10)
 
-    def answer(self, state):
+    def on_state(self, state):
         """Publish the torques of this part's joints."""
         entry = {name: index for index, name in enumerate(state.name)}
         torque = JointState()

@@ -87,8 +87,10 @@ class SimNode(Node):
         ]
         self._simulation = Simulation(setups, make_settings(values))
         pairs = zip(self._simulation.characters, loaded, strict=True)
-        waiting = [simulated for simulated, each in pairs if begins_with_reference(each.values)]
-        self._initial_states = InitialStates(self, waiting, values)
+        from_reference = [
+            simulated for simulated, each in pairs if begins_with_reference(each.values)
+        ]
+        self._initial_states = InitialStates(self, from_reference, values)
 
     def _open_topics(self) -> None:
         own_session = OwnSession(self._session, self._once_logger.log_once)
@@ -259,8 +261,8 @@ class SimNode(Node):
                 self._on_timeout()
 
     def _describe_waiting(self) -> str:
-        waiting = [each for each in self._characters if each.missing]
-        return "; ".join(describe_waiting(self, each.torques, each.missing) for each in waiting)
+        incomplete = [each for each in self._characters if each.missing]
+        return "; ".join(describe_waiting(self, each.torques, each.missing) for each in incomplete)
 
     def _on_timeout(self) -> None:
         action = self._settings.on_timeout
@@ -275,8 +277,8 @@ class SimNode(Node):
         self._timeouts += 1
         for each in self._characters:
             assert isinstance(each.commands, LockstepBarrier)  # real time has no missing commands
-            held = each.last_effort
-            each.commands.fill_missing(held if action == "hold" else np.zeros_like(held))
+            last = each.last_effort
+            each.commands.fill_missing(last if action == "hold" else np.zeros_like(last))
 
     def _raise_fault(self, sentence: str, *, diverged: bool = False) -> None:
         if self._settings.on_fault == "abort":

@@ -183,8 +183,8 @@ class SimulatorParameters:
     @property
     def open(self) -> list[Parameter]:
         """The parameters that wait for the state in which a controller's reference begins."""
-        waiting = [one for one in self.characters if begins_with_reference(one.values)]
-        names = {one.prefix + name for one in waiting for name in (POSITION, VELOCITY)}
+        from_reference = [one for one in self.characters if begins_with_reference(one.values)]
+        names = {one.prefix + name for one in from_reference for name in (POSITION, VELOCITY)}
         return [parameter for parameter in self.declared if parameter.name in names]
 
     def with_values(self, changes: Mapping[str, Mapping[str, Value]]) -> "SimulatorParameters":

@@ -12,7 +12,7 @@ from actuated_characters.bags.format.storage import reason
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rewriting import Contents, Progress, rewrite, storage_files
 from actuated_characters.metrics.collector import CONFIGURATION, HEARD, MetricsCollector
-from actuated_characters.runs.run_directory import BAG, SUMMARY, figures_directory, write_figures
+from actuated_characters.runs.run_directory import BAG, SUMMARY, metrics_directory, write_metrics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.configuration import parse_world
@@ -30,7 +30,7 @@ class Recovered:
     contents: Contents
     damaged: Path | None  # the original; None where the bag was complete and nothing was done
     measured: list[Path] = field(default_factory=list)  # directories with figures rebuilt
-    kept: list[Path] = field(default_factory=list)  # with the recorder's own, of the whole run
+    unchanged: list[Path] = field(default_factory=list)  # with the recorder's own, of the whole run
     unmeasured: str = ""  # why a run's directory got no figures
 
 
@@ -127,15 +127,15 @@ def _measure(run: Path, recovered: Recovered, progress: Progress) -> None:
     ]
     try:
         is_alone = len(namespaces) == 1 and not _name_in_world(recovered.bag, namespaces[0])
-        places = {each: figures_directory(run, each, is_alone=is_alone) for each in namespaces}
+        places = {each: metrics_directory(run, each, is_alone=is_alone) for each in namespaces}
         made = {each: place for each, place in places.items() if not (place / SUMMARY).exists()}
         if recovered.damaged is not None:
-            recovered.kept = [place for each, place in places.items() if each not in made]
+            recovered.unchanged = [place for each, place in places.items() if each not in made]
         collectors = {each: MetricsCollector(f"{each}/{topics.SIM_NODE}"[1:]) for each in made}
         if collectors:
             _collect(recovered, collectors, progress)
         for namespace, collector in collectors.items():
-            write_figures(made[namespace], *collector.results())
+            write_metrics(made[namespace], *collector.results())
             recovered.measured.append(made[namespace])
         if not namespaces and not (run / SUMMARY).exists():
             recovered.unmeasured = f"it has no '{CONFIGURATION}'"

@@ -35,7 +35,7 @@ class Contents:
 
     counts: Counter[str] = field(default_factory=Counter)  # messages of each topic
     last_log_time_ns: int = 0
-    lost: list[str] = field(default_factory=list)  # of each file, the parts that are unreadable
+    unreadable: list[str] = field(default_factory=list)  # parts of each file
 
     def add(self, topic: str, log_time_ns: int) -> None:
         """Count a message."""
@@ -59,8 +59,8 @@ def rewrite(damaged: Path, new: Path, progress: Progress) -> Contents:
     messages = _salvage(files, contents, progress)
     first = next(messages, None)
     if first is None:
-        lost = f" (unreadable: {'; '.join(contents.lost)})" if contents.lost else ""
-        raise RecordingError(f"nothing to recover in {damaged}: no message reached the disk{lost}")
+        parts = f" (unreadable: {'; '.join(contents.unreadable)})" if contents.unreadable else ""
+        raise RecordingError(f"nothing to recover in {damaged}: no message reached the disk{parts}")
     is_compressed = any(file.is_compressed for file in files)
     with BagWriter(new, compression=storage.ZSTD if is_compressed else storage.NONE) as bag:
         announced = set[str]()
@@ -125,13 +125,13 @@ def _salvage(
                     _check(message, types)
                     raw = limits.unpack_message(message.raw, packed=packed)
                 except limits.DAMAGED as error:
-                    file.lost[str(error)] += 1
+                    file.unreadable[str(error)] += 1
                 else:
                     yield message.topic, raw, message.log_time_ns
         except RecordingError as error:  # another file may be sound
-            contents.lost.append(str(error))
+            contents.unreadable.append(str(error))
         if file.damage:
-            contents.lost.append(f"{file.path.name}: {file.damage}")
+            contents.unreadable.append(f"{file.path.name}: {file.damage}")
 
 
 def _check(message: StoredMessage, types: dict[str, str]) -> None:

@@ -231,8 +231,8 @@ class CharacterTimeline:
             assert self.rebuilt is not None
             name = self.rebuilt.known.character
             raise RecordingError(f"the states are not those of {name}: {error}") from error
-        tick, kept = self._clock.tick(state.stamp_ns), self.states
-        if not kept.stamps_ns:
+        tick, states = self._clock.tick(state.stamp_ns), self.states
+        if not states.stamps_ns:
             if state.effort is not None:
                 self.skipped_states += 1
                 return
@@ -242,11 +242,11 @@ class CharacterTimeline:
         elif tick > self._last_tick + 1:
             self._gaps.append((self._last_tick + 1, tick - 1))
         self._last_tick = tick
-        kept.stamps_ns.append(state.stamp_ns)
-        kept.published_ns.append(published_ns)
-        kept.position.frombytes(state.position.tobytes())
-        kept.velocity.frombytes(state.velocity.tobytes())
-        kept.effort.frombytes(self._no_effort if state.effort is None else state.effort.tobytes())
+        states.stamps_ns.append(state.stamp_ns)
+        states.published_ns.append(published_ns)
+        states.position.frombytes(state.position.tobytes())
+        states.velocity.frombytes(state.velocity.tobytes())
+        states.effort.frombytes(self._no_effort if state.effort is None else state.effort.tobytes())
 
     def _check_repeated(self, tick: int, content: bytes) -> None:
         """Check that a state that is published again, as in a pause, is the same one."""
@@ -257,10 +257,11 @@ class CharacterTimeline:
             raise RecordingError(f"two states of tick {tick}; was its simulator restarted?")
 
     def _take_reference(self, raw: bytes, published_ns: int) -> None:
-        state, kept = state_in_layout(self._layout, self._references.decode(raw)), self.references
-        kept.stamps_ns.append(state.stamp_ns)
-        kept.position.frombytes(state.position.tobytes())
-        kept.velocity.frombytes(state.velocity.tobytes())
+        state = state_in_layout(self._layout, self._references.decode(raw))
+        references = self.references
+        references.stamps_ns.append(state.stamp_ns)
+        references.position.frombytes(state.position.tobytes())
+        references.velocity.frombytes(state.velocity.tobytes())
 
     def _take_command(self, raw: bytes, published_ns: int) -> None:
         assert self.rebuilt is not None

@@ -123,7 +123,7 @@ def _growth_table(comparison: "Comparison") -> Table:
 
 def _figures_table(comparison: "Comparison") -> Table:
     rows = []
-    for name, values in comparison.figures.items():
+    for name, values in comparison.metrics.items():
         shown = [str(v)[:_SHOWN_OF_A_HASH] if name == _HASH else show(v, 6) for v in values]
         ours, theirs = (
             v if isinstance(v, (int, float)) and not isinstance(v, bool) else None for v in values

@@ -163,14 +163,14 @@ def _output(options: argparse.Namespace) -> Path:
 
 def _report(job: "Job", found: "Reconstruction") -> None:
     """Print the figures, and the command that plays the file."""
-    figures = found.figures
+    metrics = found.metrics
     facts = {
-        "length": f"{job.problem.duration:g} s, {figures.ticks} ticks, {found.windows} windows",
-        "centre of mass error, mean": f"{figures.centre_error_mean_m:.3f} m",
-        "joint error, mean": f"{figures.joint_error_mean_rad:.3f} rad",
-        "lowest root": f"{figures.least_root_height_m:.3f} m",
-        "fell": str(figures.fell),
-        "state_hash": figures.state_hash,
+        "length": f"{job.problem.duration:g} s, {metrics.ticks} ticks, {found.windows} windows",
+        "centre of mass error, mean": f"{metrics.centre_error_mean_m:.3f} m",
+        "joint error, mean": f"{metrics.joint_error_mean_rad:.3f} rad",
+        "lowest root": f"{metrics.least_root_height_m:.3f} m",
+        "fell": str(metrics.fell),
+        "state_hash": metrics.state_hash,
     }
     console = Console()
     console.print(make_facts_table(str(job.output), facts.items()))

@@ -56,12 +56,12 @@ def _tell(recovered: "Recovered") -> None:
         Console().print(make_table("recovered", ("topic", "messages"), counts))
         last = datetime.fromtimestamp(contents.last_log_time_ns / _NS_PER_S, UTC)
         print(f"{bag}: {contents.counts.total()} messages, the last one of {last:%F %T.%f} UTC")
-        for lost in contents.lost:
-            print(f"unreadable: {lost}")
+        for part in contents.unreadable:
+            print(f"unreadable: {part}")
         print(f"the damaged bag: {recovered.damaged}")
     for directory in recovered.measured:
         print(f"figures: {directory}")
-    for directory in recovered.kept:
+    for directory in recovered.unchanged:
         print(f"figures: {directory}, as they were: of the whole run, the bag is a part of it")
     if recovered.unmeasured:
         print(f"no figures: {recovered.unmeasured}")

@@ -203,8 +203,8 @@ def _check_result(
     options: argparse.Namespace, recordings: "Sequence[Recording]", result: "ReplayResult"
 ) -> None:
     """Print the notes of a replay. Raises ReplayError if states differ."""
-    for note in result.notes:
-        print(f"note: {note}")
+    for remark in result.remarks:
+        print(f"note: {remark}")
     if result.difference is not None:
         raise _difference_error(options.bag, recordings, result.difference)
 
@@ -247,14 +247,14 @@ def _check_summaries(bag: Path, recordings: "Sequence[Recording]", result: "Repl
     They are of all states that it received: of a part of them there is no hash to compare with.
     """
     from actuated_characters.replay.world import cut_world, worlds
-    from actuated_characters.runs.run_directory import figures_directory
+    from actuated_characters.runs.run_directory import metrics_directory
 
     for together in worlds(recordings):
         for recording, cut in zip(together, cut_world(together)[0], strict=True):
             if len(cut.stamps_ns) < len(recording.stamps_ns) or recording.skipped_states:
                 continue
             is_alone = len(recordings) == 1 and not recording.world.name
-            written = _written_hash(figures_directory(bag, recording.name, is_alone=is_alone))
+            written = _written_hash(metrics_directory(bag, recording.name, is_alone=is_alone))
             found = result.state_hashes[recording.name]
             if written not in (None, found):
                 raise ReplayError(

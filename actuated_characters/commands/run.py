@@ -126,8 +126,8 @@ def _add_recorded(run: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from actuated_characters.report.run_figures import describe_figures, plot_figures
-    from actuated_characters.runs.run_directory import PLOT, prepare_directory, read_figures
+    from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
+    from actuated_characters.runs.run_directory import PLOT, prepare_directory, read_metrics
 
     run = planned_run(options)
     plan, motion = run.plan, _motion_name(run.plan)
@@ -149,9 +149,9 @@ def _run(options: argparse.Namespace) -> None:
             print(f"the results in {directory} are not complete", file=sys.stderr)
             raise
         progress(plan.ticks)
-    plot_figures(directory)
-    figures = describe_figures(read_figures(directory)[0])
-    Console().print(make_table(f"results in {directory}", ("figure", "value"), figures))
+    plot_metrics(directory)
+    metrics = describe_metrics(read_metrics(directory)[0])
+    Console().print(make_table(f"results in {directory}", ("figure", "value"), metrics))
     for text, hit in zip(options.throw, hits, strict=True):
         print(f"throw '{text}': {hit}")
     print(f"a picture of the figures: {directory / PLOT}")

@@ -77,6 +77,6 @@ def _run_study(study: "Study", label: str, directory: Path, *, keep_runs: bool) 
     files = result.write(directory)
     rows = [[show(cell) for cell in row.values()] for row in result.rows]
     console.print(make_table(study.title, result.columns, rows, right=False))
-    for note in result.notes:
-        console.print(note)
+    for remark in result.remarks:
+        console.print(remark)
     console.print(f"in {directory}: {', '.join(file.name for file in files)}")

@@ -94,13 +94,13 @@ class MetricsCollector:
             raise RecordingError("no simulator was heard")
         self._assembler.finish()
         wall_ns = self._last_state_ns - (self._first_command_ns or self._last_state_ns)
-        figures = self._measurement.summary(wall_ns / NANOSECONDS_PER_SECOND)
+        metrics = self._measurement.summary(wall_ns / NANOSECONDS_PER_SECOND)
         losses = {
             "missing_ticks": self.missing_ticks,
             "dropped_references": self._assembler.dropped_references,
         }
         head = {"character": self._configuration.character}
-        return head | figures | self._counts | losses, self._measurement.series()
+        return head | metrics | self._counts | losses, self._measurement.series()
 
     def _configure(self, text: str) -> None:
         if self._configuration is not None:

@@ -14,7 +14,7 @@ from actuated_characters.reconstruction.checkpoint import (
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.reconstruction.search import Progress, Settings, result, search
 from actuated_characters.reconstruction.tree import Node
-from actuated_characters.reconstruction.verification import Figures, verified
+from actuated_characters.reconstruction.verification import ReconstructionMetrics, verified
 from actuated_characters.reconstruction.workers import Workers
 from actuated_characters.runs.plan import Plan
 from actuated_characters.whole_files import write_whole
@@ -29,7 +29,7 @@ from msgs_config.shared_parameters import COMMAND_DELAY
 class Reconstruction:
     """What has been reconstructed."""
 
-    figures: Figures
+    metrics: ReconstructionMetrics
     windows: int
 
 
@@ -85,13 +85,13 @@ def reconstruct(
             f"{stuck_at + 1} of {windows}; {job.output} has the best attempt, "
             f"{best.tick / plan.simulator.integer('rate'):.2f} s long; --resume tries again"
         )
-    figures = verified(job.problem, job.output, best)
-    _write(job, plan, best, figures)
+    metrics = verified(job.problem, job.output, best)
+    _write(job, plan, best, metrics)
     checkpoint.unlink(missing_ok=True)
-    return Reconstruction(figures, windows)
+    return Reconstruction(metrics, windows)
 
 
-def _write(job: Job, plan: Plan, best: Node, figures: Figures | None) -> None:
+def _write(job: Job, plan: Plan, best: Node, metrics: ReconstructionMetrics | None) -> None:
     """Write the file: the clip, the plan that keeps it, and what they are of."""
     problem, rate = job.problem, plan.simulator.integer("rate")
     delay = plan.simulator.integer(COMMAND_DELAY.name)
@@ -117,7 +117,7 @@ def _write(job: Job, plan: Plan, best: Node, figures: Figures | None) -> None:
             "pushes": list(problem.pushes),
             "settings": job.settings.content(),
             "costs": [node.cost for node in best.path],
-            "figures": None if figures is None else asdict(figures),
+            "figures": None if metrics is None else asdict(metrics),
         },
         "Frames": clip["Frames"],
     }

@@ -9,7 +9,7 @@ Source: Liu, Yin, van de Panne, Shao and Xu 2010, "Sampling-based Contact-rich M
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,7 +30,7 @@ class Settings:
     """A search's settings: the same ones give the same result on any number of processes."""
 
     worlds: int = 8
-    kept: int = 2  # of them, after each window
+    survivors: int = 2  # of them, after each window
     window: float = 0.1  # s
     seed: int = 1
     tries: int = 4  # failures without getting any further, going back further each time
@@ -39,7 +39,7 @@ class Settings:
         """Raise ConfigurationError where a number cannot be used."""
         for name, value, least, most in (
             ("worlds", self.worlds, 1, _MOST_WORLDS),
-            ("kept", self.kept, 1, self.worlds),
+            ("kept", self.survivors, 1, self.worlds),
             ("window", self.window, 0.01, 10.0),
             ("seed", self.seed, 0, _LARGEST_SEED),
         ):
@@ -47,8 +47,14 @@ class Settings:
                 raise ConfigurationError(f"--{name} is {value:g}; it must be {least:g} to {most:g}")
 
     def content(self) -> dict[str, Any]:
-        """The settings as JSON has them."""
-        return asdict(self)
+        """The settings as JSON has them, by the names of their options."""
+        return {
+            "worlds": self.worlds,
+            "kept": self.survivors,
+            "window": self.window,
+            "seed": self.seed,
+            "tries": self.tries,
+        }
 
 
 @dataclass
@@ -139,7 +145,7 @@ def _next_level(worlds: Worlds, settings: Settings, progress: Progress) -> list[
         for parent, seed, grown in zip(owners, seeds, worlds.grow(branches), strict=True)
         if grown is not None
     ]
-    return sorted(nodes, key=_value)[: settings.kept]  # equal ones stay in their order
+    return sorted(nodes, key=_value)[: settings.survivors]  # equal ones stay in their order
 
 
 def _come_again(worlds: Worlds, nodes: Sequence[Node]) -> None:

@@ -18,7 +18,7 @@ from msgs_config.messages.state import StampedState
 
 
 @dataclass(frozen=True)
-class Figures:
+class ReconstructionMetrics:
     """How well a reconstruction follows its motion."""
 
     ticks: int
@@ -29,7 +29,7 @@ class Figures:
     state_hash: str
 
 
-def verified(problem: Problem, file: Path, best: Node) -> Figures:
+def verified(problem: Problem, file: Path, best: Node) -> ReconstructionMetrics:
     """Run a reconstruction's file from a fresh world, and measure it.
 
     Raises:
@@ -54,7 +54,7 @@ def verified(problem: Problem, file: Path, best: Node) -> Figures:
     summary = measurement.summary(wall_time=0.0)
     path, desired = np.array(positions), np.array(motions)
     apart = centre_path(plan.character, path) - centre_path(plan.character, desired)
-    return Figures(
+    return ReconstructionMetrics(
         ticks=len(positions),
         fell=bool(summary["fell"]),
         centre_error_mean_m=float(np.linalg.norm(apart, axis=1).mean()),

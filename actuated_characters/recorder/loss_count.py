@@ -15,7 +15,7 @@ class LossCount:
         """`count_publishers` says how many there are; asked only where a number does not follow."""
         self._count_publishers = count_publishers
         self._last: list[int] = []  # number of each publisher, that used last at the end
-        self.lost = 0
+        self.lost_messages = 0
 
     def take(self, number: int | None) -> None:
         """Take the number of a message as it came; None where the middleware has none."""
@@ -25,10 +25,10 @@ class LossCount:
         if last and last[-1] == number - 1:  # mostly
             last[-1] = number
             return
-        self._forget(number)
+        self._remove_predecessor(number)
         last.append(number)
 
-    def _forget(self, number: int) -> None:
+    def _remove_predecessor(self, number: int) -> None:
         """Forget the last number of the publisher whose next one is this; count the gap."""
         last = self._last
         if number - 1 in last:
@@ -41,4 +41,4 @@ class LossCount:
             last.pop(0)
             return
         last.remove(before)
-        self.lost += number - before - 1
+        self.lost_messages += number - before - 1

@@ -20,7 +20,7 @@ from actuated_characters.recorder.topics import (
     contract_topics,
     simulator_name,
 )
-from actuated_characters.runs.run_directory import BAG, figures_directory, write_figures
+from actuated_characters.runs.run_directory import BAG, metrics_directory, write_metrics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
@@ -188,8 +188,8 @@ class RecorderNode(Node):
         ]
         batch.sort(key=lambda message: message.published_ns)
         for message in batch:
-            if kept := self._filter.take(message):
-                for each in kept:
+            if passed := self._filter.take(message):
+                for each in passed:
                     self._keep(each)
                 if gives_way:
                     os.sched_yield()
@@ -219,8 +219,8 @@ class RecorderNode(Node):
             RecordingError: something failed, or states are missing.
         """
         for reader in self._readers:
-            if reader.lost:
-                self.get_logger().warning(f"'{reader.recorded.name}': {reader.lost} messages lost")
+            if count := reader.lost_messages:
+                self.get_logger().warning(f"'{reader.recorded.name}': {count} messages lost")
         for name in sorted(self._named.missing):
             self.get_logger().warning(f"'{name}' had no publisher")
         for name, collector in self._collectors.items():
@@ -231,17 +231,18 @@ class RecorderNode(Node):
     def _conclude_character(self, name: str, collector: MetricsCollector) -> None:
         of_it = f" of '{name}'" if name else ""
         try:
-            figures, series = collector.results()
-            if dropped := figures["dropped_references"]:
+            metrics, series = collector.results()
+            if dropped := metrics["dropped_references"]:
                 self.get_logger().warning(f"{dropped} references{of_it} belong to no state")
             own = [each for each in self._readers if each.recorded.character in (None, name)]
             foreign = {each.recorded.name: self._filter.dropped(each.recorded.name) for each in own}
-            figures |= {
-                "lost_messages": {each.recorded.name: each.lost for each in own if each.lost},
+            lost_messages = {each.recorded.name: each.lost_messages for each in own}
+            metrics |= {
+                "lost_messages": {topic: count for topic, count in lost_messages.items() if count},
                 "foreign_messages": {topic: count for topic, count in foreign.items() if count},
             }
-            directory = figures_directory(self._directory, name, is_alone=not name)
-            write_figures(directory, figures, series)
+            directory = metrics_directory(self._directory, name, is_alone=not name)
+            write_metrics(directory, metrics, series)
         except RecordingError as error:
             self._fail(f"{error}{of_it}")
         states = self.resolve_topic_name(topics.JOINT_STATES.under(name).name)

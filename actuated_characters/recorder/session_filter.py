@@ -74,7 +74,7 @@ class SessionFilter:
         self.bound: str | None = given or None
         self._foreign = ForeignSessions()
         self._tell = tell
-        self._held: deque[tuple[str, Heard]] = deque(maxlen=_MOST_HELD)
+        self._pending: deque[tuple[str, Heard]] = deque(maxlen=_MOST_HELD)
 
     def dropped(self, topic: str) -> int:
         """How many messages of a topic, by its name in the bag, were dropped."""
@@ -88,7 +88,7 @@ class SessionFilter:
         if self.bound is None and message.recorded.own_name == topics.JOINT_STATES.name:
             return [*self._bind(session), message]
         if self.bound is None:
-            self._held.append((session, message))
+            self._pending.append((session, message))
             return []
         if session != self.bound:
             self._drop(session, message)
@@ -97,16 +97,16 @@ class SessionFilter:
 
     def finish(self) -> list[Heard]:
         """The rest to record at the end: that of the only simulator, if it had no state yet."""
-        sessions = {session for session, _ in self._held}
+        sessions = {session for session, _ in self._pending}
         return self._bind(sessions.pop()) if len(sessions) == 1 else []
 
     def _bind(self, session: str) -> list[Heard]:
         self.bound = session
-        own = [message for of, message in self._held if of == session]
-        for of, message in self._held:
+        own = [message for of, message in self._pending if of == session]
+        for of, message in self._pending:
             if of != session:
                 self._drop(of, message)
-        self._held.clear()
+        self._pending.clear()
         return own
 
     def _drop(self, session: str, message: Heard) -> None:

@@ -27,9 +27,9 @@ class TopicReader:
         )
 
     @property
-    def lost(self) -> int:
+    def lost_messages(self) -> int:
         """How many messages never came, between those that did."""
-        return self._loss.lost
+        return self._loss.lost_messages
 
     def take(self, most: int) -> Iterator[tuple[int, bytes]]:
         """Yield the messages that are there, with the wall time of publishing, ns.

@@ -133,24 +133,24 @@ class NamedTopics:
         A type that is not installed is logged, and the topic not looked for any more.
         """
         for name in sorted(self.missing):
-            offers = self._node.get_publishers_info_by_topic(name)
-            if not offers:
+            endpoints = self._node.get_publishers_info_by_topic(name)
+            if not endpoints:
                 continue
             self.missing.discard(name)
             try:
-                message_type = find_message_type(offers[0].topic_type)
+                message_type = find_message_type(endpoints[0].topic_type)
             except RecordingError as error:
                 self._node.get_logger().error(f"'{name}' is not recorded: {error}")
                 continue
-            profiles = [offer.qos_profile for offer in offers]
+            profiles = [endpoint.qos_profile for endpoint in endpoints]
             topic = Topic(name, message_type, fitting_qos(profiles))
             yield RecordedTopic(topic, name, name, None), profiles[0]
 
 
-def fitting_qos(offers: Sequence[QoSProfile]) -> QoSProfile:
+def fitting_qos(profiles: Sequence[QoSProfile]) -> QoSProfile:
     """The strictest quality of service with which a subscription fits all of these publishers."""
-    reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in offers)
-    latched = all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
+    reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in profiles)
+    latched = all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in profiles)
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=1,

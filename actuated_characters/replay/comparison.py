@@ -71,7 +71,7 @@ class ReplayResult:
     episodes: int
     state_hashes: Mapping[str, str]  # of the replayed states, by `Recording.name`
     largest: Mapping[str, float] = field(default_factory=dict)  # differences by unit
-    notes: Sequence[str] = ()  # what could not be compared, and why
+    remarks: Sequence[str] = ()  # what could not be compared, and why
 
     @property
     def identical(self) -> bool:
@@ -100,7 +100,7 @@ def compare_world(
     together: Sequence[Recording],
     found: Sequence[States],
     tolerance: float | None = None,
-    notes: Sequence[str] = (),
+    remarks: Sequence[str] = (),
 ) -> ReplayResult:
     """Compare replayed states of the characters of a world with their recordings.
 
@@ -127,7 +127,7 @@ def compare_world(
             for recording, states in zip(together, found, strict=True)
         },
         largest={} if tolerance is None else _largest_differences(pairs),
-        notes=notes,
+        remarks=remarks,
     )
 
 

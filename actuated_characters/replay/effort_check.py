@@ -38,7 +38,7 @@ class _Tick(NamedTuple):
 
     row: int  # of its effort, and of the state that it begins with
     answered: int | None  # row of the state whose commands act; None before the first ones do
-    held: FloatArray  # (n,) what was commanded in the tick before
+    previous: FloatArray  # (n,) what was commanded in the tick before
     collected: FloatArray  # (n,) what the commands add up to, of equal entries the first one
     silent: BoolArray  # (n,) must have been commanded, by a command that was not recorded
 
@@ -50,26 +50,26 @@ def first_uncommanded(recordings: Sequence[Recording]) -> tuple[Difference | Non
         RecordingError: see `check_commands`.
     """
     found: list[Difference] = []
-    notes: list[str] = []
+    remarks: list[str] = []
     for recording in recordings:
         of = of_character(recording)
         if not recording.layout.size:
             continue
         if not (recording.unstamped_commands or any(recording.commands)):
-            notes.append(
+            remarks.append(
                 f"the recording has no commands{of}: its efforts were not compared with commands"
             )
             continue
         check = check_commands(recording)
         if check.silent_stamps_ns:
-            notes.append(
+            remarks.append(
                 f"the recording lacks commands{of} for {len(check.silent_stamps_ns)} states, the "
                 f"first at {check.silent_stamps_ns[0]} ns: the efforts there were not compared "
                 "with commands"
             )
         if check.difference is not None:
             found.append(check.difference)
-    return min(found, key=lambda difference: difference.tick, default=None), notes
+    return min(found, key=lambda difference: difference.tick, default=None), remarks
 
 
 def check_commands(recording: Recording) -> CommandCheck:
@@ -109,12 +109,12 @@ class _Check:
         """Yield what is wrong with a tick; None where other commands explain it."""
         self._on_timeout = values.text("on_timeout")
         for first, end in self._episodes():
-            held = self._zero
+            previous = self._zero
             for row in range(first, end):
-                tick = self._tick(row, first, held)
+                tick = self._tick(row, first, previous)
                 if not same_bits(self._clip(tick.collected), self._recording.effort[row]):
                     yield self._settle(tick)
-                held = tick.collected
+                previous = tick.collected
 
     def _episodes(self) -> Iterator[tuple[int, int]]:
         """The first tick of each episode and the one after its last, which may be a reset."""
@@ -137,19 +137,19 @@ class _Check:
         fits = len(indices) == len(command.efforts) and self._commanded[indices].all()
         return indices if fits else None
 
-    def _tick(self, row: int, first: int, held: FloatArray) -> _Tick:
+    def _tick(self, row: int, first: int, previous: FloatArray) -> _Tick:
         """The tick of a row, in an episode that begins at row `first`."""
         answered = row - self._delay if row - self._delay >= first else None
         fills = answered is None or self._on_timeout in ("hold", "zero")
         is_held = answered is not None and self._on_timeout == "hold"
-        effort = held.copy() if is_held else self._zero.copy()
+        effort = previous.copy() if is_held else self._zero.copy()
         silent = np.zeros_like(self._commanded) if fills else self._commanded.copy()
         for command, indices in reversed(self._usable(answered)):
             effort[indices] = command.efforts
             silent[indices] = False
         if answered is not None and silent.any():
             self.silent_rows.append(answered)
-        return _Tick(row, answered, held, effort, silent)
+        return _Tick(row, answered, previous, effort, silent)
 
     def _settle(self, tick: _Tick) -> Difference | None:
         """Look for other commands of the tick that led to what was applied, joint by joint."""
@@ -160,7 +160,7 @@ class _Check:
             candidate[indices] = command.efforts
             candidates.append(candidate)
         if tick.answered is not None:
-            candidates += {"hold": [tick.held], "zero": [self._zero]}.get(self._on_timeout, [])
+            candidates += {"hold": [tick.previous], "zero": [self._zero]}.get(self._on_timeout, [])
         clipped = [self._clip(each) for each in candidates]
         for joint in self._layout.joints:
             for entries in joint.vectors:

@@ -81,7 +81,7 @@ def _joined(results: Sequence[ReplayResult]) -> ReplayResult:
         episodes=sum(result.episodes for result in results),
         state_hashes=hashes,
         largest=largest,
-        notes=tuple(dict.fromkeys(note for result in results for note in result.notes)),
+        remarks=tuple(dict.fromkeys(remark for result in results for remark in result.remarks)),
     )
 
 
@@ -89,9 +89,9 @@ def _replay_world(
     whole: Sequence[Recording], tolerance: float | None, progress: Callable[[int], None], done: int
 ) -> ReplayResult:
     """Replay all ticks of a world, or until something differs; `done` were done before."""
-    together, notes = cut_world(whole)
-    notes += [note for recording in together for note in check_pushes(recording)]
-    notes += check_throws(together[0])
+    together, remarks = cut_world(whole)
+    remarks += [remark for recording in together for remark in check_pushes(recording)]
+    remarks += check_throws(together[0])
     uncommanded, more = first_uncommanded(whole)
     stamps_ns, last = together[0].stamps_ns, len(together[0].effort)
     if uncommanded is not None and uncommanded.stamp_ns > stamps_ns[-1]:
@@ -101,7 +101,7 @@ def _replay_world(
     with make_simulation(together, int(stamps_ns[0])) as simulation:
         world = _ReplayedWorld(together, simulation, is_exact=tolerance is None)
         difference = world.simulate(last, lambda row: progress(done + row))
-    result = compare_world(together, world.found(), tolerance, (*notes, *more))
+    result = compare_world(together, world.found(), tolerance, (*remarks, *more))
     return replace(result, difference=difference or result.difference or uncommanded)
 
 

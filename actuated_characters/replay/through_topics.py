@@ -58,7 +58,7 @@ def replay_commands(
         RecordingError: the bag cannot be read, or its world cannot be built again.
         RunError: a process failed, and not because of what differed.
     """
-    together, notes = read_world(path, world)
+    together, remarks = read_world(path, world)
     are_applied, failure = make_inputs(together)[0].are_applied, None
     session = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
     with child_processes() as children:
@@ -72,8 +72,8 @@ def replay_commands(
         except RunError as error:
             failure = error  # of what differs, if anything does
         found = _found_states(player, file, len(together))
-    notes += [_APPLIED] if are_applied else []
-    result = compare_world(together, found, tolerance, notes) if found else None
+    remarks += [_APPLIED] if are_applied else []
+    result = compare_world(together, found, tolerance, remarks) if found else None
     if result is None or (failure is not None and result.identical):
         raise failure or RunError("the player has received no states")
     return result

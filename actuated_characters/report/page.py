@@ -66,7 +66,7 @@ class Section:
     title: str
     illustrations: Sequence[Illustration] = ()
     tables: Sequence[Table] = ()
-    notes: Sequence[str] = ()
+    remarks: Sequence[str] = ()
     verdict: str = ""  # a sentence or two after the pictures
     tiles: Sequence[tuple[str, str]] = ()  # name and value of figures that belong to the verdict
 
@@ -109,7 +109,7 @@ def _section(section: Section) -> str:
         tiles = [f"<div>{escape(name)}<b>{escape(text)}</b></div>" for name, text in section.tiles]
         parts.append(f'<div class="tiles">{"".join(tiles)}</div>\n')
     parts += map(_table, section.tables)
-    parts += [f"<p>{escape(note)}</p>\n" for note in section.notes]
+    parts += [f"<p>{escape(remark)}</p>\n" for remark in section.remarks]
     return "".join([*parts, "</section>\n"])
 
 

@@ -23,10 +23,10 @@ from actuated_characters.metrics.recording_metrics import (
 from actuated_characters.render.stills import strip
 from actuated_characters.report import charts
 from actuated_characters.report.facts import late_facts, pace_period, run_facts
+from actuated_characters.report.metrics_plot import NOMINAL, describe_metrics
 from actuated_characters.report.page import NOT_KNOWN, Illustration, Section, Table
 from actuated_characters.report.planning import foresight, plan_chart
 from actuated_characters.report.reactions import TRACK, mode_line, thrown_line
-from actuated_characters.report.run_figures import NOMINAL, describe_figures
 from actuated_characters.report.timing import lateness, pauses, wall_steps
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
@@ -62,7 +62,7 @@ class CharacterReport:
         self._names = recording.character.vector_names
         self._limits = recording.character.effort_limits()
         self._errors = tracking_errors(recording)
-        self._figures, _ = measure_recording(recording)
+        self._metrics, _ = measure_recording(recording)
         reacts = any(span.mode != TRACK for span in facts.modes)
         self._modes = facts.modes if reacts else []
         self._pauses = pauses(recording.published_ns)
@@ -99,8 +99,8 @@ class CharacterReport:
         return (make() for make in self.makers)
 
     def _result(self) -> Section:
-        pictures, notes = self._strip()
-        return Section("", pictures, notes=notes, verdict=self._verdict(), tiles=self._tiles())
+        pictures, remarks = self._strip()
+        return Section("", pictures, remarks=remarks, verdict=self._verdict(), tiles=self._tiles())
 
     def _verdict(self) -> str:
         """A sentence on how the run ended."""
@@ -108,10 +108,10 @@ class CharacterReport:
         length = f"{recording.times[-1]:.4g} s"
         if not self._facts.reference:
             verdict = f"A run of {length} without a reference"
-        elif self._figures["fell"]:
+        elif self._metrics["fell"]:
             height, desired = recording.position[:, 2], recording.reference_position[:, 2]
             verdict = f"It fell at {fall_time(recording.times, height, desired):.3g} s of {length}"
-        elif self._figures["fell"] is not None:
+        elif self._metrics["fell"] is not None:
             verdict = f"It tracked its reference for {length} without a fall"
         else:
             verdict = f"It tracked its reference for {length}"
@@ -119,15 +119,15 @@ class CharacterReport:
 
     def _tiles(self) -> list[tuple[str, str]]:
         """The figures that support the verdict, as far as they could be measured."""
-        figures = {name: value for name, value in self._figures.items() if isinstance(value, float)}
+        metrics = {name: value for name, value in self._metrics.items() if isinstance(value, float)}
         tiles = [
-            (title, f"{figures[key]:.3g} {unit}") for title, key, unit in _TILES if key in figures
+            (title, f"{metrics[key]:.3g} {unit}") for title, key, unit in _TILES if key in metrics
         ]
-        force, weight = figures.get("assist_force_mean_n"), figures["body_weight_n"]
+        force, weight = metrics.get("assist_force_mean_n"), metrics["body_weight_n"]
         if force is not None and weight > 0.0:
             tiles.append(("mean root force / weight", f"{force / weight:.3g}"))
-        if "saturated_fraction" in figures:
-            tiles.append(("at effort limits", f"{100.0 * figures['saturated_fraction']:.3g} %"))
+        if "saturated_fraction" in metrics:
+            tiles.append(("at effort limits", f"{100.0 * metrics['saturated_fraction']:.3g} %"))
         return tiles
 
     def _strip(self) -> tuple[list[Illustration], list[str]]:
@@ -149,7 +149,7 @@ class CharacterReport:
     def _tracking(self) -> Section:
         title = "tracking error"
         if not self._facts.reference:
-            return Section(title, notes=["The recording has no reference."])
+            return Section(title, remarks=["The recording has no reference."])
         columns = list(zip(self._names, self._kinds.units, self._errors.T, strict=True))
         rows = [(name, unit, *_statistics(values)) for name, unit, values in columns]
         table = Table(rows, ("joint", "unit", *_STATISTICS), "distance from the reference")
@@ -174,7 +174,7 @@ class CharacterReport:
         title, recording = "torques against limits", self._recording
         sizes = effort_sizes(recording.layout, recording.effort)
         if np.isnan(sizes).all():
-            return Section(title, notes=["The recording has no efforts."])
+            return Section(title, remarks=["The recording has no efforts."])
         rows = []
         for name, unit, limit, values in zip(
             self._names, self._kinds.units, self._limits, sizes.T, strict=True
@@ -189,7 +189,7 @@ class CharacterReport:
         largest = np.nanmax(np.vstack((shares, np.zeros(len(self._names)))), axis=0)
         near = np.flatnonzero(self._kinds.actuated & (largest > NOMINAL))
         if not len(near):
-            return Section(title, tables=[table], notes=["No effort came near a limit."])
+            return Section(title, tables=[table], remarks=["No effort came near a limit."])
         names = [self._names[row] for row in near]
         figure = charts.effort_chart(self._timeline, shares[:, near], names)
         text = "the largest share of its limit that each joint's effort reached, over time"
@@ -205,13 +205,13 @@ class CharacterReport:
         recording = self._recording
         series = contact_series(recording.character, recording.contacts)
         if series is None:
-            note = (
+            remark = (
                 "The recording has no contacts: it was recorded with --exclude contacts, or by "
                 "another recorder."
             )
-            return Section("contacts", notes=[note])
+            return Section("contacts", remarks=[remark])
         if not series.links:
-            return Section("contacts", notes=["No link touched anything."])
+            return Section("contacts", remarks=["No link touched anything."])
         weight = recording.character.mass * float(recording.parameters.get("gravity", np.nan))
         force = series.vertical_force / (weight if weight > 0.0 else np.nan)
         curve = charts.Panel("vertical force / weight", {"vertical force / weight": force})
@@ -252,23 +252,23 @@ class CharacterReport:
             for row in self._pauses
         ]
         listed = [(f"{time:.4f}", text) for time, text in sorted(rows)]
-        notes = []
+        remarks = []
         if len(listed) > _MOST_LISTED:
-            notes.append(f"The first {_MOST_LISTED} of {len(listed)}.")
+            remarks.append(f"The first {_MOST_LISTED} of {len(listed)}.")
         if not facts.pushes_recorded:
-            notes.append("Pushes were not recorded.")
+            remarks.append("Pushes were not recorded.")
         table = Table(listed[:_MOST_LISTED], ("time (s)", "event"))
-        return Section("events", tables=[table], notes=notes)
+        return Section("events", tables=[table], remarks=remarks)
 
     def _ticks(self) -> Section:
         title, recording = "tick times", self._recording
         steps = wall_steps(recording.published_ns)
         if not len(steps):
-            return Section(title, notes=["There is one state only."])
+            return Section(title, remarks=["There is one state only."])
         steps[self._pauses] = np.nan
         known, period = 1e3 * steps, pace_period(dict(recording.parameters))
         table_rows = [("wall time from state to state, pauses left out", *_statistics(known))]
-        curves, notes = {"wall time": known}, []
+        curves, remarks = {"wall time": known}, []
         panels = [charts.Panel("wall time (ms)", curves, is_logarithmic=True)]
         if period:
             late, due = lateness(recording.published_ns, period), np.full(len(steps), 1e3 * period)
@@ -277,12 +277,12 @@ class CharacterReport:
             panels.append(charts.Panel("lateness (ms)", of_late, "behind the schedule"))
             table_rows.append(("lateness", *_statistics(1e3 * late[1:])))
             count = int(late_facts(recording.published_ns, period)["ticks"])
-            notes.append(f"{count} of {len(steps)} ticks began more than a period late.")
+            remarks.append(f"{count} of {len(steps)} ticks began more than a period late.")
         pictures = [
             self._drawn(charts.histogram(known), "histogram", "frequency of tick times"),
             self._series("ticks", "wall time from state to state", panels),
         ]
-        return Section(title, pictures, [Table(table_rows, ("ms", *_STATISTICS))], notes)
+        return Section(title, pictures, [Table(table_rows, ("ms", *_STATISTICS))], remarks)
 
     def _run(self) -> Section:
         character, parameters = self._recording.character, self._recording.parameters
@@ -294,7 +294,7 @@ class CharacterReport:
             ("mode", str(parameters.get("mode", "unknown"))),
             ("law", self._facts.law or "not recorded"),
         ]
-        tables = [Table(facts), Table(describe_figures(self._figures), caption="figures")]
+        tables = [Table(facts), Table(describe_metrics(self._metrics), caption="figures")]
         if self._facts.gains:
             rows = [
                 (row.joint, *map(_shown, (row.p, row.d, row.i, row.limit)))

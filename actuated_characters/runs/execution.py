@@ -17,8 +17,8 @@ from actuated_characters.runs.ros_domain import own_domain
 from actuated_characters.runs.run_directory import (
     LOGS,
     PARAMETERS,
-    read_figures,
-    write_figures,
+    read_metrics,
+    write_metrics,
     write_parameters,
 )
 from msgs_config.errors import RunError
@@ -76,7 +76,7 @@ def run_over_topics(
         _wait_for_end(simulator, [controller, *sender, recorder], progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
-    recorded, _ = read_figures(directory)
+    recorded, _ = read_metrics(directory)
     if recorded["ticks"] != plan.ticks:
         raise RunError(f"{recorded['ticks']} of {plan.ticks} ticks were recorded")
     for what, planned in (("pushes", pushes), ("throws", throws)):
@@ -176,6 +176,6 @@ def run_in_process(
         measurement.add(tick)
         if count % _IN_PROCESS_REPORT == 0:
             progress(count)
-    figures = measurement.summary(wall_time=time.perf_counter() - started)
-    summary = {"character": known.character, **figures, **_UNMEASURED}
-    write_figures(directory, summary, measurement.series())
+    metrics = measurement.summary(wall_time=time.perf_counter() - started)
+    summary = {"character": known.character, **metrics, **_UNMEASURED}
+    write_metrics(directory, summary, measurement.series())

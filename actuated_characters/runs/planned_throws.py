@@ -162,7 +162,7 @@ def plan_throws(plan: Plan, texts: Sequence[str]) -> tuple[list[PlannedThrow], l
     """
     if len(texts) > MOST_BALLS:
         raise ConfigurationError(f"{len(texts)} throws; a run has at most {MOST_BALLS}")
-    throws, notes = [], []
+    throws, warnings = [], []
     for text in texts:
         try:
             throw, before = plan_throw(plan, parse_throw(text))
@@ -170,8 +170,8 @@ def plan_throws(plan: Plan, texts: Sequence[str]) -> tuple[list[PlannedThrow], l
             raise ConfigurationError(f"throw '{text}': {error}") from error
         throws.append(throw)
         if before:
-            notes.append(f"throw '{text}': {', '.join(before)} may be in its way")
-    return throws, notes
+            warnings.append(f"throw '{text}': {', '.join(before)} may be in its way")
+    return throws, warnings
 
 
 def read_throws(file: Path) -> list[PlannedThrow]:

@@ -43,7 +43,7 @@ def prepare_directory(directory: Path, *, overwrite: bool) -> None:
         raise RunError(f"cannot write to {directory}: {error.strerror or error}") from error
 
 
-def figures_directory(run: Path, namespace: str, *, is_alone: bool) -> Path:
+def metrics_directory(run: Path, namespace: str, *, is_alone: bool) -> Path:
     """Where a character's figures are: in a run's directory, or in a folder of its name there.
 
     Args:
@@ -54,7 +54,7 @@ def figures_directory(run: Path, namespace: str, *, is_alone: bool) -> Path:
     return run if is_alone else run / namespace.rpartition("/")[2]
 
 
-def write_figures(directory: Path, summary: dict[str, object], series: Series) -> None:
+def write_metrics(directory: Path, summary: dict[str, object], series: Series) -> None:
     """Write `measurements.csv` with a line of column names, and then `summary.json`, each whole.
 
     Raises:
@@ -86,7 +86,7 @@ def write_parameters(
     return file
 
 
-def read_figures(directory: Path) -> tuple[dict[str, Any], Series]:
+def read_metrics(directory: Path) -> tuple[dict[str, Any], Series]:
     """The summary and the series that a run left in a directory.
 
     Raises:

@@ -44,7 +44,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
         curves[f"{name.replace(' ', '')}_m"] = run.position[:, 2]
     result.add_curves("assistance_height", curves)
     fall, same = fall_time(none), np.array_equal(none.position, zero.position)
-    result.notes += [
+    result.remarks += [
         f"without assistance it falls at {fall:.3g} s: 28 motors cannot hold 34 degrees of "
         "freedom on a path that was not planned for them (underactuation)"
         if fall is not None

@@ -70,7 +70,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     ]
     _draw(result, stood, limp, limits)
     _draw_poses(result, limp, limits["forward"])
-    result.notes.append(
+    result.remarks.append(
         f"with the virtual force it stands {standing_time(stood):.4g} s of {_STANDING:g} s; "
         f"by stable PD alone {standing_time(limp):.3g} s"
     )

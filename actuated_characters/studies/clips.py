@@ -51,7 +51,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     )
     worst = int(np.argmax(errors / bounds))
     falls, down = _named(result, "fell") or "none", _named(result, "down in the capture") or "none"
-    result.notes += [
+    result.remarks += [
         f"nearest to its bound: {list(outcomes)[worst]}, {errors[worst]:.3f} of "
         f"{bounds[worst]:g} rad",
         f"falls: {falls}; in the capture itself on the ground with more than the feet: {down}",

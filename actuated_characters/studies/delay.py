@@ -41,7 +41,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     lines, grid = result.add_panels(result.name, 1, 2, (13.0, 5.5))
     _draw_lines(lines, late, errors, failed)
     _draw_map(grid, np.where(failed, _WORST, errors), [_describe(row) for row in result.rows])
-    result.notes += [
+    result.remarks += [
         "stable PD foresees its own period, not a late command: one tick of delay is "
         "harmless from 480 Hz on, two ticks shake the character at any rate",
         "the error of a run that diverged is that until then",
@@ -97,9 +97,10 @@ def _describe(row: Row) -> str:
 
 def _draw_lines(axes: Axes, late: FloatArray, errors: FloatArray, failed: BoolArray) -> None:
     """Errors over delays in ms, a line a rate; a cross where the walk fails."""
-    for rate, times, error, lost in zip(_RATES, late, errors, failed, strict=True):
-        (line,) = axes.plot(times[~lost], error[~lost], "o-", label=f"{rate} Hz")
-        (crosses,) = axes.plot(times[lost], [_WORST] * lost.sum(), "x", color=line.get_color())
+    for rate, times, error, has_failed in zip(_RATES, late, errors, failed, strict=True):
+        (line,) = axes.plot(times[~has_failed], error[~has_failed], "o-", label=f"{rate} Hz")
+        worst = [_WORST] * has_failed.sum()
+        (crosses,) = axes.plot(times[has_failed], worst, "x", color=line.get_color())
         crosses.set(markersize=9, markeredgewidth=2)
     axes.plot([], [], "kx", label="diverges or falls")
     axes.set_yscale("log")

@@ -51,7 +51,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     curves = {"relative_residual": walk.relative, "without_contacts": walk.without_contacts}
     result.add_curves("equation_walk", {"time_s": walk.times, **curves})
     physics, control, rest = times.values()
-    result.notes += [
+    result.remarks += [
         "all forces are on the topics, and the equation closes to rounding; the efforts of "
         "joint limits are on none, and are left out on those joints' own entries",
         f"of a tick's {physics + control + rest:.0f} us over topics physics takes {physics:.0f}, "

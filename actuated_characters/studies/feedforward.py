@@ -61,7 +61,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     _draw_errors(result, list(quartets.values()))
     _draw_poses(result, quartets["humanoid"])
     same = all(row["same states"] for row in result.rows if not row["push (N s)"])
-    result.notes += [
+    result.remarks += [
         "Left alone, the torques played again give "
         + ("the same motion, to the last bit." if same else "another motion, which is a fault."),
         f"A push of {_IMPULSE:g} N s is enough for the arm to drift away in open loop, "

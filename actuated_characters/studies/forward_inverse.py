@@ -214,7 +214,7 @@ def _add_notes(
     inverse, start = whole[-1].inverse, cycle / _A_CYCLE  # when the walk has set off from rest
     in_cycle = (inverse.times >= start) & (inverse.times < start + cycle)
     vertical = float(inverse.efforts[in_cycle, 2].mean())
-    result.notes += [
+    result.remarks += [
         "The arm has a motor for each degree of freedom: its motion comes back, but for an error "
         f"in proportion to the tick ({arms[0].early:.2g} rad at {arms[0].inverse.rate} Hz, "
         f"{arms[-1].early:.2g} rad at {arms[-1].inverse.rate} Hz, after {_EARLY:g} s).",

@@ -60,7 +60,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     _draw_poses(result, runs)
     times, _, reference, _ = _knee(runs[(1.0, 1.0), "clip"].recording, (1.0, 1.0))
     curves = {"time_s": times, "reference_rad": reference}
-    result.notes += [
+    result.remarks += [
         "without the reference's velocity damping holds back: a slow motion lags by kd / kp; with "
         "it, it does not",
         "small damping does not oscillate here, as stable PD adds a damping kp h",
@@ -68,7 +68,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     for ((p, d), velocity), outcome in runs.items():
         curves[f"p{p:g}_d{d:g}_{velocity}_rad"] = _knee(outcome.recording, (p, d))[1]
         if outcome.diverged:
-            result.notes.append(
+            result.remarks.append(
                 f"stiffness x {p:g}, damping x {d:g}, velocity {velocity}: {outcome.diverged}; "
                 "efforts at their limits are not those that the implicit solve counts on"
             )

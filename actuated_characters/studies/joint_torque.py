@@ -103,7 +103,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     _draw_momentum(others, by_torque, at_fine_rate, by_root)
     curves = {"hinge_by_torque_rad": by_torque.hinge, "hinge_by_forces_rad": by_forces.hinge}
     result.add_curves("joint_torque_hinge", {"time_s": times, **curves})
-    result.notes += [
+    result.remarks += [
         f"three pairs of forces move the boxes as the torque sum r x f does: positions agree "
         f"within {apart.max():.1e}; what of it is not along the hinge's axis the hinge holds",
         "a joint torque changes neither P nor L; what is left falls with the step. "

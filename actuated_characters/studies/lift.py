@@ -122,7 +122,7 @@ def _add_notes(result: StudyResult, explicit: Bound, implicit: Bound) -> None:
         f"{bound.above.gains.stiffness:.0f}; by theory up to {bound.theory:.0f}."
         for bound in (explicit, implicit)
     ]
-    result.notes += [
+    result.remarks += [
         "P swings forever; PD comes to rest m g / kp below the target, however it is damped.",
         "Stable PD has that error too: it knows gravity only to foresee the motion. Gravity "
         "compensation and the integral of PID remove it; too much integral is unstable.",
@@ -201,7 +201,7 @@ def _draw_regions(axes: Axes, bounds: Sequence[Bound]) -> None:
     ):
         axes.plot(damping, curve, style, color=color, label=name)
     for bound, color in zip(bounds, ("tab:blue", "tab:orange"), strict=True):
-        for response in bound.tried:
+        for response in bound.evaluated:
             gains, marker = response.gains, "o" if response.stable else "x"
             x, y = gains.damping * PERIOD / MASS, gains.stiffness * PERIOD**2 / MASS
             axes.plot(x, y, marker, color=color, fillstyle="none")

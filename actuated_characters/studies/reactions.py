@@ -84,7 +84,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
             title_height=0.4,
             title_place="center",
         )
-    result.notes.append(
+    result.remarks.append(
         "assistance: full while it follows a clip, at most 0.2 of the weight in REACT, "
         "none in LIMP; the ragdoll has none"
     )

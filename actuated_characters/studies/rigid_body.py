@@ -109,7 +109,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
         columns |= {name.format(axis): values[:, k] for k, axis in enumerate("xyz")}
     result.add_curves("rigid_body_spin", columns)
     shrink = seen["torque"].trial.box.inertia[2] / seen["torque_long"].trial.box.inertia[2]
-    result.notes += [
+    result.remarks += [
         "a couple moves no centre of mass; the same force off the centre moves it as much "
         "as through it",
         f"of one mass and under one torque the long box turns {shrink:.2g} times as fast",

@@ -167,12 +167,12 @@ def _rate(plan: Plan) -> int:
 
 
 def _row(attempts: Sequence[Attempt]) -> list[str]:
-    lost = [f"{each.lost_at:.2f}" for each in attempts if each.lost_at is not None]
+    failure_times = [f"{each.lost_at:.2f}" for each in attempts if each.lost_at is not None]
     return [
-        f"{len(attempts) - len(lost)} of {len(attempts)}",
+        f"{len(attempts) - len(failure_times)} of {len(attempts)}",
         f"{np.median([each.centre_error for each in attempts]):.3f}",
         f"{np.median([each.joint_error for each in attempts]):.3f}",
-        " ".join(lost),
+        " ".join(failure_times),
     ]
 
 

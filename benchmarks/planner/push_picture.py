@@ -16,15 +16,15 @@ RIDGE = 0.01  # or few walks leave the fit without a minimum
 
 def draw(impulses: Sequence[tuple[float, float]], borne: Sequence[bool], file: Path) -> None:
     """Draw pushes in N s, forwards and to the left, and whether each was borne."""
-    pushes, held = np.array(impulses), np.array(borne)
+    pushes, is_upright = np.array(impulses), np.array(borne)
     sizes, sides = np.hypot(*pushes.T), np.arctan2(pushes[:, 1], pushes[:, 0])
     figure = Figure(figsize=(6.0, 6.0), layout="constrained")
     axes = figure.add_subplot(projection="polar")
     assert isinstance(axes, PolarAxes)
-    axes.scatter(sides[held], sizes[held], color="tab:green", label="on its feet")
-    axes.scatter(sides[~held], sizes[~held], color="tab:red", marker="x", label="fell")
+    axes.scatter(sides[is_upright], sizes[is_upright], color="tab:green", label="on its feet")
+    axes.scatter(sides[~is_upright], sizes[~is_upright], color="tab:red", marker="x", label="fell")
     around = np.linspace(-math.pi, math.pi, 181)
-    half = half_borne(sides, sizes, held, around)
+    half = half_borne(sides, sizes, is_upright, around)
     half[half > sizes.max()] = math.nan  # nothing was tried there
     axes.plot(around, half, "k-", label="half of them")
     axes.set_theta_zero_location("N")

@@ -82,7 +82,7 @@ KINDS = {
 
 
 @dataclass(frozen=True)
-class Push:
+class Impulse:
     """A push at the root's centre of mass."""
 
     time: float  # s
@@ -95,12 +95,12 @@ class Walk:
 
     kind: str
     seed: int
-    pushes: tuple[Push, ...]
+    pushes: tuple[Impulse, ...]
     settings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class WalkResult:
     """What has become of a walk."""
 
     walk: Walk
@@ -118,7 +118,7 @@ def walks(name: str, count: int, settings: tuple[str, ...]) -> list[Walk]:
     ]
 
 
-def _pushes(name: str, number: int) -> Iterator[Push]:
+def _pushes(name: str, number: int) -> Iterator[Impulse]:
     kind, draws = KINDS[name], np.random.default_rng((number, len(name)))
     for push in range(kind.pushes):
         time = kind.every * push + 1.0 + draws.uniform(0.0, CYCLE)
@@ -129,7 +129,7 @@ def _pushes(name: str, number: int) -> Iterator[Push]:
         else:
             sideways = math.copysign(kind.sideways, side)
             impulse = (kind.forwards, 0.0) if number % 2 else (0.0, sideways)
-        yield Push(float(time), impulse)
+        yield Impulse(float(time), impulse)
 
 
 # A walk
@@ -148,7 +148,9 @@ class _Watch:
         self.away = 0.0  # m
         self.missed = 0
 
-    def aim(self, state: StampedState, wanted: StampedReference, ball: Sequence[float]) -> None:
+    def check_hit(
+        self, state: StampedState, wanted: StampedReference, ball: Sequence[float]
+    ) -> None:
         """Look at whether a ball of this velocity hits, which arrives now where the clip is."""
         beside = self._centre_at(state.position) - self._centre_at(wanted.position)
         distance = abs(beside[0] * ball[1] - beside[1] * ball[0]) / math.hypot(*ball[:2])
@@ -180,7 +182,7 @@ class _Watch:
             self.fell_at = self._time
 
 
-def attempt(walk: Walk) -> Outcome:
+def attempt(walk: Walk) -> WalkResult:
     """Walk to the end, or to where it falls and nothing is to get it up."""
     plan, kind = _plan(walk), KINDS[walk.kind]
     controller = make_controller(plan.character, plan.reference, plan.controller)
@@ -197,14 +199,14 @@ def attempt(walk: Walk) -> Outcome:
             assert tick.reference is not None
             watch.look(number, tick.state, tick.reference, outlook.anchor if outlook else Anchor())
             if number in arrivals:
-                watch.aim(tick.state, tick.reference, arrivals[number])
+                watch.check_hit(tick.state, tick.reference, arrivals[number])
             if watch.lies and kind.behaviour == "tracking":
                 break
     except SimulationError:
         watch.fall()
     tracks = controller.mode is not None and controller.mode.phase.mode is Mode.TRACK
     upright = tracks and not watch.lies
-    return Outcome(walk, watch.fell_at, upright, tuple(watch.errors), watch.away, watch.missed)
+    return WalkResult(walk, watch.fell_at, upright, tuple(watch.errors), watch.away, watch.missed)
 
 
 def _planned(plan: Plan, walk: Walk) -> list[PlannedPush]:
@@ -277,7 +279,7 @@ def main() -> int:
     return 0
 
 
-def _row(outcomes: Sequence[Outcome]) -> list[str]:
+def _row(outcomes: Sequence[WalkResult]) -> list[str]:
     fell = [f"{each.fell_at:.1f}" for each in outcomes if each.fell_at is not None]
     upright = [each for each in outcomes if each.upright]
     return [
@@ -289,13 +291,13 @@ def _row(outcomes: Sequence[Outcome]) -> list[str]:
     ]
 
 
-def _errors_after(outcomes: Sequence[Outcome]) -> list[list[float]]:
+def _errors_after(outcomes: Sequence[WalkResult]) -> list[list[float]]:
     """The errors in the first, second, third and fourth second after all pushes."""
     found: list[list[float]] = [[], [], [], []]
     second = round(1.0 / EVERY)
     for each in outcomes:
         lasts = KINDS[each.walk.kind].lasts
-        for push in each.walk.pushes or (Push(1.0, (0.0, 0.0)),):
+        for push in each.walk.pushes or (Impulse(1.0, (0.0, 0.0)),):
             first = math.ceil((push.time + lasts) / EVERY)
             for number, errors in enumerate(found):
                 errors += each.errors[first + number * second :][:second]

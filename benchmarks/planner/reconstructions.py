@@ -35,7 +35,7 @@ def main() -> int:
     parser.add_argument("clips", nargs="*", default=clips, help=f"({' '.join(clips)})")
     parser.add_argument("--seed", type=int, default=1, help="(%(default)s)")
     parser.add_argument("--worlds", type=int, default=Settings.worlds, help="(%(default)s)")
-    parser.add_argument("--kept", type=int, default=Settings.kept, help="(%(default)s)")
+    parser.add_argument("--kept", type=int, default=Settings.survivors, help="(%(default)s)")
     parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
     parser.add_argument("--set", action="append", default=[], help="NODE.NAME:=VALUE, as of run")
     options = parser.parse_args()
@@ -61,12 +61,12 @@ def _row(clip: str, options: argparse.Namespace) -> list[str]:
     with tempfile.TemporaryDirectory() as directory:
         job = Job(problem, settings, Path(directory) / "motion.json", options.workers)
         try:
-            figures = reconstruct(job).figures
+            metrics = reconstruct(job).metrics
         except RunError as error:
             return [str(error).partition(";")[0], "", f"{time.perf_counter() - began:.0f}"]
     return [
-        f"{figures.centre_error_mean_m:.3f}",
-        f"{figures.joint_error_mean_rad:.3f}",
+        f"{metrics.centre_error_mean_m:.3f}",
+        f"{metrics.joint_error_mean_rad:.3f}",
         f"{time.perf_counter() - began:.0f}",
     ]
 

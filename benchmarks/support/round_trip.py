@@ -109,13 +109,13 @@ class _FarSide(Node):
         self._at_end = ExitStack()
         self._take = _taker(self, _PING, os.environ[_WAY], self._at_end)
         self._publisher = topics.create_publisher(self, _PONG)
-        self._answer = bytes(int(os.environ[_SIZE]))
+        self._reply = bytes(int(os.environ[_SIZE]))
 
     def run(self, stop: StopSignal) -> None:
         with self._at_end:
             while not stop:
                 if self._take():
-                    self._publisher.publish(self._answer)
+                    self._publisher.publish(self._reply)
 
 
 if __name__ == "__main__":

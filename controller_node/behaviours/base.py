@@ -116,11 +116,11 @@ BehaviourMaker: TypeAlias = Callable[[Character, Values], BehaviourChoice]
 BEHAVIOURS = Registry[BehaviourMaker]()
 
 
-@BEHAVIOURS.offer("tracking")
+@BEHAVIOURS.register("tracking")
 def _tracking(character: Character, values: Values) -> BehaviourChoice:
     return BehaviourChoice(Tracking)
 
 
-@BEHAVIOURS.offer("ragdoll")
+@BEHAVIOURS.register("ragdoll")
 def _ragdoll(character: Character, values: Values) -> BehaviourChoice:
     return BehaviourChoice(partial(Tracking, Mode.LIMP))

@@ -1,6 +1,6 @@
 """The behaviour that the parameters' values say."""
 
-from controller_node.behaviours import reaction_factory  # noqa: F401  offers its own
+from controller_node.behaviours import reaction_factory  # noqa: F401  registers its own
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from msgs_config.character.model import Character
 from msgs_config.parameters import Parameter, Values

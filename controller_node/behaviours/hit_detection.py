@@ -41,7 +41,7 @@ class HitDetector:
         self._recent: deque[FloatArray] = deque(maxlen=max(round(window / period), 1))
         self._before: FloatArray | None = None
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin a new window."""
         self._recent.clear()
 

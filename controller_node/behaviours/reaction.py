@@ -136,7 +136,7 @@ class Reaction:
         else:
             self._track(seen, hit)
 
-    def _follow(self, seen: Observation, hit: Hit | None) -> None:
+    def _blend(self, seen: Observation, hit: Hit | None) -> None:
         if self._elapsed(seen) >= self._settings.blend_duration:
             self._come_back(seen, self._own.carry, self._settings.blend_duration)
         self._track(seen, hit)
@@ -156,11 +156,11 @@ class Reaction:
         """Go on with the motion that is nearest to what the present state leads to."""
         library = self._kit.library
         assert library is not None
-        self._detector.forget()  # what was reacted to
+        self._detector.reset()  # what was reacted to
         match = library.nearest(library.predicted(self._led(seen), seen.velocity))
         self._follow_clip(library, match, seen, _ONTO * self._settings.blend_duration)
         facts = {"to": "clip", "assistance": seen.assistance(), **match.content()}
-        self._begin(seen.time, Mode.BLEND, self._follow, self._phase_gains.firmer, **facts)
+        self._begin(seen.time, Mode.BLEND, self._blend, self._phase_gains.firmer, **facts)
 
     def _lie(self, seen: Observation, hit: Hit | None) -> None:
         """Wait until the character lies still."""
@@ -176,7 +176,7 @@ class Reaction:
 
     def _find_get_up(self, seen: Observation, hit: Hit | None) -> None:
         assert isinstance(self._target, CurrentStateTarget)
-        self._detector.forget()
+        self._detector.reset()
         self._target.state = self._body
         library, duration = self._kit.get_ups, self._settings.recovery_duration
         facts: dict[str, object] = {"to": "reference", "assistance": seen.assistance("rising")}

@@ -15,8 +15,8 @@ from msgs_config.parameters import Values
 _LYING = 0.5  # the part of a get-up clip in which it may begin
 
 
-@BEHAVIOURS.offer("active_ragdoll", *REACTION_PARAMETERS)
-@BEHAVIOURS.offer("reactive")
+@BEHAVIOURS.register("active_ragdoll", *REACTION_PARAMETERS)
+@BEHAVIOURS.register("reactive")
 def _reaction(character: Character, values: Values) -> BehaviourChoice:
     posture = Posture(character)
     settings = reaction_settings(character, values)

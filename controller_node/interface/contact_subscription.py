@@ -30,7 +30,7 @@ class ContactSubscription:
         self._once_logger = logger
         self._until_ns = -1  # of the last state of the episode that has had its contacts
         self._newest_ns = -1
-        self._kept = dict[int, FloatArray]()  # by stamp
+        self._wrenches = dict[int, FloatArray]()  # by stamp
 
     def begin(self) -> None:
         """An episode begins, whose stamps may be those of another simulator's episode before."""
@@ -38,7 +38,7 @@ class ContactSubscription:
 
     def restart(self) -> None:
         """Forget all: what comes from now on is another simulator's."""
-        self._kept.clear()
+        self._wrenches.clear()
         self._until_ns = self._newest_ns = -1
 
     def until(self, stamp_ns: int, episode_ns: int) -> FloatArray | None:
@@ -53,11 +53,11 @@ class ContactSubscription:
             if raw is None:
                 break
             self._keep(raw)
-        if stamp_ns not in self._kept:
+        if stamp_ns not in self._wrenches:
             return None
         wrenches = np.zeros((len(self._rows), 6))
-        for stamp in sorted(stamp for stamp in self._kept if stamp <= stamp_ns):
-            contacts = self._kept.pop(stamp)
+        for stamp in sorted(stamp for stamp in self._wrenches if stamp <= stamp_ns):
+            contacts = self._wrenches.pop(stamp)
             if stamp >= episode_ns:
                 wrenches += contacts
         self._until_ns = stamp_ns
@@ -72,7 +72,7 @@ class ContactSubscription:
             self._once_logger.log_once(f"contacts ignored: {error}")
             return
         if message.stamp_ns < self._newest_ns:  # of a simulator that was started again
-            self._kept.clear()
+            self._wrenches.clear()
             self._until_ns = -1
         self._newest_ns = message.stamp_ns
         if message.stamp_ns <= self._until_ns:
@@ -87,9 +87,10 @@ class ContactSubscription:
             self._once_logger.log_once(
                 f"contacts ignored: not one wrench a link, of {_LARGEST:g} N and N m at most"
             )
-        self._kept[message.stamp_ns] = wrenches
-        if len(self._kept) > _MOST_KEPT:
-            del self._kept[next(iter(self._kept))]  # the oldest: stamps that go back clear all
+        self._wrenches[message.stamp_ns] = wrenches
+        if len(self._wrenches) > _MOST_KEPT:
+            oldest = next(iter(self._wrenches))  # the first: stamps that go back clear all
+            del self._wrenches[oldest]
             self._once_logger.log_once(
                 f"contacts of more than {_MOST_KEPT} ticks wait for their states; the oldest are "
                 "dropped",

@@ -26,7 +26,7 @@ from msgs_config.messages.wrenches import WORLD
 
 
 @dataclass(frozen=True)
-class Answer:
+class Reply:
     """An answer, kept: a state that comes again gets it again, and nothing is computed again."""
 
     raw_state: bytes
@@ -81,24 +81,24 @@ class Publishers:
         """How many subscribe to the torques."""
         return int(self._torques.get_subscription_count())
 
-    def answer(
+    def make_reply(
         self, raw: bytes, state: StampedState, effort: FloatArray, reference: StampedReference
-    ) -> Answer:
+    ) -> Reply:
         """The answer with an effort (n,) to a state, ready to be published."""
         torques = self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded])
         sent = np.zeros(self._layout.size)
         sent[self._commanded] = effort[self._commanded]
-        return Answer(raw, state, sent, torques, self._session, reference)
+        return Reply(raw, state, sent, torques, self._session, reference)
 
-    def publish(self, answer: Answer) -> None:
+    def publish(self, reply: Reply) -> None:
         """Publish an answer, the torques first: the simulator goes on while the rest is made."""
-        self._torques.publish(answer.torques)
-        topics.publish_together(self._beside_torques(answer))
+        self._torques.publish(reply.torques)
+        topics.publish_together(self._beside_torques(reply))
 
-    def _beside_torques(self, answer: Answer) -> Iterator[Outgoing]:
+    def _beside_torques(self, reply: Reply) -> Iterator[Outgoing]:
         """The messages that the simulator does not wait for, where there are subscribers."""
         if self._references.get_subscription_count():
-            reference = answer.reference
+            reference = reply.reference
             yield (
                 self._references,
                 self._reference_encoder.encode(
@@ -106,7 +106,7 @@ class Publishers:
                 ),
             )
         if self._wrenches.get_subscription_count():
-            yield self._wrenches, self._net_wrench(answer)
+            yield self._wrenches, self._net_wrench(reply)
 
     def flush(self, seconds: float) -> None:
         """Wait until every subscriber has what was published, at the most `seconds`."""
@@ -137,8 +137,8 @@ class Publishers:
         if self._plans.get_subscription_count():
             self._plans.publish(plan_message(outlook, stamp_ns))
 
-    def _net_wrench(self, answer: Answer) -> bytes:
+    def _net_wrench(self, reply: Reply) -> bytes:
         """The serialised message."""
-        configuration = self._layout.configuration(answer.state.position)
-        force, torque = net_wrench(self._layout, configuration, answer.effort)
-        return self._wrench_encoder.encode(answer.state.stamp_ns, np.concatenate((force, torque)))
+        configuration = self._layout.configuration(reply.state.position)
+        force, torque = net_wrench(self._layout, configuration, reply.effort)
+        return self._wrench_encoder.encode(reply.state.stamp_ns, np.concatenate((force, torque)))

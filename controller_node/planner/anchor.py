@@ -64,7 +64,7 @@ class Anchor:
         placed: FloatArray = rotations.rotate(rotations.about_z(self.yaw), points) + shift
         return placed
 
-    def follow(
+    def advanced(
         self, state: PlanarState, wanted: PlanarState, time: float, elapsed: float
     ) -> "Anchor":
         """Where it is next, after a look at a state and at the reference, both in the latter's.

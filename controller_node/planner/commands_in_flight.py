@@ -32,7 +32,7 @@ class CommandsInFlight:
         self._nothing = nothing  # what acts before the first command
         self.state_then(0, np.array(character.rest_position), nothing)
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Begin with no command on its way."""
         self._sent.clear()
 

@@ -103,9 +103,9 @@ class PredictivePlanner:
         """Forget plan and reference; `episode` is the tick of the episode's first state."""
         self._episode = episode
         self.rest()
-        self._reference.forget()
+        self._reference.clear()
         if self.in_flight is not None:
-            self.in_flight.forget()
+            self.in_flight.clear()
 
     @property
     def plan(self) -> Plan | None:
@@ -127,7 +127,7 @@ class PredictivePlanner:
 
     def change_reference(self) -> None:
         """Say that the reference is another one from now on; the plan in force stays."""
-        self._reference.forget()
+        self._reference.clear()
         self._abandon_search()
 
     def rest(self) -> None:
@@ -194,7 +194,7 @@ class PredictivePlanner:
         self._search.rehearse(
             Start(0, position, nothing, desired, body, self._anchor, gives_way=False)
         )
-        self._reference.forget()
+        self._reference.clear()
 
     def _forget_what_is_over(self, tick: int) -> None:
         """Plan again from a state of before, which comes once more, or beyond the plan's end."""
@@ -258,7 +258,7 @@ class PredictivePlanner:
         seen = self._anchor.to_reference_world(position, velocity)
         features = self._rollouts.features_of(*seen, body)
         since_plan = tick - (tick if self._plan is None else self._plan.seen)
-        self._anchor = self._anchor.follow(
+        self._anchor = self._anchor.advanced(
             self._balance(seen[0], features),
             self._balance(target.position, target.features),
             tick / self._rate_hz,

@@ -32,7 +32,7 @@ class RecordedPlanner:
         """Start over."""
         del episode
         if self.in_flight is not None:
-            self.in_flight.forget()
+            self.in_flight.clear()
 
     def change_reference(self) -> None:
         """The offsets are added to whatever is tracked."""

@@ -31,7 +31,7 @@ class Foreseen:
 
 
 class SampledReference:
-    """Samples a reference, each tick of it once, until `forget` is called."""
+    """Samples a reference, each tick of it once, until `clear` is called."""
 
     def __init__(
         self, model: ContactModel, rollouts: RolloutPool, settings: PlannerSettings
@@ -39,7 +39,7 @@ class SampledReference:
         self._model, self._rollouts, self._settings = model, rollouts, settings
         self._targets: dict[int, Target] = {}
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Say that the reference may be another one."""
         self._targets.clear()
 

@@ -129,12 +129,12 @@ def _cycle_turn(root_xyzw: FloatArray) -> FloatArray:
     return rotations.yaw(rotations.multiply(root_xyzw[-1], rotations.conjugate(root_xyzw[0])))
 
 
-@REFERENCES.offer(
+@REFERENCES.register(
     "clip",
     Parameter("clip", "walk", "name of a clip of the character, or path of a .txt or .json file"),
 )
 def _clip(character: Character, values: Values) -> Motion:
     frames = read_clip(character, values.text("clip"))
     names = ", ".join(frames.clamped)
-    kept = (f"kept within joint limits: {names}",) if names else ()
-    return Motion(ClipReference(character.layout, frames), kept)
+    warnings = (f"kept within joint limits: {names}",) if names else ()
+    return Motion(ClipReference(character.layout, frames), warnings)

@@ -1,6 +1,6 @@
 """Which motion to track: the parameters that say it, and the reference that they make."""
 
-from controller_node.references import clip, hold, keyframes, signals  # noqa: F401  offer their own
+from controller_node.references import clip, hold, keyframes, signals  # noqa: F401  register their own
 from controller_node.references.base import REFERENCES, Motion
 from msgs_config.character.model import Character
 from msgs_config.parameters import Parameter, Values

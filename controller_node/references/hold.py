@@ -20,6 +20,6 @@ class HoldReference:
         return self._state
 
 
-@REFERENCES.offer("hold")
+@REFERENCES.register("hold")
 def _hold(character: Character, values: Values) -> Motion:
     return Motion(HoldReference(character))

@@ -113,7 +113,7 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-@REFERENCES.offer(
+@REFERENCES.register(
     "keyframes", Parameter("keyframes", "", "name of shipped keyframes, or path of a .yaml file")
 )
 def _keyframes(character: Character, values: Values) -> Motion:

@@ -89,7 +89,7 @@ _DOFS = Parameter(
 )
 
 
-@REFERENCES.offer(
+@REFERENCES.register(
     "step",
     Parameter("step.size", 0.1, "how far the step goes", unit="rad or m", minimum=-1e6),
     Parameter("step.time", 0.5, "when, since the episode began", unit="s"),
@@ -100,7 +100,7 @@ def _step(character: Character, values: Values) -> Motion:
     return Motion(StepReference(character, dofs, size, time), warnings)
 
 
-@REFERENCES.offer(
+@REFERENCES.register(
     "sine",
     _DOFS,
     Parameter("sine.amplitude", 0.1, "how far the sine goes", unit="rad or m", minimum=-1e6),

@@ -160,7 +160,7 @@ class TrajectoryReference:
     character: Character
     before: Reference  # what holds until the present trajectory's start
     curve: Curve | None = None
-    waiting: int = 0  # trajectories that are yet to begin, the present one among them
+    pending: int = 0  # trajectories that are yet to begin, the present one among them
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the episode's first state."""
@@ -194,17 +194,17 @@ class TrajectoryReference:
             _check_first(self.character, points, knots, there)
             knots = knots[1:]
         curve = Curve(layout, _lead(layout, start, there, knots), knots)
-        kept, waiting = self._until(start, start if now is None else now)
-        if waiting > _MOST_WAITING:
+        before, pending = self._until(start, start if now is None else now)
+        if pending > _MOST_WAITING:
             raise MotionError(f"trajectory: more than {_MOST_WAITING} are yet to begin")
-        return TrajectoryReference(self.character, kept, curve, waiting)
+        return TrajectoryReference(self.character, before, curve, pending)
 
     def _until(self, start: float, now: float) -> tuple[Reference, int]:
         """The reference until a trajectory's start, and how many are yet to begin then."""
         if self.curve is None or start <= self.curve.start:
             return self.before, 1
         if now < self.curve.start:
-            return self, self.waiting + 1
+            return self, self.pending + 1
         return self.curve, 1
 
 

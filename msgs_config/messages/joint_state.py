@@ -228,7 +228,7 @@ class JointStateDecoder:
     """Reads serialised JointState messages; fast for senders whose names it has seen."""
 
     def __init__(self) -> None:
-        self._kept: dict[bytes, tuple[tuple[str, ...], str]] = {}  # names and frame_id
+        self._known_senders: dict[bytes, tuple[tuple[str, ...], str]] = {}  # names and frame_id
 
     def decode(self, raw: bytes) -> JointArrays:
         """The message's content.
@@ -236,15 +236,16 @@ class JointStateDecoder:
         Raises:
             MessageError: the bytes are no JointState.
         """
-        for head, texts in self._kept.items():
+        for head, texts in self._known_senders.items():
             if raw.startswith(head, _NAMES_START) and raw.startswith(CDR_LITTLE_ENDIAN):
                 return _read_arrays(raw, _NAMES_START + len(head), *texts)
         stamp_ns, frame_id, names, lists = read_message(raw, JointState)
         head = _cdr_names(names, frame_id)
         if raw.startswith(head, _NAMES_START):
-            if len(self._kept) == _MAX_KEPT_SENDERS:  # each start of a simulator is a new sender
-                del self._kept[next(iter(self._kept))]
-            self._kept[head] = names, frame_id
+            # each start of a simulator is a new sender
+            if len(self._known_senders) == _MAX_KEPT_SENDERS:
+                del self._known_senders[next(iter(self._known_senders))]
+            self._known_senders[head] = names, frame_id
         position, velocity, effort = lists
         return JointArrays(stamp_ns, names, position, velocity, effort, frame_id)
 

@@ -61,22 +61,22 @@ class Publishers:
         self._last_episode: Header | None = None
         self._make_encoders()
 
-        def offer(topic: Topic) -> Publisher:
+        def create(topic: Topic) -> Publisher:
             return topics.create_publisher(node, topic.under(character.setup.name))
 
-        self._episode = offer(topics.EPISODE)
-        self._configuration = offer(topics.CONFIGURATION.of(node.get_name()))
-        self._states = offer(topics.JOINT_STATES)
-        self._contacts = offer(topics.CONTACTS)
-        self._wrenches = offer(topics.APPLIED_WRENCH)
-        self._odometry = offer(topics.ODOM)
-        self._visualization = offer(topics.VISUALIZATION)
+        self._episode = create(topics.EPISODE)
+        self._configuration = create(topics.CONFIGURATION.of(node.get_name()))
+        self._states = create(topics.JOINT_STATES)
+        self._contacts = create(topics.CONTACTS)
+        self._wrenches = create(topics.APPLIED_WRENCH)
+        self._odometry = create(topics.ODOM)
+        self._visualization = create(topics.VISUALIZATION)
         self._transforms = None
         if TFMessage is not None:
             self._transforms = node.create_publisher(TFMessage, "/tf", topics.STREAM_QOS)
         description = robot_description(character.character)
         if description is not None:
-            self._description = offer(topics.ROBOT_DESCRIPTION)
+            self._description = create(topics.ROBOT_DESCRIPTION)
             self._description.publish(String(data=description))
 
     def _make_encoders(self) -> None:

@@ -51,12 +51,12 @@ class PassiveForces:
         self._damping = bounded_damping(wanted, inverse_mass, step_s)
         self.active = bool(self._limits or wanted.any())
         self.warnings = tuple(
-            f"the passive damping of '{name}' is kept at {kept:.3g} of {asked:.3g}: more would be "
-            f"unstable at engine steps of {1e3 * step_s:.3g} ms, substeps make them shorter"
-            for name, asked, kept in zip(
+            f"the passive damping of '{name}' is kept at {applied:.3g} of {asked:.3g}: more would "
+            f"be unstable at engine steps of {1e3 * step_s:.3g} ms, substeps make them shorter"
+            for name, asked, applied in zip(
                 character.layout.dof_names, wanted, self._damping, strict=True
             )
-            if kept < asked
+            if applied < asked
         )
 
     def effort(self, position: FloatArray, velocity: FloatArray) -> FloatArray:

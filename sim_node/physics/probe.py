@@ -64,7 +64,7 @@ def probe_engine(character: Character, gravity: float) -> tuple[DynamicsSample, 
     with World(still_settings(gravity=0.0)) as world:
         body = _add_without_collisions(world, character)
         inverse_mass = _inverse_mass_matrix(world, body, character)
-        _check_mobility(character, np.diag(inverse_mass))
+        _check_inverse_mass(character, np.diag(inverse_mass))
         effort = rng.uniform(-_ACCELERATION, _ACCELERATION, layout.size) / np.diag(inverse_mass)
         passive = PassiveForces(character, INSTANT, inverse_mass)
         world.set_gravity(gravity)
@@ -121,9 +121,9 @@ def _position(character: Character, rng: np.random.Generator) -> FloatArray:
     return rest + rng.uniform(-1.0, 1.0, len(rest)) * np.minimum(_TURN, 0.5 * room)
 
 
-def _check_mobility(character: Character, mobility: FloatArray) -> None:
+def _check_inverse_mass(character: Character, inverse_mass_diagonal: FloatArray) -> None:
     """Raise CharacterError unless each effort accelerates its entry, by a finite amount (n,)."""
-    sound = (mobility > 0.0) & np.isfinite(mobility)
+    sound = (inverse_mass_diagonal > 0.0) & np.isfinite(inverse_mass_diagonal)
     if sound.all():
         return
     worst = int(np.argmin(sound))

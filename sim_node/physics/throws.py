@@ -13,7 +13,7 @@ MOST_BALLS = 100
 class ThrowQueue:
     """The throws of an episode that wait, in the order in which they were sent."""
 
-    _waiting: list[tuple[int, ProjectileThrow]] = field(default_factory=list)  # with the tick
+    _queue: list[tuple[int, ProjectileThrow]] = field(default_factory=list)  # with the tick
     _taken: int = 0
 
     def add(self, throw: ProjectileThrow, first_tick: int) -> None:
@@ -22,20 +22,20 @@ class ThrowQueue:
         Raises:
             CommandError: there are too many in this episode.
         """
-        if self._taken + len(self._waiting) >= MOST_BALLS:
+        if self._taken + len(self._queue) >= MOST_BALLS:
             raise CommandError(f"an episode has at most {MOST_BALLS} balls")
-        self._waiting.append((first_tick, throw))
+        self._queue.append((first_tick, throw))
 
     def take(self, tick: int) -> list[ProjectileThrow]:
         """The throws that begin in the state of a tick."""
-        if not self._waiting:
+        if not self._queue:
             return []
-        due = [throw for first_tick, throw in self._waiting if first_tick == tick]
-        self._waiting = [waiting for waiting in self._waiting if waiting[0] != tick]
+        due = [throw for first_tick, throw in self._queue if first_tick == tick]
+        self._queue = [queued for queued in self._queue if queued[0] != tick]
         self._taken += len(due)
         return due
 
     def clear(self) -> None:
         """Forget all: another episode begins."""
-        self._waiting.clear()
+        self._queue.clear()
         self._taken = 0

@@ -35,9 +35,9 @@ class ZeroOrderHold(CommandCollector):
         """Go on to the tick of the state of this stamp."""
         self.stamp_ns = stamp_ns
         self.conflict = None
-        held = self._held
-        self.timeouts += bool((self._was_held & ~held).any())
-        self._was_held = held
+        is_held = self._is_held
+        self.timeouts += bool((self._was_held & ~is_held).any())
+        self._was_held = is_held
 
     def clear(self) -> None:
         """Discard all commands, and those on their way: the next tick begins a new episode."""
@@ -48,20 +48,20 @@ class ZeroOrderHold(CommandCollector):
     @property
     def effort(self) -> FloatArray:
         """The effort (n,) of this tick; zero where no command is held."""
-        return np.where(self._held, self._effort, 0.0)
+        return np.where(self._is_held, self._effort, 0.0)
 
     @property
     def age_ns(self) -> int | None:
         """Age of the oldest command that is held; None without any."""
-        held = self._held
-        return int(self.stamp_ns - self._given_ns[held].min()) if held.any() else None
+        is_held = self._is_held
+        return int(self.stamp_ns - self._given_ns[is_held].min()) if is_held.any() else None
 
     @property
-    def _held(self) -> BoolArray:
-        held: BoolArray = (self._given_ns != _NEVER) & (
+    def _is_held(self) -> BoolArray:
+        is_held: BoolArray = (self._given_ns != _NEVER) & (
             self.stamp_ns - self._given_ns < self.timeout_ns
         )
-        return held
+        return is_held
 
     def _take(self, stamp_ns: int, indices: IntArray, effort: FloatArray) -> CommandStatus:
         answered_ns = stamp_ns or self.stamp_ns

@@ -9,7 +9,7 @@ import pytest
 
 from actuated_characters.metrics.run_metrics import COLUMNS
 from actuated_characters.render.stills import save_png
-from actuated_characters.report.run_figures import plot_figures
+from actuated_characters.report.metrics_plot import plot_metrics
 from actuated_characters.runs.planned_files import write_planned
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.run_directory import (
@@ -18,8 +18,8 @@ from actuated_characters.runs.run_directory import (
     SERIES,
     SUMMARY,
     prepare_directory,
-    read_figures,
-    write_figures,
+    read_metrics,
+    write_metrics,
     write_parameters,
 )
 from actuated_characters.whole_files import part_of, write_whole, writing
@@ -79,10 +79,10 @@ def test_nothing_of_a_file_is_left_where_its_writer_or_its_directory_fails(
 
 WRITERS: dict[str, tuple[Callable[[Path], object], str]] = {  # and the file that is too large
     "summary": (
-        lambda run: write_figures(run, FIGURES | {"notes": NEW}, {"time_s": np.ones(1)}),
+        lambda run: write_metrics(run, FIGURES | {"notes": NEW}, {"time_s": np.ones(1)}),
         SUMMARY,
     ),
-    "series": (lambda run: write_figures(run, FIGURES, ROWS), SERIES),
+    "series": (lambda run: write_metrics(run, FIGURES, ROWS), SERIES),
     "parameters": (
         lambda run: write_parameters(run, "sim_node", {"character": NEW}),
         f"{PARAMETERS}/sim_node.yaml",
@@ -93,7 +93,7 @@ WRITERS: dict[str, tuple[Callable[[Path], object], str]] = {  # and the file tha
         ),
         f"{PARAMETERS}/pushes.json",
     ),
-    "plot": (plot_figures, PLOT),
+    "plot": (plot_metrics, PLOT),
     "picture": (
         lambda run: save_png(
             np.random.default_rng(1).integers(0, 255, (30, 30, 3)).astype(np.uint8),
@@ -110,7 +110,7 @@ def test_a_full_disk_leaves_no_file_in_part(tmp_path: Path, name: str) -> None:
     run = tmp_path / "run"
     prepare_directory(run, overwrite=False)
     if file == PLOT:
-        write_figures(run, FIGURES, ROWS)
+        write_metrics(run, FIGURES, ROWS)
     before = files_below(run)
 
     with file_size_limit(FULL_AT), pytest.raises(RecordingError) as caught:
@@ -121,7 +121,7 @@ def test_a_full_disk_leaves_no_file_in_part(tmp_path: Path, name: str) -> None:
     write(run)
     assert (run / file).stat().st_size > FULL_AT
     if before:
-        summary, series = read_figures(run)
+        summary, series = read_metrics(run)
         assert summary == FIGURES
         assert series.keys() == ROWS.keys() and all(
             map(np.array_equal, series.values(), ROWS.values())

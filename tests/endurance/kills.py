@@ -116,14 +116,14 @@ def _kill_one(nodes: Nodes, run: Path, compression: str, life: float, found: _Fo
         raise RuntimeError("the bag of a killed recorder is complete")
     _check(run / BAG, recovered.contents.counts, last_flushed, found)
     found.recovered += 1
-    unreadable = [lost for lost in recovered.contents.lost if not _CUT_OFF.fullmatch(lost)]
+    unreadable = [lost for lost in recovered.contents.unreadable if not _CUT_OFF.fullmatch(lost)]
     if unreadable:
         raise RuntimeError(f"unreadable: {'; '.join(unreadable)}")
     if last_flushed:  # else there are only latched messages, as old as they may be
         lost = spoke_at - recovered.contents.last_log_time_ns / NANOSECONDS_PER_SECOND
         found.most_lost = max(found.most_lost, lost)
         if lost > _MOST_LOST:
-            raise RuntimeError(f"the last {lost:.2f} s are lost")
+            raise RuntimeError(f"the last {unreadable:.2f} s are lost")
     return True
 
 

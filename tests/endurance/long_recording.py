@@ -22,7 +22,7 @@ from rich.console import Console  # noqa: E402 - after the limit on threads
 
 from actuated_characters.bags.reader import read_messages  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
-from actuated_characters.runs.run_directory import BAG, read_figures  # noqa: E402
+from actuated_characters.runs.run_directory import BAG, read_metrics  # noqa: E402
 from benchmarks.recorder import RATE, walk  # noqa: E402
 from benchmarks.support.nodes import Nodes, processor_time  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402
@@ -103,7 +103,7 @@ def missing(directory: Path, ticks: int, *, lockstep: bool) -> list[str]:
         if last.get(message.topic) != message.raw:
             counts[message.topic] += 1
             last[message.topic] = message.raw
-    summary, _ = read_figures(directory)
+    summary, _ = read_metrics(directory)
     problems = [f"{name}: {count} lost" for name, count in summary["lost_messages"].items()]
     expected = {topic.name: ticks + 1 for topic in _OF_STATES}
     if lockstep:

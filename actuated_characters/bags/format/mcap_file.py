@@ -49,7 +49,7 @@ class McapFile:
         self.path = path
         self.topics: dict[int, StoredTopic] = {}
         """By channel, those that the file announces: with messages or without."""
-        self.lost: Counter[str] = Counter()
+        self.unreadable: Counter[str] = Counter()
         """How often something could not be read, by its description."""
         self.fraction = 0.0
         """Of the file that `messages` has read."""
@@ -63,8 +63,8 @@ class McapFile:
     @property
     def damage(self) -> str:
         """The damage in a few words; empty if there was none."""
-        kinds = sorted(self.lost, key=lambda kind: kind != _CUT_OFF)
-        named = [f"{kind} ({self.lost[kind]})" for kind in kinds[:_MOST_NAMED]]
+        kinds = sorted(self.unreadable, key=lambda kind: kind != _CUT_OFF)
+        named = [f"{kind} ({self.unreadable[kind]})" for kind in kinds[:_MOST_NAMED]]
         return ", ".join([*named, *["..."] * (len(kinds) > _MOST_NAMED)])
 
     def messages(self) -> Iterator[StoredMessage]:
@@ -79,7 +79,7 @@ class McapFile:
                 raise RecordingError(f"{self.path} is no MCAP file")
             with suppress(Exception):  # a closed file announces its topics at its end, too
                 self._read_summary(file)
-            self.lost.clear()
+            self.unreadable.clear()
             file.seek(len(_MAGIC))
             for message in self._scan(file, size, {*_IN_CHUNK, _CHUNK}):
                 self.fraction = file.tell() / size
@@ -116,18 +116,19 @@ class McapFile:
             yield from sorted(self._all_messages())
             return
         chosen = {number for number, topic in self.topics.items() if topic.name in names}
-        held: list[StoredMessage] = []
+        pending: list[StoredMessage] = []
         for index in sorted(self._chunks, key=lambda each: each.message_start_time):
             if index.message_index_offsets and not index.message_index_offsets.keys() & chosen:
                 continue
-            ready = bisect_left(held, index.message_start_time, key=lambda each: each.log_time_ns)
-            yield from held[:ready]
-            del held[:ready]
-            size = sum(len(message.raw) for message in held) + index.uncompressed_size
+            start_ns = index.message_start_time
+            ready = bisect_left(pending, start_ns, key=lambda each: each.log_time_ns)
+            yield from pending[:ready]
+            del pending[:ready]
+            size = sum(len(message.raw) for message in pending) + index.uncompressed_size
             limits.check_size("chunks", max(size, index.chunk_length), limits.MOST_OF_CHUNK)
-            held += self._read_chunk(index)
-            held.sort()
-        yield from held
+            pending += self._read_chunk(index)
+            pending.sort()
+        yield from pending
 
     def _read_chunk(self, index: ChunkIndex) -> list[StoredMessage]:
         self._file.seek(index.chunk_start_offset)
@@ -141,15 +142,15 @@ class McapFile:
 
     def _all_messages(self) -> Iterator[StoredMessage]:
         """Yield the messages of a file without an index, in its order, up to a limit."""
-        held = 0
+        size = 0
         for message in self.messages():
-            held += len(message.raw) + _LEAST_HELD
-            limits.check_size("a file without an index", held, limits.MOST_SORTED)
+            size += len(message.raw) + _LEAST_HELD
+            limits.check_size("a file without an index", size, limits.MOST_SORTED)
             yield message
         self._check_whole()
 
     def _check_whole(self) -> None:
-        if self.lost:
+        if self.unreadable:
             raise ValueError(f"it cannot be read whole: {self.damage}")
 
     def _scan(
@@ -159,22 +160,22 @@ class McapFile:
         try:
             for kind, begin, length in _records(stream, size):
                 if kind in wanted and length > limits.MOST_OF_CHUNK:
-                    self.lost[f"record of more than {limits.MOST_OF_CHUNK} bytes"] += 1
+                    self.unreadable[f"record of more than {limits.MOST_OF_CHUNK} bytes"] += 1
                 elif kind in wanted and kind == _MESSAGE and length >= _MESSAGE_HEAD.size:
                     channel, _, log_time_ns, _ = _MESSAGE_HEAD.unpack(
                         stream.read(_MESSAGE_HEAD.size)
                     )
                     if (topic := self.topics.get(channel)) is None:
-                        self.lost["message of a topic that is not announced"] += 1
+                        self.unreadable["message of a topic that is not announced"] += 1
                     elif self._names is None or topic.name in self._names:
                         raw = stream.read(length - _MESSAGE_HEAD.size)
                         yield StoredMessage(log_time_ns, (place, begin), topic, raw)
                 elif kind in wanted:
                     yield from self._parse(kind, stream.read(length), begin)
                 elif kind in _UNKNOWN:
-                    self.lost["unknown record"] += 1
+                    self.unreadable["unknown record"] += 1
         except _CutOffError as error:
-            self.lost[_CUT_OFF] += error.size
+            self.unreadable[_CUT_OFF] += error.size
 
     def _parse(self, kind: int, body: bytes, begin: int) -> list[StoredMessage]:
         """Return the messages of a record that is whole; announcements have none."""
@@ -193,9 +194,9 @@ class McapFile:
             else:
                 raise ValueError("a message without its head")
         except limits.LimitError as error:
-            self.lost[str(error)] += 1
+            self.unreadable[str(error)] += 1
         except Exception:  # whatever the libraries raise for damaged bytes
-            self.lost[f"damaged {Opcode(kind).name.lower()}"] += 1
+            self.unreadable[f"damaged {Opcode(kind).name.lower()}"] += 1
         return []
 
     def _announce(self, channel: Channel) -> None:

@@ -106,12 +106,12 @@ class RecordedController(Node):
                 self._report.tell_wait(lambda: f"the state of tick {FIRST_TICK + self._played}")
             if min(len(each.states) for each in self._characters) > self._played:
                 if self._played < self._ticks:
-                    self._answer(self._played)
+                    self._replay_tick(self._played)
                 self._played += 1
                 self._report.tell_state(self._played)
                 self._report.begin_wait()
 
-    def _answer(self, tick: int) -> None:
+    def _replay_tick(self, tick: int) -> None:
         """Let the simulator do what it did in a tick, counted from 0."""
         if tick in self._resets:
             self._reset_client.call_async(Trigger.Request())  # the next state is its answer

@@ -70,7 +70,7 @@ def _sent(recording: Recording, tick: int) -> Commands | None:
     """
     layout = recording.layout
     required = layout.mask(recording.parameters["commanded_joints"])
-    barrier, kept = LockstepBarrier(layout.dof_names, required), list[CommandArrays]()
+    barrier, accepted = LockstepBarrier(layout.dof_names, required), list[CommandArrays]()
     for command in recording.commands[tick]:
         try:
             indices = layout.indices(command.names)
@@ -79,12 +79,12 @@ def _sent(recording: Recording, tick: int) -> Commands | None:
             continue
         if verdict is CommandStatus.CONFLICT:
             barrier.clear()
-            kept.clear()
+            accepted.clear()
             barrier.submit(barrier.stamp_ns, indices, command.efforts)
         if verdict in (CommandStatus.ACCEPTED, CommandStatus.CONFLICT):
-            kept.append(command)
+            accepted.append(command)
         if barrier.complete:
-            return tuple(kept)
+            return tuple(accepted)
     return None
 
 

@@ -124,7 +124,7 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
     Raises:
         RecordingError: the bag cannot be read.
     """
-    rare, kept = RareMessages(), dict[str, list[tuple[int, Request]]]()
+    rare, by_topic = RareMessages(), dict[str, list[tuple[int, Request]]]()
     types = {_name(recording, topic): topic.message_type for topic in (*REQUESTS, *_ACTIVE)}
     for message in read_messages(find_bag(path)):
         if message.topic == _name(recording, _CONFIGURATION):
@@ -134,9 +134,9 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
             rare.episodes[int(np.searchsorted(recording.stamps_ns, stamp_ns))] = message.raw
         elif message.topic in types:
             content = decode(message.raw, types[message.topic])
-            kept.setdefault(message.topic, []).append((message.log_time_ns, content))
+            by_topic.setdefault(message.topic, []).append((message.log_time_ns, content))
     for topic, active in zip(REQUESTS, _ACTIVE, strict=True):
-        sent = kept.get(_name(recording, active)) or kept.get(_name(recording, topic), [])
+        sent = by_topic.get(_name(recording, active)) or by_topic.get(_name(recording, topic), [])
         for published_ns, content in sent:
             row = _row(recording, published_ns, content.header)
             if row is not None:

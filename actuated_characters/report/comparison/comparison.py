@@ -55,7 +55,7 @@ class Comparison:
     common: int  # states with the same stamps
     first: FirstDifference | None
     growth: Growth
-    figures: dict[str, tuple[object, object]]  # without those that neither has
+    metrics: dict[str, tuple[object, object]]  # without those that neither has
     simulator: dict[str, tuple[object, object]]  # parameters that differ
     controller: dict[str, tuple[object, object]] | None  # at the start; None: not in both
     versions: dict[str, tuple[object, object]]  # of package, engines and libraries that differ
@@ -93,7 +93,7 @@ def compare(first: Recording, second: Recording, tolerance: float | None = None)
         spans = [f"{r.stamps_ns[0]} to {r.stamps_ns[-1]} ns" for r in both]
         raise RecordingError(f"the recordings have no stamp in common: {' and '.join(spans)}")
     measured = [measure_recording(recording)[0] for recording in both]
-    figures = {name: (value, measured[1][name]) for name, value in measured[0].items()}
+    metrics = {name: (value, measured[1][name]) for name, value in measured[0].items()}
     told = [r.controller[0].parameters if r.controller else {} for r in both]
     return Comparison(
         name=first.name,
@@ -101,7 +101,7 @@ def compare(first: Recording, second: Recording, tolerance: float | None = None)
         common=len(stamps),
         first=_first_difference((first, ours), (second, theirs), tolerance),
         growth=_growth((first, ours), (second, theirs)),
-        figures={name: values for name, values in figures.items() if values != (None, None)},
+        metrics={name: values for name, values in metrics.items() if values != (None, None)},
         simulator=differences(first.parameters, second.parameters),
         controller=differences(*told) if all(told) or not any(told) else None,
         versions=differences(first.versions, second.versions),

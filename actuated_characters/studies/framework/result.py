@@ -35,7 +35,7 @@ class StudyResult:
         self.figures: dict[str, Figure] = {}  # by the name of their files
         self.curves: dict[str, Mapping[str, FloatArray]] = {}
         # by the name of a CSV file: columns (t,) by their names
-        self.notes: list[str] = []  # sentences about the result
+        self.remarks: list[str] = []  # sentences about the result
 
     @property
     def columns(self) -> list[str]:

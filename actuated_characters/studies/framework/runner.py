@@ -12,7 +12,7 @@ from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned_throws import plan_throws
 from actuated_characters.runs.planned_wrenches import PlannedPush
-from actuated_characters.runs.run_directory import prepare_directory, read_figures
+from actuated_characters.runs.run_directory import prepare_directory, read_metrics
 from actuated_characters.studies.framework.study import RunResult, RunSpec
 from msgs_config.errors import RunError
 
@@ -57,7 +57,7 @@ class TopicRunner:
                 raise
             diverged = str(error).partition(": ")[2]
         self._report(case.label, 1.0)
-        recording, (summary, _) = read_recording(directory), read_figures(directory)
+        recording, (summary, _) = read_recording(directory), read_metrics(directory)
         _check_pushes(case.pushes, recording)
         if not self._keep_runs:
             shutil.rmtree(directory)

@@ -73,11 +73,11 @@ def inertialess_response(
         damping: kd, N m s/rad.
         period: h, of control, s.
     """
-    held = damping + stiffness * period
+    effective_damping = damping + stiffness * period
     angle = reference.copy()
     for k, (desired, speed) in enumerate(zip(reference[1:], velocity[1:], strict=True)):
         angle[k + 1] = angle[k] + period * (
-            (stiffness * (desired - angle[k]) + damping * speed) / held
+            (stiffness * (desired - angle[k]) + damping * speed) / effective_damping
         )
     return angle
 

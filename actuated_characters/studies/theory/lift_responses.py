@@ -91,17 +91,17 @@ class Bound:
 
     law: str
     theory: float  # N/m
-    tried: tuple[Response, ...]  # in rising order of stiffness
+    evaluated: tuple[Response, ...]  # in rising order of stiffness
 
     @property
     def below(self) -> Response:
         """The stiffest that was stable."""
-        return [response for response in self.tried if response.stable][-1]
+        return [response for response in self.evaluated if response.stable][-1]
 
     @property
     def above(self) -> Response:
         """The softest that was not."""
-        return next(response for response in self.tried if not response.stable)
+        return next(response for response in self.evaluated if not response.stable)
 
     @property
     def found(self) -> float:
@@ -112,10 +112,10 @@ class Bound:
 def find_bound(respond: Callable[[Gains], Response], law: str, theory: float) -> Bound:
     """Bisect for the bound of a law between stiffnesses (N/m) around that of theory."""
     low, high = (share * theory for share in _BRACKET)
-    tried = [respond(Gains.critical(law, stiffness)) for stiffness in (low, high)]
+    evaluated = [respond(Gains.critical(law, stiffness)) for stiffness in (low, high)]
     while high / low > _RESOLUTION:
         middle = math.sqrt(low * high)
-        tried.append(respond(Gains.critical(law, middle)))
-        low, high = (middle, high) if tried[-1].stable else (low, middle)
-    tried.sort(key=lambda response: response.gains.stiffness)
-    return Bound(law, theory, tuple(tried))
+        evaluated.append(respond(Gains.critical(law, middle)))
+        low, high = (middle, high) if evaluated[-1].stable else (low, middle)
+    evaluated.sort(key=lambda response: response.gains.stiffness)
+    return Bound(law, theory, tuple(evaluated))

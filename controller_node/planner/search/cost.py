@@ -38,7 +38,7 @@ class Comparison:
             *((weights["feet" if foot else "hands"], 3) for foot in is_foot),
         ]
         share = 1.0 / math.sqrt(settings.checks)  # the mean of the checks' squares counts
-        self._held = share * np.repeat(
+        self._weights = share * np.repeat(
             [weight for weight, _ in parts], [count for _, count in parts]
         )
         self._centre = 6 + 2 * joints
@@ -46,10 +46,10 @@ class Comparison:
             [self._centre + 9 + 3 * i for i, foot in enumerate(is_foot) if foot is wanted]
             for wanted in (True, False)
         )
-        self._loose = self._held.copy()
-        self._loose[self._centre : self._centre + 2] *= _LOOSE_CENTRE
+        self._loose_weights = self._weights.copy()
+        self._loose_weights[self._centre : self._centre + 2] *= _LOOSE_CENTRE
         for foot in self._feet:
-            self._loose[foot : foot + 2] = share * _STEP
+            self._loose_weights[foot : foot + 2] = share * _STEP
 
     def balance(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Centres of mass (..., 3) in m, their velocities (..., 3) in m/s of features (..., f)."""
@@ -59,8 +59,8 @@ class Comparison:
     def residuals(self, deviations: FloatArray, *, gives_way: bool) -> FloatArray:
         """The residuals of deviations, both (..., f)."""
         if not gives_way:
-            held: FloatArray = deviations * self._held
-            return held
+            residuals: FloatArray = deviations * self._weights
+            return residuals
         loose = deviations.copy()
         centre = deviations[..., self._centre : self._centre + 3]
         velocity = deviations[..., self._centre + 3 : self._centre + 6]
@@ -68,5 +68,5 @@ class Comparison:
             loose[..., foot : foot + 2] -= centre[..., :2] + _STEP_TIME * velocity[..., :2]
         for hand in self._hands:
             loose[..., hand : hand + 3] -= centre
-        loose *= self._loose
+        loose *= self._loose_weights
         return loose

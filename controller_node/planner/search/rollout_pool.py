@@ -82,9 +82,9 @@ class RolloutPool:
                 )
 
         own, *others = self._engines
-        waiting = [self._threads.submit(work, engine) for engine in others]
+        futures = [self._threads.submit(work, engine) for engine in others]
         work(own)
-        for done in waiting:
+        for done in futures:
             done.result()
         with np.errstate(invalid="ignore"):
             sound &= (np.abs(features) < _LARGEST).all(axis=(1, 2))  # NaN is not

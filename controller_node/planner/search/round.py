@@ -51,10 +51,10 @@ def improve(
     places = _within(problem, np.concatenate((place[np.newaxis], place + draws)))
     deviations = problem.deviations(places)
     costs = _costs(problem, places, deviations)
-    kept = _best(costs[1:]) + 1
-    if not np.isfinite(costs[0]) or len(kept) < _FEWEST:
+    elites = _best(costs[1:]) + 1
+    if not np.isfinite(costs[0]) or len(elites) < _FEWEST:
         return _found(places, costs, deviations, known)
-    distances, changes = places[kept] - places[0], deviations[kept] - deviations[0]
+    distances, changes = places[elites] - places[0], deviations[elites] - deviations[0]
     residuals = problem.residuals(deviations[0])
     sensitivities = gauss_newton.corrected_sensitivities(known, distances, changes)
     steps = [

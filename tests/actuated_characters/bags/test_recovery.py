@@ -18,7 +18,7 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recovery import recover
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import MetricsCollector
-from actuated_characters.runs.run_directory import SUMMARY, read_figures, write_figures
+from actuated_characters.runs.run_directory import SUMMARY, read_metrics, write_metrics
 from msgs_config.errors import RecordingError
 from tests.support.bags import add_to, make_run
 from tests.support.foreign_bags import SAID, texts
@@ -180,7 +180,7 @@ def test_a_file_that_was_being_compressed_is_read_once(tmp_path: Path) -> None:
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID and recovered.contents.lost == []
+    assert texts(bag) == SAID and recovered.contents.unreadable == []
 
 
 def test_topics_without_messages_are_kept(tmp_path: Path) -> None:
@@ -337,11 +337,11 @@ def test_a_run_gets_its_figures_again(tmp_path: Path) -> None:
     for message in read_messages(tmp_path / "alive" / "bag"):
         listener.take(message.topic.removeprefix("/"), message.raw, message.log_time_ns)
     expected, expected_series = listener.results()
-    write_figures(tmp_path / "expected", expected, expected_series)
+    write_metrics(tmp_path / "expected", expected, expected_series)
     assert recovered.measured == [run]
-    for found, same in zip(read_figures(run), read_figures(tmp_path / "expected"), strict=True):
+    for found, same in zip(read_metrics(run), read_metrics(tmp_path / "expected"), strict=True):
         np.testing.assert_equal(found, same)
-    assert read_figures(run)[0]["ticks"] == 120
+    assert read_metrics(run)[0]["ticks"] == 120
 
 
 def test_each_of_several_characters_gets_figures_of_its_own(tmp_path: Path) -> None:
@@ -354,7 +354,7 @@ def test_each_of_several_characters_gets_figures_of_its_own(tmp_path: Path) -> N
     recovered = recover(tmp_path / "run")
 
     assert recovered.measured == [tmp_path / "run" / "left", tmp_path / "run" / "right"]
-    ticks = [read_figures(directory)[0]["ticks"] for directory in recovered.measured]
+    ticks = [read_metrics(directory)[0]["ticks"] for directory in recovered.measured]
     assert ticks == [60, 120]
 
 
@@ -365,7 +365,7 @@ def test_figures_of_the_whole_run_are_kept(tmp_path: Path) -> None:
 
     recovered = recover(run)
 
-    assert (recovered.measured, recovered.kept) == ([], [run])
+    assert (recovered.measured, recovered.unchanged) == ([], [run])
     assert (run / SUMMARY).read_text() == "of the whole run"
 
 
@@ -375,7 +375,7 @@ def test_a_complete_bag_without_figures_gets_them(tmp_path: Path) -> None:
     recovered = recover(tmp_path / "alive")
 
     assert recovered.damaged is None
-    assert read_figures(tmp_path / "alive")[0]["ticks"] == 120
+    assert read_metrics(tmp_path / "alive")[0]["ticks"] == 120
     assert recover(tmp_path / "alive").measured == []
 
 

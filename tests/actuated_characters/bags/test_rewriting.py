@@ -46,7 +46,7 @@ def test_a_truncated_file_of_ros2_bag_record_is_recovered_up_to_the_cut(
     read = texts(bag)
     assert read == SAID[: len(read)]
     assert 5 < len(read) < len(SAID)
-    (lost,) = recovered.contents.lost
+    (lost,) = recovered.contents.unreadable
     assert lost.startswith("bag_0.mcap: ")
     with Reader(bag) as reader:
         assert {connection.digest for connection in reader.connections} == {"RIHS01_ab"}
@@ -66,7 +66,7 @@ def test_a_damaged_chunk_in_the_middle_is_left_out_and_said(bag: Path) -> None:
     assert SAID[15] not in read
     assert {SAID[0], SAID[-5]} <= set(read)
     assert read == [said for said in SAID if said in read]
-    assert recovered.contents.lost == ["bag_0.mcap: damaged chunk (1)"]
+    assert recovered.contents.unreadable == ["bag_0.mcap: damaged chunk (1)"]
 
 
 def test_topics_whose_first_chunk_is_damaged_are_taken_from_the_files_end(bag: Path) -> None:
@@ -147,10 +147,10 @@ def test_of_a_chunk_whose_inner_length_lies_nothing_else_is_lost(bag: Path, bit:
     recovered = recover(bag)
 
     if bit in (16, 47):  # the record ends where it ends
-        assert texts(bag) == SAID and recovered.contents.lost == []
+        assert texts(bag) == SAID and recovered.contents.unreadable == []
     else:
         assert texts(bag) == [said for said in SAID if said not in gone]
-        assert recovered.contents.lost == ["bag_0.mcap: damaged chunk (1)"]
+        assert recovered.contents.unreadable == ["bag_0.mcap: damaged chunk (1)"]
 
 
 @pytest.mark.parametrize(("kind", "bit"), [(CHUNK, 2), (MESSAGE_INDEX, 3), (CHUNK, 0), (CHUNK, 4)])
@@ -166,7 +166,7 @@ def test_a_record_of_another_kind_ends_nothing(bag: Path, kind: int, bit: int) -
     recovered = recover(bag)
 
     assert texts(bag) == [said for said in SAID if said not in gone]
-    assert bool(recovered.contents.lost) == (bit == 4)
+    assert bool(recovered.contents.unreadable) == (bit == 4)
 
 
 @pytest.mark.parametrize("kind", [MESSAGE_INDEX, FOOTER])
@@ -184,7 +184,7 @@ def test_a_record_that_no_message_needs_may_be_damaged(bag: Path, kind: int) -> 
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID and recovered.contents.lost == []
+    assert texts(bag) == SAID and recovered.contents.unreadable == []
 
 
 @pytest.mark.parametrize("left", [1, 8, 9, 10])
@@ -198,7 +198,9 @@ def test_the_head_of_a_record_without_its_content_is_no_loss(bag: Path, left: in
 
     read = texts(bag)
     assert read == SAID[: len(read)] and len(read) > len(SAID) // 2
-    assert recovered.contents.lost == ([] if left < 10 else ["bag_0.mcap: bytes cut off (10)"])
+    assert recovered.contents.unreadable == (
+        [] if left < 10 else ["bag_0.mcap: bytes cut off (10)"]
+    )
 
 
 def test_a_tail_of_zeros_is_no_record(bag: Path) -> None:
@@ -209,7 +211,7 @@ def test_a_tail_of_zeros_is_no_record(bag: Path) -> None:
     recovered = recover(bag)
 
     assert texts(bag) == SAID
-    assert recovered.contents.lost == [f"bag_0.mcap: bytes cut off ({1 << 30})"]
+    assert recovered.contents.unreadable == [f"bag_0.mcap: bytes cut off ({1 << 30})"]
 
 
 def test_a_message_that_is_cut_off_swallows_none_behind_it(bag: Path) -> None:
@@ -226,7 +228,7 @@ def test_a_message_that_is_cut_off_swallows_none_behind_it(bag: Path) -> None:
     recovered = recover(bag)
 
     assert texts(bag) == [said for said in SAID if said.cdr not in data[begin:end]]
-    assert "bytes cut off" in recovered.contents.lost[0]
+    assert "bytes cut off" in recovered.contents.unreadable[0]
 
 
 def test_many_losses_are_one_line(bag: Path) -> None:
@@ -274,7 +276,7 @@ def test_messages_that_rosbag2_compressed_are_recovered(
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID and recovered.contents.lost == []
+    assert texts(bag) == SAID and recovered.contents.unreadable == []
 
 
 def test_messages_that_rosbag2_compressed_in_a_file_without_an_index_are_read(
@@ -319,7 +321,7 @@ def test_messages_that_a_bag_cannot_hold_are_left_out_and_named(bag: Path) -> No
     recovered = recover(bag)
 
     assert texts(bag) == SAID[:2]
-    assert recovered.contents.lost == [
+    assert recovered.contents.unreadable == [
         "bag_1.mcap: message on '/a' as json, not as cdr (1), "
         "message on '/b' as json, not as cdr (1)",
         "bag_2.mcap: message on '/a' of another type, own_msgs/msg/Sample (1)",

@@ -31,7 +31,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 PROJECT = Path(__file__).parents[3]
 QUICK = {"plan.samples": 8, "plan.rounds": 1, "plan.horizon": 0.2}
-SMALL = Settings(worlds=3, kept=2, window=0.1)
+SMALL = Settings(worlds=3, survivors=2, window=0.1)
 DURATION = 0.3  # s
 PROBLEM = Problem("humanoid", "kick", DURATION, {}, QUICK)
 WINDOW = 24  # ticks
@@ -144,7 +144,7 @@ def progress_of(worlds: Numbered, windows: int, settings: Settings) -> tuple[int
 
 
 def test_the_best_worlds_are_kept_and_the_others_go_on_from_them() -> None:
-    stuck_at, progress = progress_of(Numbered(), 5, Settings(worlds=6, kept=2))
+    stuck_at, progress = progress_of(Numbered(), 5, Settings(worlds=6, survivors=2))
 
     best = result(progress)
     assert stuck_at is None and best is not None
@@ -155,7 +155,7 @@ def test_the_best_worlds_are_kept_and_the_others_go_on_from_them() -> None:
 def test_where_all_are_lost_it_goes_back_and_tries_others() -> None:
     worlds = Numbered(deadly=4)
 
-    stuck_at, progress = progress_of(worlds, 6, Settings(worlds=4, kept=1))
+    stuck_at, progress = progress_of(worlds, 6, Settings(worlds=4, survivors=1))
 
     assert stuck_at is None and progress.failures == 1
     assert worlds.grown == 4 * (3 + 1 + 2 + 3)  # to the third, lost, back by two, to the sixth
@@ -167,7 +167,7 @@ def test_who_is_stuck_gives_up_and_has_the_furthest_window() -> None:
             for grown in super().grow(branches):
                 yield None if grown is not None and grown.place.tick > 3 else grown
 
-    stuck_at, progress = progress_of(Deadly(), 6, Settings(worlds=2, kept=1, tries=3))
+    stuck_at, progress = progress_of(Deadly(), 6, Settings(worlds=2, survivors=1, tries=3))
 
     best = result(progress)
     assert stuck_at == 3 and best is not None
@@ -204,9 +204,9 @@ def test_over_topics_it_is_what_was_found_bit_for_bit(
 
     summary = json.loads((directory / "summary.json").read_text())
     assert code == 0
-    assert summary["ticks"] == round(DURATION * rate) == found.figures.ticks
+    assert summary["ticks"] == round(DURATION * rate) == found.metrics.ticks
     assert summary["actuators"] == summary["degrees_of_freedom"] - 6
-    assert summary["state_hash"] == found.figures.state_hash
+    assert summary["state_hash"] == found.metrics.state_hash
     assert main(["replay", str(directory)]) == 0
 
 
@@ -299,7 +299,7 @@ def test_pushes_that_it_was_found_with_come_again_unless_others_are_given(
     none = hash_of(file, tmp_path / "none", "--push", "none")
     other = hash_of(file, tmp_path / "other", *one)
 
-    assert none == kick[1].figures.state_hash != known
+    assert none == kick[1].metrics.state_hash != known
     assert other == hash_of(kick[0], tmp_path / "2", *one) not in (known, none)
 
 

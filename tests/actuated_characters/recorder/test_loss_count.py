@@ -15,7 +15,7 @@ def lost(numbers: Iterable[int | None], publishers: int = 1) -> int:
     count = LossCount(lambda: publishers)
     for number in numbers:
         count.take(number)
-    return count.lost
+    return count.lost_messages
 
 
 @given(

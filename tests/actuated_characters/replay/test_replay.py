@@ -71,7 +71,7 @@ def test_a_run_comes_again(walk: Recording, made: Made) -> None:
 
     result = replay([walk])
 
-    assert result.difference is None and result.notes == ()
+    assert result.difference is None and result.remarks == ()
     assert (result.states, result.episodes) == (TICKS + 1, 1)
     assert result.state_hashes == {"": expected.hexdigest()}
 
@@ -114,7 +114,7 @@ def test_an_effort_that_was_another_one_changes_the_states(
 
     assert result.difference is not None and result.difference.tick == 22
     assert said in str(result.difference)
-    assert any("no commands" in note for note in result.notes)
+    assert any("no commands" in note for note in result.remarks)
 
 
 def test_contacts_are_compared_where_they_were_recorded(walk: Recording) -> None:
@@ -209,7 +209,7 @@ def test_a_command_that_is_missing_is_told(walk: Recording) -> None:
     result = replay([commanding(walk, 9)])
 
     assert result.difference is None
-    (note,) = result.notes
+    (note,) = result.remarks
     assert "lacks commands for 1 states" in note and str(walk.stamps_ns[9]) in note
 
 
@@ -397,7 +397,7 @@ def test_pushes_that_are_not_known_are_told(pendulum: Recording) -> None:
         replay([replace(sent, applied_wrench=partly)])
     assert replay([replace(pendulum, applied_wrench=partly)]).difference is None
     none = replay([replace(pendulum, applied_wrench=())])
-    assert none.difference is None and "without pushes" in none.notes[0]
+    assert none.difference is None and "without pushes" in none.remarks[0]
     wrong = WrenchArrays.of_rows(0, ["tail"], [(0.0,) * 6], [])
     with pytest.raises(RecordingError, match="unknown link 'tail'"):
         replay([replace(pendulum, applied_wrench=(wrong, *pendulum.applied_wrench[1:]))])

@@ -66,7 +66,7 @@ def ended(process: Process, directory: Path) -> Path:
 def test_a_walk_with_assistance_comes_again(walk: Path) -> None:
     result = replay(read_recordings(walk))
 
-    assert result.difference is None and result.notes == ()
+    assert result.difference is None and result.remarks == ()
     assert (result.states, result.episodes) == (241, 1)
     assert result.state_hashes[""] == json.loads((walk / "summary.json").read_text())["state_hash"]
     assert read_recording(walk).contacts  # were compared, too
@@ -119,7 +119,7 @@ def test_two_resets_a_pause_and_clipped_torques_come_again(
     hips = [recording.layout.joint(f"{side}_hip").entries for side in ("left", "right")]
     sizes = np.linalg.norm([recording.effort[:, hip] for hip in hips], axis=2)
     assert np.isclose(sizes, 200.0).sum() > 10  # were clipped
-    assert result.difference is None and result.notes == ()
+    assert result.difference is None and result.remarks == ()
     assert (result.states, result.episodes) == (158, 3)
 
 
@@ -161,7 +161,7 @@ def test_two_humanoids_in_one_world_come_again(processes: Processes, tmp_path: P
     result = replay(recordings)
 
     assert [recording.name for recording in recordings] == names
-    assert result.difference is None and result.notes == ()
+    assert result.difference is None and result.remarks == ()
     assert result.states == 121
     assert len(set(result.state_hashes.values())) == 2
     with pytest.raises(RecordingError, match="lacks right, in whose world left was"):
@@ -174,7 +174,7 @@ def test_an_arm_in_real_time_comes_again(processes: Processes, tmp_path: Path) -
 
     result = replay(read_recordings(directory))
 
-    assert result.difference is None and result.notes == ()
+    assert result.difference is None and result.remarks == ()
     assert result.states == 241
 
 

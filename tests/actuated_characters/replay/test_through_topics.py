@@ -28,7 +28,7 @@ from actuated_characters.replay.players.controller_parameters import (
 )
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.replay.through_topics import replay_commands, replay_states
-from actuated_characters.runs.run_directory import SUMMARY, read_figures
+from actuated_characters.runs.run_directory import SUMMARY, read_metrics
 from msgs_config.character.file import CHARACTERS_DIRECTORY
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder
@@ -236,7 +236,7 @@ def test_a_walk_comes_again_when_the_bag_commands_a_simulator(
 ) -> None:
     assert main(["replay", str(walk), "--through-topics"]) == 0
 
-    summary, _ = read_figures(walk)
+    summary, _ = read_metrics(walk)
     said = capsys.readouterr().out
     assert "identical: 121 states of humanoid, 1 episode" in said
     assert f"state hash {summary['state_hash']};" in said
@@ -253,9 +253,9 @@ def test_delays_clipped_torques_pushes_pauses_and_a_reset_come_again(eventful: P
 
     result = replay_commands(eventful, progress=told.append, tell=print)
 
-    summary, _ = read_figures(eventful)
+    summary, _ = read_metrics(eventful)
     assert result.difference is None
-    assert result.notes == []  # nothing was needed but the commands
+    assert result.remarks == []  # nothing was needed but the commands
     assert (result.states, result.episodes) == (TICKS + 1, 2)
     assert result.state_hashes == {"": summary["state_hash"]}
     assert told and told == sorted(told) and told[-1] <= TICKS + 1
@@ -268,7 +268,7 @@ def test_what_the_clock_decided_comes_again_from_the_efforts_applied(realtime: P
     result = by_commands(realtime)
 
     assert result.difference is None and result.states == len(recording.stamps_ns)
-    (note,) = result.notes
+    (note,) = result.remarks
     assert "efforts that were really applied" in note
 
 
@@ -437,7 +437,7 @@ def test_the_second_episode_alone_comes_again(late: Path, eventful: Path) -> Non
 
     result = by_commands(late)
 
-    assert result.difference is None and result.notes == []
+    assert result.difference is None and result.remarks == []
     assert (result.states, result.episodes) == (len(recording.stamps_ns), 1)
 
 

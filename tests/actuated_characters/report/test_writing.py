@@ -332,7 +332,7 @@ def test_a_bag_of_something_else_is_one_line(
 
 def test_texts_are_escaped_wherever_they_are() -> None:
     evil = "<img src=x onerror=alert(1)>\"'&"
-    section = Section(evil, tables=[Table([(evil,)], (evil,), evil)], notes=[evil])
+    section = Section(evil, tables=[Table([(evil,)], (evil,), evil)], remarks=[evil])
 
     page = Page(render_page(evil, [Chapter(evil, [section])]))
 

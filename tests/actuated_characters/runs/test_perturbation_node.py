@@ -20,7 +20,7 @@ from actuated_characters.runs.planned_wrenches import (
     plan_push,
     read_pushes,
 )
-from actuated_characters.runs.run_directory import prepare_directory, read_figures
+from actuated_characters.runs.run_directory import prepare_directory, read_metrics
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -100,7 +100,7 @@ class Made:
 def pushed(tmp_path_factory: pytest.TempPathFactory) -> Made:
     directory, mark = tmp_path_factory.mktemp("pushed") / "run", uuid.uuid4().hex
     most_alive = run_plan(plan_of(), directory, mark, pushes=PLANNED)
-    summary, _ = read_figures(directory)
+    summary, _ = read_metrics(directory)
     return Made(directory, read_recording(directory), summary, most_alive, len(family(mark)))
 
 
@@ -150,7 +150,7 @@ def test_a_run_in_one_process_takes_the_same_pushes(pushed: Made, tmp_path: Path
 
     run_in_process(plan_of(), tmp_path / "run", progress=lambda _: None, pushes=PLANNED)
 
-    summary, _ = read_figures(tmp_path / "run")
+    summary, _ = read_metrics(tmp_path / "run")
     assert summary["state_hash"] == pushed.summary["state_hash"]
 
 

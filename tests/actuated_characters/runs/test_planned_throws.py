@@ -23,7 +23,7 @@ from actuated_characters.runs.planned_throws import (
     plan_throws,
 )
 from actuated_characters.runs.planned_wrenches import plan_push
-from actuated_characters.runs.run_directory import prepare_directory, read_figures
+from actuated_characters.runs.run_directory import prepare_directory, read_metrics
 from actuated_characters.runs.throw_hits import (
     States,
     describe_hits,
@@ -260,7 +260,7 @@ def thrown(tmp_path_factory: pytest.TempPathFactory) -> Made:
     plan = make_plan("humanoid", 0.75, WALK, {"ball_lifetime": 0.25}, {"behaviour": "reactive"})
     throws, _ = plan_throws(plan, THROWN)
     run_plan(plan, directory, throws=throws)
-    summary, _ = read_figures(directory)
+    summary, _ = read_metrics(directory)
     return Made(plan, throws, directory, read_recording(directory), summary)
 
 
@@ -285,7 +285,7 @@ def test_a_run_in_one_process_takes_the_same_throws(thrown: Made, tmp_path: Path
 
     run_in_process(thrown.plan, tmp_path / "run", progress=lambda _: None, throws=thrown.throws)
 
-    summary, _ = read_figures(tmp_path / "run")
+    summary, _ = read_metrics(tmp_path / "run")
     assert summary["state_hash"] == thrown.summary["state_hash"]
 
 
@@ -345,7 +345,7 @@ def test_a_replay_through_topics_sends_the_balls_as_well(thrown: Made) -> None:
 def test_a_replay_is_identical_with_all_the_balls(thrown: Made) -> None:
     result = replay([thrown.recording])
 
-    assert result.identical and result.states == 181 and not result.notes
+    assert result.identical and result.states == 181 and not result.remarks
     assert result.state_hashes == {"": thrown.summary["state_hash"]}
 
 
@@ -380,7 +380,7 @@ def test_a_recording_of_throws_alone_is_replayed_without_them_and_says_so(thrown
 
     result = replay([silent])
 
-    assert any("'throw'" in note and "without balls" in note for note in result.notes)
+    assert any("'throw'" in note and "without balls" in note for note in result.remarks)
     assert not result.identical
 
 
@@ -393,12 +393,12 @@ def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path
 
     run_plan(plan, directory, write_bag=False, pushes=pushes, throws=throws)
 
-    summary, _ = read_figures(directory)
+    summary, _ = read_metrics(directory)
     assert summary["ticks"] == 60
     assert (summary["rejected_pushes"], summary["rejected_throws"]) == (0, 0)
     with_both = [tick.following for tick in ticks_in_process(plan, pushes, throws)]
     with_one = [tick.following for tick in ticks_in_process(plan, pushes)]
     assert not np.array_equal(with_both[-1].position, with_one[-1].position)  # it has hit
     run_in_process(plan, directory, progress=lambda _: None, pushes=pushes, throws=throws)
-    again, _ = read_figures(directory)
+    again, _ = read_metrics(directory)
     assert again["state_hash"] == summary["state_hash"]

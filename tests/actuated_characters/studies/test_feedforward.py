@@ -171,7 +171,7 @@ def test_the_force_that_no_joint_gives_is_the_weight_in_the_mean(inverted: Study
 
     assert list(curves) == ["time_s", "root_force_n", "root_torque_nm"]
     assert force[cycle].mean() == pytest.approx(weight, rel=0.05)  # mostly upwards
-    assert f"{weight:.0f} N upwards" in inverted.notes[2]
+    assert f"{weight:.0f} N upwards" in inverted.remarks[2]
 
 
 def test_the_weight_is_drawn_beside_the_force(inverted: StudyResult) -> None:

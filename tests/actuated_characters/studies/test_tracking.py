@@ -277,7 +277,7 @@ def test_assistance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert table["none",][force] == 0.0
     # a root that is commanded, by nothing, and one that may not be
     assert list(table["x 0",].values())[1:] == list(table["none",].values())[1:]
-    assert any("the same states" in note for note in result.notes)
+    assert any("the same states" in note for note in result.remarks)
 
 
 def test_weaker_assistance_keeps_its_damping_ratio() -> None:

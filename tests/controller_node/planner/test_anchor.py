@@ -32,7 +32,7 @@ def random_state(seed: int) -> tuple[FloatArray, FloatArray]:
 def test_undisturbed_it_stays_where_it_is_to_the_last_bit() -> None:
     anchor = Anchor()
     for tick in range(200):
-        anchor = anchor.follow(pushed(0.2 + 0.1j, velocity=0.4j), STILL, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(pushed(0.2 + 0.1j, velocity=0.4j), STILL, tick * PERIOD, PERIOD)
     position, velocity = random_state(0)
 
     seen, moving = anchor.to_reference_world(position, velocity)
@@ -68,7 +68,7 @@ def test_pushed_away_it_follows_and_turns() -> None:
 
     def look(time: float) -> Anchor:
         inside = (where - anchor.place) * complex(math.cos(anchor.yaw), -math.sin(anchor.yaw))
-        return anchor.follow(pushed(inside, heading=heading - anchor.yaw), STILL, time, PERIOD)
+        return anchor.advanced(pushed(inside, heading=heading - anchor.yaw), STILL, time, PERIOD)
 
     # Act
     places, yaws = [0j], [0.0]
@@ -92,7 +92,7 @@ def test_the_way_back_leads_to_the_clips_own_place_and_heading() -> None:
         at_ease = PlanarState(walking, 1.2, STILL.root)
         turn = complex(math.cos(anchor.yaw), math.sin(anchor.yaw))
         before = turn * walking + anchor.place
-        anchor = anchor.follow(at_ease, at_ease, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(at_ease, at_ease, tick * PERIOD, PERIOD)
         turn = complex(math.cos(anchor.yaw), math.sin(anchor.yaw))
         away.append(turn * walking + anchor.place - walking)
         assert abs(away[-1] + walking - before) <= 0.15 * PERIOD + 1e-12
@@ -122,7 +122,7 @@ def test_what_flips_over_turns_the_reference_by_how_far_it_is_off_about_z(lean: 
     state = PlanarState(0.4 + 0j, 0j, rotations.multiply(off, wanted))
 
     # Act
-    anchor = Anchor().follow(state, PlanarState(0j, 0j, wanted), 0.0, PERIOD)
+    anchor = Anchor().advanced(state, PlanarState(0j, 0j, wanted), 0.0, PERIOD)
 
     # Assert
     assert anchor.yaw == pytest.approx(0.2 * PERIOD / 1.0, rel=0.02)
@@ -133,7 +133,7 @@ def test_it_returns_while_it_gives_way_too() -> None:
     anchor = Anchor(0.5 + 0j, 0.4)
     fast = PlanarState(0j, 0.9 + 0j, STILL.root)  # where the reference is, but faster
     for tick in range(100):
-        anchor = anchor.follow(fast, STILL, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(fast, STILL, tick * PERIOD, PERIOD)
 
     assert anchor.gives_way(100 * PERIOD)
     assert abs(anchor.place) < 0.15

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from actuated_characters.metrics.run_metrics import Series, slider_columns
 from actuated_characters.report.charts import Marks, Panel, Timeline, png, series_chart
-from actuated_characters.runs.run_directory import PLOT, read_figures
+from actuated_characters.runs.run_directory import PLOT, read_metrics
 from actuated_characters.whole_files import write_whole
 from msgs_config.arrays import FloatArray
 
@@ -17,7 +17,7 @@ NOMINAL = 1e-3
 """Share of a limit below which an effort is nowhere near it, as if there were none."""
 
 
-def describe_figures(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+def describe_metrics(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Name and value of each figure that could be measured, as a table shows them."""
     known = {name: _shown(value) for name, value in summary.items() if value is not None}
     of_root = known.pop("root_actuators", "0")
@@ -32,16 +32,16 @@ def _shown(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def plot_figures(directory: Path) -> None:
+def plot_metrics(directory: Path) -> None:
     """Draw the figures that a run left in its directory into `plot.png` there.
 
     Raises:
         RecordingError: there are none, or it cannot be written.
     """
-    write_whole(directory / PLOT, png(draw_figures(*read_figures(directory))))
+    write_whole(directory / PLOT, png(draw_metrics(*read_metrics(directory))))
 
 
-def draw_figures(summary: Mapping[str, Any], series: Series) -> Figure:
+def draw_metrics(summary: Mapping[str, Any], series: Series) -> Figure:
     """One panel for each quantity that the character has; see `Measurement` for the arguments."""
     timeline = Timeline(series["time_s"], np.zeros(0, dtype=np.intp), Marks())
     title = f"{summary['character']}, {summary['ticks']} ticks"

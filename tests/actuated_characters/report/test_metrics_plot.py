@@ -7,8 +7,8 @@ import pytest
 
 from actuated_characters.cli import main
 from actuated_characters.metrics.run_metrics import COLUMNS
-from actuated_characters.report.run_figures import describe_figures, draw_figures
-from actuated_characters.runs.run_directory import read_figures
+from actuated_characters.report.metrics_plot import describe_metrics, draw_metrics
+from actuated_characters.runs.run_directory import read_metrics
 
 RUN = ("run", "--in-process", "--duration", "0.2")
 PANELS = {
@@ -29,7 +29,7 @@ def test_the_plot_has_a_panel_for_each_quantity_that_there_is(
 ) -> None:
     run(tmp_path / "run", "--character", character)
 
-    panels = draw_figures(*read_figures(tmp_path / "run")).axes
+    panels = draw_metrics(*read_metrics(tmp_path / "run")).axes
 
     assert {panel.get_ylabel() for panel in panels} == PANELS[character]
     for panel in panels:
@@ -45,7 +45,7 @@ def test_a_lifts_height_is_measured_against_its_target(
     pid = ("--set", "controller_node.law:=pid", "--set", "controller_node.gains.height.i:=100")
     run(tmp_path / "run", "--character", "lift", *pid)
 
-    summary, series = read_figures(tmp_path / "run")
+    summary, series = read_metrics(tmp_path / "run")
 
     apart = np.abs(series["position.height"] - series["reference_position.height"])
     assert summary["slider_error_mean_m"] == pytest.approx(apart.mean(), rel=1e-6)
@@ -61,7 +61,7 @@ def test_a_lifts_height_is_measured_against_its_target(
 def test_a_run_without_a_tick_has_a_plot_too() -> None:
     series = dict.fromkeys(COLUMNS, np.zeros(0))
 
-    figure = draw_figures({"character": "none", "ticks": 0, "body_weight_n": 9.81}, series)
+    figure = draw_metrics({"character": "none", "ticks": 0, "body_weight_n": 9.81}, series)
 
     assert not figure.axes[0].lines
 
@@ -70,7 +70,7 @@ def test_a_run_without_a_tick_has_a_plot_too() -> None:
     ("of_root", "told"), [(6, "34, 6 of them the root's assistance"), (0, "34")]
 )
 def test_actuators_of_the_root_are_told_apart(of_root: int, told: str) -> None:
-    figures = describe_figures(
+    figures = describe_metrics(
         {"actuators": 34, "root_actuators": of_root, "fell": None, "lost_messages": {}}
     )
 
