@@ -5,13 +5,13 @@ import time
 import numpy as np
 
 from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from benchmarks.support.nodes import Nodes
 from msgs_config.arrays import FloatArray
 from msgs_config.messages import topics
 
 
-def in_process(plan: Plan) -> FloatArray:
+def in_process(plan: RunPlan) -> FloatArray:
     """Durations (ticks,) in s of the ticks of a plan, without ROS."""
     times = [time.perf_counter()]
     for _ in ticks_in_process(plan):
@@ -19,7 +19,7 @@ def in_process(plan: Plan) -> FloatArray:
     return np.diff(times)[1:]  # the first one builds the world, too
 
 
-def over_topics(plan: Plan) -> list[dict[str, str]]:
+def over_topics(plan: RunPlan) -> list[dict[str, str]]:
     """What the simulator reports in a run of two processes without a recorder, to the end."""
     with Nodes() as nodes:
         nodes.start(topics.SIM_NODE, plan.simulator)

@@ -43,7 +43,7 @@ def measure_control_laws(console: Console) -> list[Ratio]:
     return ratios
 
 
-class _Known:
+class _CachedReference:
     """A reference that has been worked out before, so that it takes no time."""
 
     def __init__(self, reference: Reference) -> None:
@@ -65,7 +65,7 @@ def _ours(law: str, ticks: Sequence[Tick]) -> tuple[float, float]:
             lambda: [controller.compute_effort(t.state, first) for t in ticks], ticks
         )
 
-    return answers_us(_Known(plan.reference)), answers_us(plan.reference)
+    return answers_us(_CachedReference(plan.reference)), answers_us(plan.reference)
 
 
 def _duration_us(work: Callable[[], object], ticks: Sequence[Tick]) -> float:

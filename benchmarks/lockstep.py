@@ -4,7 +4,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from benchmarks.closed_loop import in_process, over_topics
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.round_trip import round_trips
@@ -31,7 +31,7 @@ def measure_lockstep(console: Console) -> list[Ratio]:
     return ratios
 
 
-def _measure(plan: Plan, table: Table) -> Ratio:
+def _measure(plan: RunPlan, table: Table) -> Ratio:
     """Add the rows of one character; the ratio of a tick over topics to what it is made of."""
     name, rate = plan.character.name, plan.simulator.integer("rate")
     layout = plan.character.layout

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.yardstick import yardstick_us
 from controller_node.controller import Controller
@@ -17,7 +17,7 @@ from controller_node.parameters import make_settings as make_control
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.compiled.rollout import Desired
 from controller_node.planner.contact_model import ContactModel
-from controller_node.planner.search.cost import Comparison
+from controller_node.planner.search.cost import ResidualModel
 from controller_node.planner.search.rollout_pool import RolloutPool
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -76,7 +76,7 @@ def _wall_time(workers: int) -> float:
 class _World:
     """The walk from a moment on without a plan: in the planner's model, and in the simulator."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: RunPlan) -> None:
         character = plan.character
         settings = planner_settings.make_settings(character, plan.controller)
         assert settings is not None
@@ -85,7 +85,7 @@ class _World:
         self._model = ContactModel(
             character, period_s=1.0 / _RATE, gravity=9.81, friction=settings.friction
         )
-        self._comparison = Comparison(character, self._model, settings)
+        self._residual_model = ResidualModel(character, self._model, settings)
         self._body = self._model.body(self._control.gains)
         self._dynamics = DynamicsModel(character)
         self._knots = np.zeros((2, character.layout.size - 6))
@@ -108,7 +108,7 @@ class _World:
             desired.positions[0], desired.velocities[0], self._knots[None], desired, self._body
         )
         assert sound.all()
-        foreseen, _ = self._comparison.balance(features[0])
+        foreseen, _ = self._residual_model.balance(features[0])
         centres = list(self._centres(moment))
         after = [round(ahead * _RATE) for ahead in _AHEAD]
         return np.array(

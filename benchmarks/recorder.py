@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from benchmarks.support.nodes import Nodes, processor_time
 from benchmarks.support.ratios import Ratio
 from msgs_config.messages import topics
@@ -27,20 +27,20 @@ class Timing:
     share: float  # of a core, that the recorder had; 0 without one
 
 
-def walk(duration: float) -> Plan:
+def walk(duration: float) -> RunPlan:
     """The run that is measured: the humanoid's walk by stable PD, at 1 kHz."""
     reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
     return make_plan(CHARACTER, duration, reference, {"rate": RATE}, {})
 
 
-def _real_time() -> Plan:
+def _real_time() -> RunPlan:
     """The same messages in real time, of a ragdoll: late efforts cannot make it diverge."""
     reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
     simulator = {"rate": RATE, "mode": "realtime"}
     return make_plan(CHARACTER, _REAL_TIME_DURATION, reference, simulator, {"law": "zero"})
 
 
-def time_run(plan: Plan, *, recorded: bool) -> Timing:
+def time_run(plan: RunPlan, *, recorded: bool) -> Timing:
     """Run simulator and controller, with a recorder of everything or without."""
     with Nodes() as nodes, tempfile.TemporaryDirectory() as directory:
         recorder = None

@@ -40,7 +40,7 @@ from msgs_config.messages.state import StampedReference, StampedState
 
 
 @dataclass(frozen=True)
-class Settings:
+class ControllerSettings:
     """The law, its gains and the balance, which may change from one tick to the next."""
 
     law: str
@@ -72,7 +72,7 @@ class Controller:
         self,
         character: Character,
         reference: Reference,
-        settings: Settings,
+        settings: ControllerSettings,
         *,
         rate_hz: int,
         gravity: float,
@@ -139,12 +139,12 @@ class Controller:
         return None if self.planner is None else self.planner.outlook
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> ControllerSettings:
         """Law, gains and limits in force."""
         return self._settings
 
     @settings.setter
-    def settings(self, settings: Settings) -> None:
+    def settings(self, settings: ControllerSettings) -> None:
         """Take others from the next state on. Raises as `check` does."""
         self.check(settings)
         if settings.law != self._settings.law:
@@ -154,7 +154,7 @@ class Controller:
         self._tracked.follows_velocity = settings.follows_velocity
         self._change_reference()  # its velocity may count, or no longer
 
-    def check(self, settings: Settings) -> None:
+    def check(self, settings: ControllerSettings) -> None:
         """Raise ConfigurationError if settings cannot be taken."""
         make_law(settings.law, self._context)
         if settings.balance is not None and self._balance is None:

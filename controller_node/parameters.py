@@ -9,7 +9,7 @@ from controller_node.balance import BalanceGains
 from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS, choose_behaviour
 from controller_node.behaviours.settings import check_terrain
 from controller_node.control_laws import LAWS, GainArrays
-from controller_node.controller import Controller, Settings
+from controller_node.controller import Controller, ControllerSettings
 from controller_node.effort_series import read_effort_series
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.factory import make_planner
@@ -143,7 +143,7 @@ def make_gains(character: Character, values: Values) -> GainArrays:
     return GainArrays(**gains, effort_limits=np.array(limits))
 
 
-def make_settings(character: Character, values: Values) -> Settings:
+def make_settings(character: Character, values: Values) -> ControllerSettings:
     """Law, gains and limits that the parameters' values say."""
     strengths = [
         1.0 if name in _ROOT_VECTORS else values.number(f"strength.{name}")
@@ -156,7 +156,7 @@ def make_settings(character: Character, values: Values) -> Settings:
             damping=values.number("balance.damping"),
             friction=values.number("balance.friction"),
         )
-    return Settings(
+    return ControllerSettings(
         law="zero" if _is_ragdoll(values) else values.text("law"),
         gains=make_gains(character, values),
         follows_velocity=values.text("reference_velocity") == "clip",

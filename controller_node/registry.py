@@ -11,7 +11,8 @@ Maker = TypeVar("Maker")
 class Registry(Generic[Maker]):
     """Functions by name, each with the parameters that it reads.
 
-    A module registers its functions when it is imported: `@REFERENCES.register("step", *PARAMETERS)`.
+    A module registers its functions when it is imported, by
+    `@REFERENCES.register("step", *PARAMETERS)`.
     """
 
     def __init__(self) -> None:

@@ -25,7 +25,7 @@ from sensor_msgs.msg import MultiDOFJointState
 REJECTED_AFTER = 1.0  # s of simulated time; a push that was not applied by then was rejected
 
 
-class PerturbationNode(Node):
+class WrenchPublisher(Node):
     """Publishes one push on `external_wrench`; reads `applied_wrench` until it is over."""
 
     def __init__(self, arguments):
@@ -127,7 +127,7 @@ def main():
     arguments = parse()
     rclpy.init()
     try:
-        node = PerturbationNode(arguments)
+        node = WrenchPublisher(arguments)
         while rclpy.ok() and not node.over.done():  # a wait without end may miss a SIGTERM
             rclpy.spin_until_future_complete(node, node.over, timeout_sec=0.5)
         return node.report() if node.over.done() else 1

@@ -10,7 +10,7 @@ from actuated_characters.bags.directory_lock import DirectoryLock, find_writer
 from actuated_characters.bags.format.metadata import METADATA
 from actuated_characters.bags.format.storage import reason
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.rewriting import Contents, Progress, rewrite, storage_files
+from actuated_characters.bags.rewriting import Progress, RecoveredContents, rewrite, storage_files
 from actuated_characters.metrics.collector import CONFIGURATION, HEARD, MetricsCollector
 from actuated_characters.runs.run_directory import BAG, SUMMARY, metrics_directory, write_metrics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
@@ -27,7 +27,7 @@ class Recovered:
     """The result of `recover`, and where it is."""
 
     bag: Path
-    contents: Contents
+    contents: RecoveredContents
     damaged: Path | None  # the original; None where the bag was complete and nothing was done
     measured: list[Path] = field(default_factory=list)  # directories with figures rebuilt
     unchanged: list[Path] = field(default_factory=list)  # with the recorder's own, of the whole run
@@ -104,9 +104,9 @@ def _finish_swap(bag: Path) -> None:
         shutil.rmtree(new.parent, ignore_errors=True)
 
 
-def _read_whole(bag: Path, progress: Progress) -> Contents | None:
+def _read_whole(bag: Path, progress: Progress) -> RecoveredContents | None:
     """Count the messages of a bag that can be read to its end; None for any other."""
-    contents = Contents()
+    contents = RecoveredContents()
     progress("checking", None)
     try:
         for message in read_messages(bag):

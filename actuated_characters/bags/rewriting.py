@@ -30,7 +30,7 @@ _MOST_NAMED = 3  # files in an error
 
 
 @dataclass
-class Contents:
+class RecoveredContents:
     """The messages of a bag, counted."""
 
     counts: Counter[str] = field(default_factory=Counter)  # messages of each topic
@@ -43,7 +43,7 @@ class Contents:
         self.last_log_time_ns = max(self.last_log_time_ns, log_time_ns)
 
 
-def rewrite(damaged: Path, new: Path, progress: Progress) -> Contents:
+def rewrite(damaged: Path, new: Path, progress: Progress) -> RecoveredContents:
     """Write all that can be read of a damaged bag into a new one.
 
     Args:
@@ -55,7 +55,7 @@ def rewrite(damaged: Path, new: Path, progress: Progress) -> Contents:
         RecordingError: there is nothing that can be read, or the new bag cannot be written.
     """
     files = [McapFile(file) for file in storage_files(damaged)]
-    contents = Contents()
+    contents = RecoveredContents()
     messages = _salvage(files, contents, progress)
     first = next(messages, None)
     if first is None:
@@ -110,7 +110,7 @@ def storage_files(bag: Path) -> list[Path]:
 
 
 def _salvage(
-    files: list[McapFile], contents: Contents, progress: Progress
+    files: list[McapFile], contents: RecoveredContents, progress: Progress
 ) -> Iterator[tuple[StoredTopic, bytes, int]]:
     """Yield topic, content and log time (ns) of the messages of all files, one after the other."""
     types: dict[str, str] = {}

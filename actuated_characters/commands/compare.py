@@ -15,7 +15,7 @@ from actuated_characters.commands.common.tables import make_table, show
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.report.comparison.comparison import Comparison
+    from actuated_characters.report.comparison.comparison import RecordingComparison
 
 _DIFFERENT = 1  # exit code, like that of diff
 _MOST_SECONDS = 20  # in the table
@@ -75,7 +75,7 @@ def _compare(options: argparse.Namespace) -> int:
     return 0 if all(comparison.identical for comparison in comparisons) else _DIFFERENT
 
 
-def _print(console: Console, comparison: "Comparison", tolerance: float | None) -> None:
+def _print(console: Console, comparison: "RecordingComparison", tolerance: float | None) -> None:
     named = f"{comparison.name}: " if comparison.name else ""
     console.print(escape(named + _verdict(comparison, tolerance)), soft_wrap=True)
     first = comparison.first
@@ -99,7 +99,7 @@ def _print(console: Console, comparison: "Comparison", tolerance: float | None) 
         _print_differences(console, "parameters of controller_node", comparison.controller)
 
 
-def _verdict(comparison: "Comparison", tolerance: float | None) -> str:
+def _verdict(comparison: "RecordingComparison", tolerance: float | None) -> str:
     ours, theirs = comparison.states
     how = "to the last bit" if tolerance is None else f"within {tolerance:g}"
     same = "different" if comparison.first is not None else f"identical {how}"
@@ -111,7 +111,7 @@ def _verdict(comparison: "Comparison", tolerance: float | None) -> str:
     )
 
 
-def _growth_table(comparison: "Comparison") -> Table:
+def _growth_table(comparison: "RecordingComparison") -> Table:
     seconds = comparison.growth.by_second()
     stride = -(-len(seconds) // _MOST_SECONDS)
     return make_table(
@@ -121,7 +121,7 @@ def _growth_table(comparison: "Comparison") -> Table:
     )
 
 
-def _figures_table(comparison: "Comparison") -> Table:
+def _figures_table(comparison: "RecordingComparison") -> Table:
     rows = []
     for name, values in comparison.metrics.items():
         shown = [str(v)[:_SHOWN_OF_A_HASH] if name == _HASH else show(v, 6) for v in values]

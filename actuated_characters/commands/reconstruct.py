@@ -109,7 +109,7 @@ def _job(options: argparse.Namespace) -> "Job":
     """The search that the options describe; raises ActuatedCharactersError if it cannot be."""
     from actuated_characters.reconstruction.problem import Problem, duration_of
     from actuated_characters.reconstruction.reconstruction import Job
-    from actuated_characters.reconstruction.search import Settings
+    from actuated_characters.reconstruction.search import SearchSettings
     from sim_node.node_settings import make_node_settings
 
     workers = options.workers if options.workers is not None else os.cpu_count() or 1
@@ -129,7 +129,7 @@ def _job(options: argparse.Namespace) -> "Job":
         given["controller_node"],
         tuple(options.push),
     )
-    settings = Settings(options.worlds, options.kept, options.window, options.seed)
+    settings = SearchSettings(options.worlds, options.kept, options.window, options.seed)
     settings.check()
     plan = problem.plan()  # mistakes are reported before anything begins
     problem.planned_pushes(plan)

@@ -25,7 +25,7 @@ from actuated_characters.commands.common.tables import make_table
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.runs.plan import Plan
+    from actuated_characters.runs.plan import RunPlan
     from actuated_characters.runs.planned_throws import PlannedThrow
     from actuated_characters.runs.planned_wrenches import PlannedPush
     from controller_node.references.files.reconstructed import FoundWith
@@ -161,7 +161,7 @@ def _run(options: argparse.Namespace) -> None:
 class PlannedRun:
     """A run as the command's options describe it."""
 
-    plan: "Plan"
+    plan: "RunPlan"
     pushes: "Sequence[PlannedPush]"
     throws: "Sequence[PlannedThrow]"
     warnings: Sequence[str]  # that the user should read
@@ -192,7 +192,7 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
     return PlannedRun(plan, pushes, throws, [*plan.warnings, *in_the_way])
 
 
-def _check_options(options: argparse.Namespace, plan: "Plan") -> None:
+def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
     """Raise ConfigurationError where options contradict each other."""
     from sim_node.node_settings import make_node_settings
 
@@ -253,7 +253,7 @@ def _run_plan(
     return describe_hits(plan, throws, states)
 
 
-def _motion_name(plan: "Plan") -> str:
+def _motion_name(plan: "RunPlan") -> str:
     """The name of the motion that a plan tracks."""
     kind = plan.controller.text("reference")
     return plan.controller.text(kind) if kind in ("clip", "keyframes") else kind
@@ -268,7 +268,7 @@ def _reference(options: argparse.Namespace) -> dict[str, object]:
     return {} if options.reference is None else {"reference": options.reference}
 
 
-def _pushes(texts: list[str], plan: "Plan", found_in: "FoundWith | None") -> "list[PlannedPush]":
+def _pushes(texts: list[str], plan: "RunPlan", found_in: "FoundWith | None") -> "list[PlannedPush]":
     """Those of `--push`; without any, those with which a reconstruction was found."""
     from actuated_characters.runs.planned_wrenches import parse_push, parse_pushes_within
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_wrenches import PlannedPush, parse_push
 from controller_node.planner.settings import PREDICTIVE, RECORDED
 from controller_node.references.files.clip import read_clip
@@ -30,11 +30,11 @@ class Problem:
     controller: Mapping[str, object] = field(default_factory=dict)
     pushes: tuple[str, ...] = ()  # LINK:FX,FY,FZ@S, which come in the search, too
 
-    def planned_pushes(self, plan: Plan) -> tuple[PlannedPush, ...]:
+    def planned_pushes(self, plan: RunPlan) -> tuple[PlannedPush, ...]:
         """The pushes of its plan. Raises ConfigurationError if one is wrong."""
         return tuple(parse_push(text, plan) for text in self.pushes)
 
-    def plan(self) -> Plan:
+    def plan(self) -> RunPlan:
         """The run in which the motion is planned, with one thread.
 
         Raises:
@@ -42,7 +42,7 @@ class Problem:
         """
         return self._plan(self.clip, {**_PLANNING, **self.controller, "plan.workers": 1})
 
-    def plan_of(self, file: Path) -> Plan:
+    def plan_of(self, file: Path) -> RunPlan:
         """The run in which a file's plan is played. Raises ActuatedCharactersError likewise."""
         return self._plan(str(file), self.played_with)
 
@@ -51,7 +51,7 @@ class Problem:
         """The controller's parameters with which a file is played."""
         return {**self.controller, "planner": RECORDED}
 
-    def _plan(self, clip: str, controller: Mapping[str, object]) -> Plan:
+    def _plan(self, clip: str, controller: Mapping[str, object]) -> RunPlan:
         reference = {"reference": "clip", "clip": clip}
         return make_plan(self.character, self.duration, reference, self.simulator, controller)
 

@@ -12,11 +12,11 @@ from actuated_characters.reconstruction.checkpoint import (
     write_checkpoint,
 )
 from actuated_characters.reconstruction.problem import Problem
-from actuated_characters.reconstruction.search import Progress, Settings, result, search
+from actuated_characters.reconstruction.search import Progress, SearchSettings, result, search
 from actuated_characters.reconstruction.tree import Node
 from actuated_characters.reconstruction.verification import ReconstructionMetrics, verified
 from actuated_characters.reconstruction.workers import Workers
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.whole_files import write_whole
 from controller_node.references.files.clip import clip_path
 from controller_node.references.files.reconstructed import PLAN, RECONSTRUCTION
@@ -38,7 +38,7 @@ class Job:
     """What is to be reconstructed, how, and into which file."""
 
     problem: Problem
-    settings: Settings
+    settings: SearchSettings
     output: Path
     workers: int = 1
     resume: bool = False
@@ -91,7 +91,7 @@ def reconstruct(
     return Reconstruction(metrics, windows)
 
 
-def _write(job: Job, plan: Plan, best: Node, metrics: ReconstructionMetrics | None) -> None:
+def _write(job: Job, plan: RunPlan, best: Node, metrics: ReconstructionMetrics | None) -> None:
     """Write the file: the clip, the plan that keeps it, and what they are of."""
     problem, rate = job.problem, plan.simulator.integer("rate")
     delay = plan.simulator.integer(COMMAND_DELAY.name)

@@ -26,7 +26,7 @@ _LARGEST_SEED = 2**32
 
 
 @dataclass(frozen=True)
-class Settings:
+class SearchSettings:
     """A search's settings: the same ones give the same result on any number of processes."""
 
     worlds: int = 8
@@ -82,7 +82,7 @@ class Worlds(Protocol):
 def search(
     worlds: Worlds,
     windows: int,
-    settings: Settings,
+    settings: SearchSettings,
     progress: Progress,
     report: Callable[[Progress], None],
 ) -> int | None:
@@ -129,7 +129,7 @@ def result(progress: Progress) -> Node | None:
     return min(progress.levels[-1], key=lambda node: float(np.mean([n.cost for n in node.path])))
 
 
-def _next_level(worlds: Worlds, settings: Settings, progress: Progress) -> list[Node]:
+def _next_level(worlds: Worlds, settings: SearchSettings, progress: Progress) -> list[Node]:
     """The nodes that are kept of the next window, the best first; none if all are lost."""
     parents: list[Node | None] = list(progress.levels[-1]) if progress.levels else [None]
     _come_again(worlds, [node for node in parents if node is not None and node.place is None])
@@ -163,7 +163,7 @@ def _value(node: Node) -> float:
     return float(np.mean(recent)) + node.ahead
 
 
-def _seed(settings: Settings, progress: Progress, world: int) -> int:
+def _seed(settings: SearchSettings, progress: Progress, world: int) -> int:
     return (settings.seed * _MOST_FAILURES + progress.failures) * _MOST_WORLDS + world
 
 

@@ -109,7 +109,7 @@ def compare_world(
         found: The replayed states of each, the first one first.
         tolerance: Largest difference that is accepted, in rad, m, rad/s and m/s, of positions and
             velocities alone; None: every bit has to be the same, those of efforts too.
-        notes: Of the result.
+        remarks: Of the result.
     """
     count = min(len(states[POSITION]) for states in found)
     compared = QUANTITIES if tolerance is None else (POSITION, VELOCITY)

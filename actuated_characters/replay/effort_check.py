@@ -33,7 +33,7 @@ class CommandCheck:
     silent_stamps_ns: tuple[int, ...]  # of states to which the recording has not all commands
 
 
-class _Tick(NamedTuple):
+class _RecordedTick(NamedTuple):
     """A tick of the lockstep, and the commands that it may have applied."""
 
     row: int  # of its effort, and of the state that it begins with
@@ -44,7 +44,7 @@ class _Tick(NamedTuple):
 
 
 def first_uncommanded(recordings: Sequence[Recording]) -> tuple[Difference | None, list[str]]:
-    """The first effort that no command can have led to, and notes on what could not be checked.
+    """The first effort that no command can have led to, and remarks on what could not be checked.
 
     Raises:
         RecordingError: see `check_commands`.
@@ -137,7 +137,7 @@ class _Check:
         fits = len(indices) == len(command.efforts) and self._commanded[indices].all()
         return indices if fits else None
 
-    def _tick(self, row: int, first: int, previous: FloatArray) -> _Tick:
+    def _tick(self, row: int, first: int, previous: FloatArray) -> _RecordedTick:
         """The tick of a row, in an episode that begins at row `first`."""
         answered = row - self._delay if row - self._delay >= first else None
         fills = answered is None or self._on_timeout in ("hold", "zero")
@@ -149,9 +149,9 @@ class _Check:
             silent[indices] = False
         if answered is not None and silent.any():
             self.silent_rows.append(answered)
-        return _Tick(row, answered, previous, effort, silent)
+        return _RecordedTick(row, answered, previous, effort, silent)
 
-    def _settle(self, tick: _Tick) -> Difference | None:
+    def _settle(self, tick: _RecordedTick) -> Difference | None:
         """Look for other commands of the tick that led to what was applied, joint by joint."""
         applied = self._recording.effort[tick.row]
         candidates = [tick.collected]
@@ -174,7 +174,7 @@ class _Check:
                     return self._difference(tick, entries.start, clipped[0])
         return None
 
-    def _difference(self, tick: _Tick, start: int, clipped: FloatArray) -> Difference:
+    def _difference(self, tick: _RecordedTick, start: int, clipped: FloatArray) -> Difference:
         """The difference of the vector that begins at an entry: of that of its entries it is in."""
         applied = self._recording.effort[tick.row]
         # where one entry was changed beyond the limit, the clip has changed the others with it

@@ -71,7 +71,7 @@ def of_character(recording: Recording) -> str:
 
 
 def check_pushes(recording: Recording) -> list[str]:
-    """Check that the recording has the pushes that acted in each tick; returns notes.
+    """Check that the recording has the pushes that acted in each tick; returns remarks.
 
     Raises:
         RecordingError: there were pushes, and it does not have all that acted.
@@ -94,7 +94,7 @@ def check_pushes(recording: Recording) -> list[str]:
 
 
 def check_throws(recording: Recording) -> list[str]:
-    """Check that the recording has the throw of each ball; returns notes.
+    """Check that the recording has the throw of each ball; returns remarks.
 
     Raises:
         RecordingError: there were balls, and it does not have how they were thrown.
@@ -174,7 +174,7 @@ def make_pushes(recording: Recording, row: int, tick: int) -> list[ExternalWrenc
 
 
 def read_world(path: Path, number: int = 0) -> tuple[list[Recording], list[str]]:
-    """Read the recordings of one of a bag's worlds, cut to the states that all have; and notes.
+    """Read the recordings of one of a bag's worlds, cut to the states that all have; and remarks.
 
     Raises:
         ActuatedCharactersError: the bag cannot be read, or its worlds are not whole.
@@ -183,7 +183,7 @@ def read_world(path: Path, number: int = 0) -> tuple[list[Recording], list[str]]
 
 
 def cut_world(together: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """Cut the recordings of a world to the states that all have; returns them, and notes.
+    """Cut the recordings of a world to the states that all have; returns them, and remarks.
 
     They begin with the first state of an episode that all have. A recorder that was stopped may
     have one state more of one than of another.

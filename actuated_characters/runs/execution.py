@@ -8,7 +8,7 @@ from pathlib import Path
 
 from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.runs.in_process import Watch, ticks_in_process
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_files import write_planned
 from actuated_characters.runs.planned_throws import PlannedThrow
 from actuated_characters.runs.planned_wrenches import PlannedPush
@@ -43,7 +43,7 @@ Progress = Callable[[int], None]
 
 
 def run_over_topics(
-    plan: Plan,
+    plan: RunPlan,
     directory: Path,
     *,
     write_bag: bool,
@@ -151,7 +151,7 @@ def _wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> 
 
 
 def run_in_process(
-    plan: Plan,
+    plan: RunPlan,
     directory: Path,
     *,
     progress: Progress,

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from actuated_characters.metrics.run_metrics import Tick
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_throws import PlannedThrow
 from actuated_characters.runs.planned_wrenches import PlannedPush, push_schedule
 from controller_node.controller import Controller
@@ -20,7 +20,7 @@ Watch = Callable[[Simulation], object]
 
 
 def ticks_in_process(
-    plan: Plan,
+    plan: RunPlan,
     pushes: Sequence[PlannedPush] = (),
     throws: Sequence[PlannedThrow] = (),
     controller: Controller | None = None,

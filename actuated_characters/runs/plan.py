@@ -35,7 +35,7 @@ _LOCKSTEP_TIMEOUT = 60.0  # s that one answer may take, on a machine that may be
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """A run's character, reference and parameters; both sides agree with each other."""
 
     character: Character
@@ -58,7 +58,7 @@ def make_plan(
     controller_settings: Mapping[str, object],
     *,
     loaded: Character | None = None,
-) -> Plan:
+) -> RunPlan:
     """Resolve all parameters of both sides, and the initial state that the reference begins with.
 
     Args:
@@ -88,7 +88,7 @@ def make_plan(
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings + simulator.warnings + controller.warnings
-    return Plan(character, motion.reference, simulator, controller, warnings)
+    return RunPlan(character, motion.reference, simulator, controller, warnings)
 
 
 def _with_reference(

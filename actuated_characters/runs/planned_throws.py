@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_files import Planned, read_planned
 from controller_node.behaviours.posture import Posture
 from msgs_config.arrays import FloatArray
@@ -108,7 +108,7 @@ def _number(key: str, value: str, what: str = "a number") -> float:
     return found
 
 
-def plan_throw(plan: Plan, request: ThrowRequest) -> tuple[PlannedThrow, tuple[str, ...]]:
+def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tuple[str, ...]]:
     """A throw that hits a link, where the reference has it at that time, and the links in its way.
 
     The ball is let go as many whole ticks before as it needs for the straight way at its speed,
@@ -145,7 +145,7 @@ def plan_throw(plan: Plan, request: ThrowRequest) -> tuple[PlannedThrow, tuple[s
     return PlannedThrow(TickClock(rate).stamp_ns(1 + first), throw), impact.before
 
 
-def _check_ground(plan: Plan, request: ThrowRequest, lowest: float) -> None:
+def _check_ground(plan: RunPlan, request: ThrowRequest, lowest: float) -> None:
     """Raise ConfigurationError if the lowest point of a ball's way, m, is in the ground."""
     if plan.simulator.text("terrain") == PLANE and lowest < 0.0:
         raise ConfigurationError(
@@ -154,7 +154,7 @@ def _check_ground(plan: Plan, request: ThrowRequest, lowest: float) -> None:
         )
 
 
-def plan_throws(plan: Plan, texts: Sequence[str]) -> tuple[list[PlannedThrow], list[str]]:
+def plan_throws(plan: RunPlan, texts: Sequence[str]) -> tuple[list[PlannedThrow], list[str]]:
     """The throws that texts describe, see `parse_throw`; and warnings.
 
     Raises:

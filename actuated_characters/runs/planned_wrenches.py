@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_files import Planned, read_planned
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.clock import TickClock
@@ -34,7 +34,7 @@ def read_pushes(file: Path) -> list[PlannedPush]:
     return read_planned(file, "pushes", lambda fields: PlannedPush(**fields))
 
 
-def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
+def push_schedule(plan: RunPlan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
     """The pushes of a plan as its simulator takes them, without topics."""
     schedule, clock = WrenchQueue(plan.character), TickClock(plan.simulator.integer("rate"))
     for push in pushes:
@@ -49,7 +49,7 @@ def push_schedule(plan: Plan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
     return schedule
 
 
-def parse_push(text: str, plan: Plan) -> PlannedPush:
+def parse_push(text: str, plan: RunPlan) -> PlannedPush:
     """The push of a text `LINK:FX,FY,FZ@S`: N, world axes, and s since the first state.
 
     Raises:
@@ -58,7 +58,7 @@ def parse_push(text: str, plan: Plan) -> PlannedPush:
     return plan_push(plan, *_split(text))
 
 
-def parse_pushes_within(texts: Sequence[str], plan: Plan) -> list[PlannedPush]:
+def parse_pushes_within(texts: Sequence[str], plan: RunPlan) -> list[PlannedPush]:
     """The pushes of texts, without those that would begin after the run.
 
     Raises:
@@ -86,7 +86,9 @@ def _split(text: str) -> tuple[str, tuple[float, float, float], float]:
     return found[1], (x, y, z), time
 
 
-def plan_push(plan: Plan, link: str, force: tuple[float, float, float], time: float) -> PlannedPush:
+def plan_push(
+    plan: RunPlan, link: str, force: tuple[float, float, float], time: float
+) -> PlannedPush:
     """A force (N, world axes) on a link's centre of mass, at a time in s since the first state.
 
     Raises:

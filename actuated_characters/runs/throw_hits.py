@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_throws import PlannedThrow
 from msgs_config.arrays import FloatArray
 from sim_node.physics.simulation import Simulation
@@ -36,7 +36,9 @@ def watch_states(states: States, simulation: Simulation) -> None:
     states.append((simulation.characters[0].state.position, simulation.ball_motion()))
 
 
-def describe_hits(plan: Plan, throws: Sequence[PlannedThrow], states: States | None) -> list[str]:
+def describe_hits(
+    plan: RunPlan, throws: Sequence[PlannedThrow], states: States | None
+) -> list[str]:
     """Of each throw a few words: whether the ball has hit the character, where, and when."""
     if states is None:
         return ["without a bag that has 'thrown' it is not known whether it hit"] * len(throws)
@@ -49,7 +51,7 @@ def describe_hits(plan: Plan, throws: Sequence[PlannedThrow], states: States | N
 
 
 def find_hit(
-    plan: Plan, throw: PlannedThrow, ball: int, states: States
+    plan: RunPlan, throw: PlannedThrow, ball: int, states: States
 ) -> tuple[float, str] | None:
     """When a ball has first touched the character, and the link; None if it never has.
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
@@ -48,7 +48,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     ]
 
 
-def _growth_by_theory(plan: Plan, rate: int, delay: int) -> float:
+def _growth_by_theory(plan: RunPlan, rate: int, delay: int) -> float:
     """Growth a tick of small deviations from the rest pose in the air, under the plan's gains.
 
     `rate` is that of control in Hz, `delay` the ticks by which commands come late.
@@ -67,7 +67,7 @@ def _growth_by_theory(plan: Plan, rate: int, delay: int) -> float:
     )
 
 
-def _measure(runner: StudyRunner, plan: Plan, rate: int, delay: int) -> Row:
+def _measure(runner: StudyRunner, plan: RunPlan, rate: int, delay: int) -> Row:
     substeps = _ENGINE_RATE // rate
     simulator = {"rate": rate, "substeps": substeps, "command_delay_ticks": delay}
     case = RunSpec(f"{rate}Hz_{delay}ticks", _CHARACTER, _DURATION, WALK, simulator)

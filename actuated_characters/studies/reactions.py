@@ -45,7 +45,7 @@ _POSES = {  # of a run: what is seen, and when, s
 
 
 @dataclass(frozen=True)
-class Reaction:
+class HitEffects:
     """The effects of a hit."""
 
     impulse: float  # N s, that the ball has lost until shortly after it touched
@@ -90,7 +90,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     )
 
 
-def _row(planned: float, reaction: Reaction, run: Recording) -> Row:
+def _row(planned: float, reaction: HitEffects, run: Recording) -> Row:
     spans = mode_spans(run)
     lasting = {
         f"{mode} (s)": sum((span.duration for span in spans if span.mode == mode), start=0.0)
@@ -105,7 +105,7 @@ def _row(planned: float, reaction: Reaction, run: Recording) -> Row:
     }
 
 
-def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
+def measure(run: Recording, alone: Recording, hit: float) -> HitEffects:
     """The effects of a hit at a time in s, by comparison with the same run without it.
 
     Args:
@@ -123,7 +123,7 @@ def measure(run: Recording, alone: Recording, hit: float) -> Reaction:
     back: float | None = 0.0
     if last is not None:
         back = None if last == len(times) - 1 else float(times[last + 1]) - hit
-    return Reaction(
+    return HitEffects(
         impulse=lost_momentum(run, hit),
         peak=float(displacement[after & (times <= hit + _PEAK)].max()),
         back=back,
@@ -169,7 +169,7 @@ def _draw(
     result: StudyResult,
     alone: Recording,
     hits: Mapping[float, Recording],
-    reactions: Mapping[float, Reaction],
+    reactions: Mapping[float, HitEffects],
 ) -> None:
     """Two panels an impulse: the root's displacement and the joint error, and the modes."""
     title = "hit against the chest at 1 s; the assistance is full in TRACK and BLEND"

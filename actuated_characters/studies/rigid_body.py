@@ -15,8 +15,8 @@ from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import HOLD, RunSpec, StudyRunner
 from actuated_characters.studies.theory.euler import (
     Load,
-    Motion,
     RigidBody,
+    RigidBodyMotion,
     angular_acceleration,
     move,
     net_load,
@@ -63,8 +63,8 @@ class Observed:
 
     trial: Trial
     recording: Recording
-    motion: Motion  # (t + 1) simulated states
-    theory: Motion  # at the same times
+    motion: RigidBodyMotion  # (t + 1) simulated states
+    theory: RigidBodyMotion  # at the same times
     momenta: Momenta
 
     @property
@@ -143,14 +143,16 @@ def _observe(runner: StudyRunner, trial: Trial) -> Observed:
     )
     run = runner.run(case).recording
     position, velocity = run.position, run.velocity
-    simulated = Motion(
+    simulated = RigidBodyMotion(
         position[:, :3], rotations.exp(position[:, 3:6]), velocity[:, :3], velocity[:, 3:6]
     )
     theory = move(RigidBody(trial.box.mass, trial.box.inertia), simulated, trial.loads, run.times)
     return Observed(trial, run, simulated, theory, momenta(run.character, position, velocity))
 
 
-def euler_residual(inertia: FloatArray, motion: Motion, torque: FloatArray, step: float) -> float:
+def euler_residual(
+    inertia: FloatArray, motion: RigidBodyMotion, torque: FloatArray, step: float
+) -> float:
     """The largest `I (w' - w) / h + w x I w - tau` of all ticks, relative to its largest part.
 
     `torque` (t, 3) is in the world, at the begin of each tick of `step` s.

@@ -28,7 +28,7 @@ from rich.table import Table  # noqa: E402
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
 from actuated_characters.metrics.error_measures import is_lost, joint_errors  # noqa: E402
 from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
-from actuated_characters.runs.plan import Plan, make_plan  # noqa: E402
+from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
 from actuated_characters.runs.planned_wrenches import parse_pushes_within  # noqa: E402
 from controller_node.parameters import make_controller  # noqa: E402
 from controller_node.references.files.clip import available_clips, read_clip  # noqa: E402
@@ -149,7 +149,7 @@ def _with_mass(character: str, factor: float, folder: Path) -> str:
     return str(folder / file.name)
 
 
-def _plan(task: Task, character: str) -> Plan:
+def _plan(task: Task, character: str) -> RunPlan:
     settings = node_settings(task.settings, NODES)
     cycle = float(read_clip(load_character(character), task.clip).times[-1])
     return make_plan(
@@ -162,7 +162,7 @@ def _plan(task: Task, character: str) -> Plan:
     )
 
 
-def _rate(plan: Plan) -> int:
+def _rate(plan: RunPlan) -> int:
     return plan.simulator.integer("rate")
 
 

@@ -29,7 +29,7 @@ from rich.table import Table  # noqa: E402
 
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
 from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
-from actuated_characters.runs.plan import Plan, make_plan  # noqa: E402
+from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
 from actuated_characters.runs.planned_throws import PlannedThrow, plan_throws  # noqa: E402
 from actuated_characters.runs.planned_wrenches import PlannedPush, plan_push  # noqa: E402
 from benchmarks.planner.push_picture import draw  # noqa: E402
@@ -138,7 +138,7 @@ def _pushes(name: str, number: int) -> Iterator[Impulse]:
 class _Watch:
     """What is seen of a walk."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: RunPlan) -> None:
         self._centre_at = DynamicsModel(plan.character).centre_of_mass_at
         self.rate = plan.simulator.integer("rate")
         self._time = 0.0  # s
@@ -209,7 +209,7 @@ def attempt(walk: Walk) -> WalkResult:
     return WalkResult(walk, watch.fell_at, upright, tuple(watch.errors), watch.away, watch.missed)
 
 
-def _planned(plan: Plan, walk: Walk) -> list[PlannedPush]:
+def _planned(plan: RunPlan, walk: Walk) -> list[PlannedPush]:
     lasts = KINDS[walk.kind].lasts
     return [
         plan_push(plan, LINK, (x / lasts, y / lasts, 0.0), push.time)
@@ -218,7 +218,7 @@ def _planned(plan: Plan, walk: Walk) -> list[PlannedPush]:
     ]
 
 
-def _throws(plan: Plan, walk: Walk) -> list[PlannedThrow]:
+def _throws(plan: RunPlan, walk: Walk) -> list[PlannedThrow]:
     """A ball for each push, from where it comes."""
     texts = [
         BALL.format(push.time, math.degrees(math.atan2(-push.impulse[1], -push.impulse[0])))
@@ -227,7 +227,7 @@ def _throws(plan: Plan, walk: Walk) -> list[PlannedThrow]:
     return plan_throws(plan, texts)[0]
 
 
-def _plan(walk: Walk) -> Plan:
+def _plan(walk: Walk) -> RunPlan:
     given, kind = node_settings(list(walk.settings), NODES), KINDS[walk.kind]
     simulator = {"wrench_duration": kind.lasts, "ball_lifetime": BALL_LIFETIME}
     own = {"plan.seed": walk.seed, "plan.workers": 1, "behaviour": kind.behaviour}

@@ -19,7 +19,7 @@ from rich.table import Table  # noqa: E402
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
 from actuated_characters.reconstruction.problem import Problem, duration_of  # noqa: E402
 from actuated_characters.reconstruction.reconstruction import Job, reconstruct  # noqa: E402
-from actuated_characters.reconstruction.search import Settings  # noqa: E402
+from actuated_characters.reconstruction.search import SearchSettings  # noqa: E402
 from controller_node.references.files.clip import available_clips  # noqa: E402
 from msgs_config.character.loading import load_character  # noqa: E402
 from msgs_config.errors import RunError  # noqa: E402
@@ -34,8 +34,8 @@ def main() -> int:
     clips = available_clips(load_character(CHARACTER))
     parser.add_argument("clips", nargs="*", default=clips, help=f"({' '.join(clips)})")
     parser.add_argument("--seed", type=int, default=1, help="(%(default)s)")
-    parser.add_argument("--worlds", type=int, default=Settings.worlds, help="(%(default)s)")
-    parser.add_argument("--kept", type=int, default=Settings.survivors, help="(%(default)s)")
+    parser.add_argument("--worlds", type=int, default=SearchSettings.worlds, help="(%(default)s)")
+    parser.add_argument("--kept", type=int, default=SearchSettings.survivors, help="(%(default)s)")
     parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
     parser.add_argument("--set", action="append", default=[], help="NODE.NAME:=VALUE, as of run")
     options = parser.parse_args()
@@ -56,7 +56,7 @@ def _row(clip: str, options: argparse.Namespace) -> list[str]:
     given = node_settings(options.set, NODES)
     duration = duration_of(CHARACTER, clip, 1)
     problem = Problem(CHARACTER, clip, duration, given["sim_node"], given["controller_node"])
-    settings = Settings(options.worlds, options.kept, seed=options.seed)
+    settings = SearchSettings(options.worlds, options.kept, seed=options.seed)
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as directory:
         job = Job(problem, settings, Path(directory) / "motion.json", options.workers)

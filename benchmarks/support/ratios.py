@@ -33,7 +33,7 @@ class Ratio:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RatioComparison:
     """A ratio beside the stored one."""
 
     ratio: Ratio
@@ -50,12 +50,12 @@ class Comparison:
         return self.change is not None and not self.change <= TOLERANCE  # NaN is worse, too
 
 
-def compare(measured: Iterable[Ratio], stored: Mapping[str, float]) -> list[Comparison]:
+def compare(measured: Iterable[Ratio], stored: Mapping[str, float]) -> list[RatioComparison]:
     """Each measured ratio beside the stored one of the same figure."""
-    return [Comparison(ratio, stored.get(ratio.figure)) for ratio in measured]
+    return [RatioComparison(ratio, stored.get(ratio.figure)) for ratio in measured]
 
 
-def comparison_table(comparisons: Iterable[Comparison]) -> Table:
+def comparison_table(comparisons: Iterable[RatioComparison]) -> Table:
     """A row for each ratio; red where it got worse."""
     table = Table(title="ratios, beside the stored ones; less is better", title_justify="left")
     table.add_column("")

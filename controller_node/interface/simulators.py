@@ -39,7 +39,7 @@ _ALONE_AFTER = 1.0  # s in which another simulator would have been discovered
 
 
 @dataclass
-class _Known:
+class _KnownSimulator:
     """The configuration and episode that one simulator published."""
 
     configuration: RunConfiguration | None = None
@@ -69,7 +69,7 @@ class Simulators:
         self._clock = clock
         self._check = check
         self._once_logger = logger
-        self._known: dict[str, _Known] = {}  # by session, the oldest first
+        self._known: dict[str, _KnownSimulator] = {}  # by session, the oldest first
         self._rejected_episodes = 0
         self._now = 0.0
         self._lacks_episode_since: float | None = None
@@ -213,7 +213,7 @@ class Simulators:
             return  # its first state came before it, and another simulator may be there
         self._judge(known)
 
-    def _judge(self, known: _Known) -> None:
+    def _judge(self, known: _KnownSimulator) -> None:
         """Raise the error if the bound simulator is not what this controller was made for."""
         if known.configuration is not None:
             self.runs_on = known.configuration.parameters.get("mode") == "realtime"
@@ -242,12 +242,12 @@ class Simulators:
             return error
         return None
 
-    def _known_of(self, session: str) -> _Known:
+    def _known_of(self, session: str) -> _KnownSimulator:
         if session not in self._known:
             if len(self._known) == _MOST_KNOWN:
                 others = (name for name in self._known if name != self._binding.bound)
                 del self._known[next(others)]
-            self._known[session] = _Known()
+            self._known[session] = _KnownSimulator()
         return self._known[session]
 
 

@@ -24,8 +24,8 @@ from controller_node.planner.compiled.rollout import RolloutModel
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.plan import Plan
-from controller_node.planner.sampled_reference import SampledReference, Target
-from controller_node.planner.search.cost import Comparison
+from controller_node.planner.sampled_reference import ReferenceSample, SampledReference
+from controller_node.planner.search.cost import ResidualModel
 from controller_node.planner.search.plan_search import PlanSearch, Start
 from controller_node.planner.search.rollout_pool import RolloutPool
 from controller_node.planner.settings import PlannerSettings
@@ -77,8 +77,8 @@ class PredictivePlanner:
         self.in_flight = (
             CommandsInFlight(character, self._model, settings.delay) if settings.delay else None
         )
-        self._comparison = Comparison(character, self._model, settings)
-        self._search = PlanSearch(self._rollouts, self._comparison, settings, rate_hz)
+        self._residual_model = ResidualModel(character, self._model, settings)
+        self._search = PlanSearch(self._rollouts, self._residual_model, settings, rate_hz)
         self._reference = SampledReference(self._model, self._rollouts, settings)
         self._thread = ThreadPoolExecutor(1)
         self._act: Callable[[], None] = lambda: None
@@ -250,7 +250,7 @@ class PredictivePlanner:
         )
 
     def _observe(
-        self, tick: int, state: StampedState, body: RolloutModel, target: Target
+        self, tick: int, state: StampedState, body: RolloutModel, target: ReferenceSample
     ) -> tuple[FloatArray, FloatArray]:
         """A state in the reference's world, (q,) and (n,), which may have given way to it."""
         position = self._model.position_of(state.position)
@@ -267,5 +267,5 @@ class PredictivePlanner:
         return self._anchor.to_reference_world(position, velocity)
 
     def _balance(self, position: FloatArray, features: FloatArray) -> PlanarState:
-        centre, velocity = self._comparison.balance(features)
+        centre, velocity = self._residual_model.balance(features)
         return planar_state(position, velocity, centre)

@@ -1,4 +1,4 @@
-"""The reference over a horizon, as rollouts and comparisons need it."""
+"""The reference over a horizon, as rollouts and residuals need it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from msgs_config.arrays import FloatArray
 
 
 @dataclass(frozen=True)
-class Target:
+class ReferenceSample:
     """The reference at one tick."""
 
     position: FloatArray  # (q,) as MuJoCo has it
@@ -37,19 +37,19 @@ class SampledReference:
         self, model: ContactModel, rollouts: RolloutPool, settings: PlannerSettings
     ) -> None:
         self._model, self._rollouts, self._settings = model, rollouts, settings
-        self._targets: dict[int, Target] = {}
+        self._targets: dict[int, ReferenceSample] = {}
 
     def clear(self) -> None:
         """Say that the reference may be another one."""
         self._targets.clear()
 
-    def target(self, tick: int, desired_at: DesiredAt, body: RolloutModel) -> Target:
+    def target(self, tick: int, desired_at: DesiredAt, body: RolloutModel) -> ReferenceSample:
         """The reference at a tick."""
         if tick not in self._targets:
             state = desired_at(tick)
             position = self._model.position_of(state.configuration.position)
             features = self._rollouts.features_of(position, state.velocity, body)
-            self._targets[tick] = Target(position, state.velocity, features)
+            self._targets[tick] = ReferenceSample(position, state.velocity, features)
         return self._targets[tick]
 
     def ahead(self, tick: int, desired_at: DesiredAt, body: RolloutModel) -> Foreseen:
@@ -70,7 +70,7 @@ class SampledReference:
         targets = [self.target(each, desired_at, body) for each in range(first, last + 1)]
         return self._desired(first, targets, first_knot)
 
-    def _desired(self, tick: int, targets: Sequence[Target], first_knot: int) -> Desired:
+    def _desired(self, tick: int, targets: Sequence[ReferenceSample], first_knot: int) -> Desired:
         return Desired(
             tick,
             self._settings.knots,

@@ -8,8 +8,8 @@ from rich.console import Console
 
 from benchmarks.cost import Cost, cost_ratios
 from benchmarks.support.ratios import (
-    Comparison,
     Ratio,
+    RatioComparison,
     compare,
     comparison_table,
     read_ratios,
@@ -24,7 +24,7 @@ def of(figure: str, value: float) -> Ratio:
     return Ratio(figure, value, "this / that")
 
 
-def compared(value: float) -> Comparison:
+def compared(value: float) -> RatioComparison:
     (comparison,) = compare([of("law pd", value)], STORED)
     return comparison
 
@@ -54,7 +54,7 @@ def test_a_figure_that_is_not_stored_is_compared_with_nothing() -> None:
     assert (new.stored, new.change, new.is_worse) == (None, None, False)
 
 
-def lines(comparisons: list[Comparison]) -> dict[str, str]:
+def lines(comparisons: list[RatioComparison]) -> dict[str, str]:
     """What is printed for each figure, with the terminal's codes of colour."""
     console = Console(width=100, force_terminal=True, color_system="standard", no_color=False)
     with console.capture() as capture:

@@ -10,7 +10,7 @@ from std_msgs.msg import String
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.run_metrics import Tick
 from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.state import StampedReference, StampedState
@@ -28,7 +28,7 @@ Said = tuple[Topic, bytes]
 class Made:
     """A run that was made in the process."""
 
-    plan: Plan
+    plan: RunPlan
     ticks: list[Tick]
 
     @property
@@ -57,12 +57,12 @@ def make_run(
     return Made(plan, list(ticks_in_process(plan)))
 
 
-def said_configuration(plan: Plan, name: str = "", characters: Sequence[str] = ()) -> Said:
+def said_configuration(plan: RunPlan, name: str = "", characters: Sequence[str] = ()) -> Said:
     text = configuration.describe(plan.character, plan.simulator, name=name, characters=characters)
     return CONFIGURATION, serialize_message(String(data=text))
 
 
-def said_states(plan: Plan, states: Iterable[StampedState]) -> list[Said]:
+def said_states(plan: RunPlan, states: Iterable[StampedState]) -> list[Said]:
     encoder = JointStateEncoder(plan.character.layout.dof_names)
     said = []
     for state in states:
@@ -72,7 +72,7 @@ def said_states(plan: Plan, states: Iterable[StampedState]) -> list[Said]:
     return said
 
 
-def said_references(plan: Plan, references: Iterable[StampedReference]) -> list[Said]:
+def said_references(plan: RunPlan, references: Iterable[StampedReference]) -> list[Said]:
     encoder = JointStateEncoder(plan.character.layout.dof_names)
     return [(REFERENCE, encoder.encode(r.stamp_ns, r.position, r.velocity)) for r in references]
 

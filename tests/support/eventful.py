@@ -7,7 +7,7 @@ import numpy as np
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.state import StampedReference, StampedState
@@ -30,7 +30,7 @@ MS = 1_000_000
 class Eventful:
     """A run, and what a recorder hears of it, each with the wall time at which it came."""
 
-    plan: Plan
+    plan: RunPlan
     states: list[StampedState] = field(default_factory=list)
     references: list[StampedReference] = field(default_factory=list)
     contacts: list[WrenchArrays] = field(default_factory=list)
@@ -112,6 +112,6 @@ def eventful_run(
     return run
 
 
-def said_controller(plan: Plan, values: Values, since_ns: int | None = None) -> Said:
+def said_controller(plan: RunPlan, values: Values, since_ns: int | None = None) -> Said:
     text = configuration.describe(plan.character, values, since_ns)
     return CONTROLLER, serialize_message(String(data=text))

@@ -6,7 +6,7 @@ import numpy as np
 
 from actuated_characters.bags.recording import ModeChange, Recording
 from actuated_characters.metrics.run_metrics import Measurement, Tick
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_throws import plan_throws
 from actuated_characters.studies.catalogue import load_study
 from actuated_characters.studies.framework.result import StudyResult
@@ -61,7 +61,7 @@ class InProcessRunner:
 class _Run:
     """One run, and what a bag would hold of it."""
 
-    def __init__(self, plan: Plan, case: RunSpec) -> None:
+    def __init__(self, plan: RunPlan, case: RunSpec) -> None:
         self._plan, self._case = plan, case
         self._states: list[StampedState] = []
         self._references: list[StampedReference] = []

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from actuated_characters.runs.execution import run_over_topics
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.run_directory import prepare_directory
 from tests.support.ros import Process, Processes, wait_until
 
@@ -87,7 +87,7 @@ def parameters_of(directory: Path, node: str) -> dict[str, Any]:
     return dict(content[node]["ros__parameters"])
 
 
-def run_plan(plan: Plan, directory: Path, mark: str = "", **inputs: Any) -> int:
+def run_plan(plan: RunPlan, directory: Path, mark: str = "", **inputs: Any) -> int:
     """Run a plan over topics on a domain of its own; the most of its marked processes at once."""
     prepare_directory(directory, overwrite=False)
     alive = [0]

@@ -38,7 +38,7 @@ class Spheres(NamedTuple):
         return (along - reach).min(axis=0), (along + reach).max(axis=0)
 
 
-class Box(NamedTuple):
+class PixelRegion(NamedTuple):
     """A part of a picture, in pixels from its upper left corner; false if it is empty."""
 
     top: int
@@ -51,9 +51,9 @@ class Box(NamedTuple):
         """Its rows and columns."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
-    def times(self, factor: int) -> "Box":
+    def times(self, factor: int) -> "PixelRegion":
         """The same part of a picture with so many times as many pixels along each edge."""
-        return Box(*(factor * edge for edge in self))
+        return PixelRegion(*(factor * edge for edge in self))
 
     def __bool__(self) -> bool:
         return self.right > self.left and self.bottom > self.top
@@ -96,22 +96,22 @@ class CameraPose:
         rows, columns = 0.5 * height - scale * upwards, 0.5 * width + scale * across
         return np.floor((rows, columns)).astype(np.intp)
 
-    def box(self, seen: Spheres, size: Size) -> Box:
+    def box(self, seen: Spheres, size: Size) -> PixelRegion:
         """The part of a picture in which spheres are seen, with half a pixel around them.
 
         It is all of it where one is at the camera, and empty if there is none.
         """
         width, height = size
         if not len(seen.radii):
-            return Box(0, 0, 0, 0)
+            return PixelRegion(0, 0, 0, 0)
         in_axes = self.axes() @ (seen.centres - self.eye()).T
         nearest, farthest = -in_axes[2] - seen.radii, -in_axes[2] + seen.radii
         if nearest.min() <= 0.0:
-            return Box(0, height, 0, width)
+            return PixelRegion(0, height, 0, width)
         sides = np.array([in_axes[:2] - seen.radii, in_axes[:2] + seen.radii]) / self.pixel(height)
         reach = np.concatenate((sides / nearest, sides / farthest))  # (4, 2, m), in pixels
         (left, low), (right, high) = reach.min(axis=(0, 2)) - 0.5, reach.max(axis=(0, 2)) + 0.5
-        return Box(
+        return PixelRegion(
             min(max(floor(0.5 * height - high), 0), height),
             min(max(ceil(0.5 * height - low), 0), height),
             min(max(floor(0.5 * width + left), 0), width),

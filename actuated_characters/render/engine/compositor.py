@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuated_characters.render.engine import ground
-from actuated_characters.render.engine.camera_pose import Box, CameraPose, Size, Spheres, framing
+from actuated_characters.render.engine.camera_pose import (
+    CameraPose,
+    PixelRegion,
+    Size,
+    Spheres,
+    framing,
+)
 from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.render_scene import LIGHT_VIEW, RenderScene
 from msgs_config.arrays import BoolArray
@@ -57,7 +63,7 @@ class Compositor:
         """
         light = framing(casting, 1.0, LIGHT_VIEW)
         width, height = _SHADOW_SIZE
-        dark = scene.draw(light, _SHADOW_SIZE, Box(0, height, 0, width)).casts_shadow
+        dark = scene.draw(light, _SHADOW_SIZE, PixelRegion(0, height, 0, width)).casts_shadow
         edges = np.array((0.0, 1.0))
         x, y = ground.places(light, (1, 1), edges, edges)  # the corners of that picture
         corners = np.column_stack((x.ravel(), y.ravel(), np.zeros(4)))
@@ -66,7 +72,7 @@ class Compositor:
             share = self._mean(self._shadow(dark, light, box.times(self._samples)))
             self._colors[box.part] *= 1.0 - (1.0 - _SHADOW) * share[:, :, np.newaxis]
 
-    def draw_solid(self, scene: RenderScene, box: Box) -> None:
+    def draw_solid(self, scene: RenderScene, box: PixelRegion) -> None:
         """Draw what a scene has in a part of the picture, wherever nothing solid hides it."""
         if not box:
             return
@@ -81,7 +87,9 @@ class Compositor:
         np.minimum(solid, drawing.depth, out=solid)
         self._lay(box, paint, (~seen).astype(np.float32))
 
-    def draw_over(self, scene: RenderScene, box: Box, opacity: float, hidden: float = 0.0) -> None:
+    def draw_over(
+        self, scene: RenderScene, box: PixelRegion, opacity: float, hidden: float = 0.0
+    ) -> None:
         """Blend in what a scene has in a part of the picture.
 
         With one opacity where it is before all that is solid, and with another where it is not.
@@ -94,7 +102,7 @@ class Compositor:
         share = np.where(seen, opacity, hidden * np.isfinite(drawing.depth)).astype(np.float32)
         self._lay(box, share[:, :, np.newaxis] * drawing.color, 1.0 - share)
 
-    def _lay(self, box: Box, paint: Samples, clear: Samples) -> None:
+    def _lay(self, box: PixelRegion, paint: Samples, clear: Samples) -> None:
         """Lay samples over a part of the picture.
 
         Colours (h, w, 3) times the share that they cover, and the share (h, w) of what is below.
@@ -114,7 +122,7 @@ class Compositor:
         mean: Samples = total * np.float32(1.0 / edge**2)
         return mean
 
-    def _shadow(self, dark: BoolArray, light: CameraPose, fine: Box) -> Samples:
+    def _shadow(self, dark: BoolArray, light: CameraPose, fine: PixelRegion) -> Samples:
         """1 where the samples (h, w) of a part of the picture see ground without light, else 0.
 
         `dark` is where something that casts a shadow is seen from the light.

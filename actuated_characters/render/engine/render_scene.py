@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from actuated_characters.render.engine.camera_pose import Box, CameraPose, Size
+from actuated_characters.render.engine.camera_pose import CameraPose, PixelRegion, Size
 from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.posed_characters import Frames
 from actuated_characters.render.engine.surfaces import Surface, arrow_surface, round_surface
@@ -111,7 +111,7 @@ class RenderScene:
             self._put(body, tail, _turn_from_z((tip - tail) / length))
             self._arrows.append(body)
 
-    def draw(self, view: CameraPose, size: Size, box: Box) -> Drawing:
+    def draw(self, view: CameraPose, size: Size, box: PixelRegion) -> Drawing:
         """What is seen in a part of a view's picture of a size; the part is not empty."""
         near, far = _NEAR * view.distance, _FAR * view.distance
         width, height = size

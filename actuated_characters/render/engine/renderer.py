@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.render.engine.camera_pose import (
-    Box,
     CameraPose,
+    PixelRegion,
     Size,
     Spheres,
 )
@@ -127,7 +127,7 @@ class Renderer:
             near = balls[np.linalg.norm(balls[:, :3] - view.target, axis=1) < view.distance]
             layers.darken_ground(self._scene, _with_balls(bodies, near))
         width, height = size
-        everywhere = Box(0, height, 0, width)
+        everywhere = PixelRegion(0, height, 0, width)
         box = everywhere if self._has_terrain else view.box(_with_balls(bodies, balls), size)
         layers.draw_solid(self._scene, box)
 

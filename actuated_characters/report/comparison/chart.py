@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from actuated_characters.report.comparison.comparison import Comparison
+from actuated_characters.report.comparison.comparison import RecordingComparison
 from actuated_characters.report.decimation import decimated
 from actuated_characters.studies.framework.plots import label, make_panels
 
@@ -11,7 +11,7 @@ _SIZE = (11.0, 3.4)  # inches, of each character's panel
 _LEAST = 1e-17  # rad or m; stands for 0 on a logarithmic axis
 
 
-def draw_comparisons(comparisons: list[Comparison]) -> Figure:
+def draw_comparisons(comparisons: list[RecordingComparison]) -> Figure:
     """One panel a character: the difference of joints, sliders and root over time."""
     width, height = _SIZE
     figure, panels = make_panels(len(comparisons), 1, (width, height * len(comparisons)))

@@ -47,7 +47,7 @@ class Growth:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RecordingComparison:
     """The differences of two recordings of one character."""
 
     name: str
@@ -70,7 +70,9 @@ _Rows: TypeAlias = tuple[Recording, IntArray]
 """A recording, and its rows (c,) of the states that both recordings have."""
 
 
-def compare(first: Recording, second: Recording, tolerance: float | None = None) -> Comparison:
+def compare(
+    first: Recording, second: Recording, tolerance: float | None = None
+) -> RecordingComparison:
     """Compare two recordings wherever they have states with the same stamps.
 
     Args:
@@ -95,7 +97,7 @@ def compare(first: Recording, second: Recording, tolerance: float | None = None)
     measured = [measure_recording(recording)[0] for recording in both]
     metrics = {name: (value, measured[1][name]) for name, value in measured[0].items()}
     told = [r.controller[0].parameters if r.controller else {} for r in both]
-    return Comparison(
+    return RecordingComparison(
         name=first.name,
         states=(len(first.stamps_ns), len(second.stamps_ns)),
         common=len(stamps),

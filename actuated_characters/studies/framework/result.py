@@ -1,4 +1,4 @@
-"""The result of a study: table, pictures, the curves behind them, notes; and their files."""
+"""The result of a study: table, pictures, the curves behind them, remarks; and their files."""
 
 import csv
 from collections.abc import Mapping

@@ -36,7 +36,7 @@ class RigidBody:
 
 
 @dataclass(frozen=True)
-class Motion:
+class RigidBodyMotion:
     """The states of a rigid body at t times."""
 
     centre: FloatArray  # (t, 3) of mass, m, world
@@ -67,7 +67,9 @@ def angular_acceleration(
     return acceleration
 
 
-def move(body: RigidBody, start: Motion, loads: Sequence[Load], times: FloatArray) -> Motion:
+def move(
+    body: RigidBody, start: RigidBodyMotion, loads: Sequence[Load], times: FloatArray
+) -> RigidBodyMotion:
     """The motion that begins as `start` does, at rising times (t,) in s; the first is its.
 
     By Runge's and Kutta's method of fourth order, a step from time to time.
@@ -84,7 +86,7 @@ def move(body: RigidBody, start: Motion, loads: Sequence[Load], times: FloatArra
         states.append(state)
     centre, turn, velocity, spin = np.split(np.array(states), (3, 7, 10), axis=1)
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
-    return Motion(centre, turn, velocity, spin)
+    return RigidBodyMotion(centre, turn, velocity, spin)
 
 
 def _rate(body: RigidBody, loads: Sequence[Load], state: FloatArray) -> FloatArray:

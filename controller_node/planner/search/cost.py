@@ -14,7 +14,7 @@ _STEP = 5.0  # 1/m, of a foot that steps there
 _LOOSE_CENTRE = 0.4  # of the weight of the centre of mass, horizontally, while the place gives way
 
 
-class Comparison:
+class ResidualModel:
     """Turns deviations of features (..., f) into residuals, linearly.
 
     While the reference gives way, feet are not held to places but to the centre of mass and its

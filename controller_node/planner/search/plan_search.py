@@ -11,9 +11,9 @@ from controller_node.planner.compiled.rollout import RolloutModel
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.plan import Plan, areas_of
 from controller_node.planner.sampled_reference import Foreseen
-from controller_node.planner.search.cost import Comparison
+from controller_node.planner.search.cost import ResidualModel
 from controller_node.planner.search.rollout_pool import RolloutPool
-from controller_node.planner.search.round import Found, Problem, improve
+from controller_node.planner.search.round import Found, LeastSquaresProblem, improve
 from controller_node.planner.settings import PlannerSettings
 from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
@@ -44,9 +44,13 @@ class PlanSearch:
     """Finds plans. It remembers nothing."""
 
     def __init__(
-        self, rollouts: RolloutPool, comparison: Comparison, settings: PlannerSettings, rate_hz: int
+        self,
+        rollouts: RolloutPool,
+        residual_model: ResidualModel,
+        settings: PlannerSettings,
+        rate_hz: int,
     ) -> None:
-        self._rollouts, self._comparison = rollouts, comparison
+        self._rollouts, self._residual_model = rollouts, residual_model
         self._settings, self._rate_hz = settings, rate_hz
         self._unit = settings.noise * settings.sigma  # (n - 6,) of what is looked for
 
@@ -85,7 +89,7 @@ class PlanSearch:
 
     def cost(self, features: FloatArray, wanted: FloatArray) -> float:
         """What features (f,) cost where others are wanted, without giving way."""
-        residuals = self._comparison.residuals(features - wanted, gives_way=False)
+        residuals = self._residual_model.residuals(features - wanted, gives_way=False)
         return self._settings.checks * float(fixed_order.dot(residuals, residuals))
 
     def cost_ahead(self, start: Start, plan: Plan | None) -> float:
@@ -110,7 +114,7 @@ class PlanSearch:
             return np.zeros(count * len(self._unit))
         return (plan.left(tick, count) / self._unit).ravel()
 
-    def _problem(self, start: Start) -> Problem:
+    def _problem(self, start: Start) -> LeastSquaresProblem:
         """What a plan from a state is to make small."""
         settings, checks, desired = self._settings, self._settings.checks, start.desired
 
@@ -125,24 +129,26 @@ class PlanSearch:
 
         def residuals(rows: FloatArray) -> FloatArray:
             by_check = rows.reshape(*rows.shape[:-1], checks, -1)
-            weighted = self._comparison.residuals(by_check, gives_way=start.gives_way)
+            weighted = self._residual_model.residuals(by_check, gives_way=start.gives_way)
             return weighted.reshape(rows.shape)
 
         penalty = _PENALTY * settings.noise
         knots = self._knot_count(desired.rollout.first_tick)
-        return Problem(deviations, residuals, penalty * penalty / knots, _LARGEST / settings.noise)
+        return LeastSquaresProblem(
+            deviations, residuals, penalty * penalty / knots, _LARGEST / settings.noise
+        )
 
     def _knot_count(self, tick: int) -> int:
         """How many knots a plan has that acts from a tick on."""
         settings = self._settings
         return (tick + settings.horizon - 1) // settings.knots + 2 - tick // settings.knots
 
-    def _outlook(self, found: Found, problem: Problem, start: Start) -> Outlook:
+    def _outlook(self, found: Found, problem: LeastSquaresProblem, start: Start) -> Outlook:
         """What is expected of a plan."""
         settings, checks = self._settings, self._settings.checks
         residuals = problem.residuals(found.deviations).reshape(2, checks, -1)
         best = found.deviations[0].reshape(checks, -1)
-        centres, _ = self._comparison.balance(start.desired.features + best)
+        centres, _ = self._residual_model.balance(start.desired.features + best)
         numbers: FloatArray = np.arange(1.0, checks + 1.0)
         times = (settings.delay + settings.period * numbers) / self._rate_hz
         costs, others = fixed_order.dot(residuals, residuals)

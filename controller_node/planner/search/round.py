@@ -16,7 +16,7 @@ _FEWEST = 4  # samples that a step can be found from
 
 
 @dataclass(frozen=True)
-class Problem:
+class LeastSquaresProblem:
     """What is to be made small: `|residuals(deviations(x))|^2 + penalty |x|^2`."""
 
     deviations: Callable[[FloatArray], FloatArray]
@@ -38,7 +38,7 @@ class Found:
 
 
 def improve(
-    problem: Problem, place: FloatArray, draws: FloatArray, known: FloatArray | None
+    problem: LeastSquaresProblem, place: FloatArray, draws: FloatArray, known: FloatArray | None
 ) -> Found:
     """Look around a place (d,) for a better one.
 
@@ -75,7 +75,7 @@ def improve(
 
 
 def _ensemble_steps(
-    problem: Problem,
+    problem: LeastSquaresProblem,
     place: FloatArray,
     distances: FloatArray,
     residuals: FloatArray,
@@ -87,11 +87,11 @@ def _ensemble_steps(
     return gauss_newton.ensemble_steps(distances, whole, here, _DAMPINGS)
 
 
-def _within(problem: Problem, places: FloatArray) -> FloatArray:
+def _within(problem: LeastSquaresProblem, places: FloatArray) -> FloatArray:
     return np.clip(places, -problem.largest, problem.largest)
 
 
-def _costs(problem: Problem, places: FloatArray, deviations: FloatArray) -> FloatArray:
+def _costs(problem: LeastSquaresProblem, places: FloatArray, deviations: FloatArray) -> FloatArray:
     """The costs (s,); infinite of what leads to nothing."""
     residuals = problem.residuals(deviations)
     large = fixed_order.dot(places, places)

@@ -15,7 +15,7 @@ from std_msgs.msg import String
 
 from actuated_characters.bags.recording import Recording, read_recording, read_recordings
 from actuated_characters.bags.writer import BagWriter
-from actuated_characters.runs.plan import Plan
+from actuated_characters.runs.plan import RunPlan
 from msgs_config.errors import ActuatedCharactersError, MessageError, RecordingError
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.joint_state import JointStateEncoder
@@ -429,7 +429,7 @@ def own_character(folder: Path) -> Path:
     return file
 
 
-def said_without(plan: Plan, *names: str, **changes: object) -> Said:
+def said_without(plan: RunPlan, *names: str, **changes: object) -> Said:
     """The simulator's configuration without some entries, and with others changed."""
     text = configuration.describe(plan.character, plan.simulator)
     content = {key: value for key, value in json.loads(text).items() if key not in names}

@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from actuated_characters.bags.recording import read_recording, read_recordings
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
-from actuated_characters.report.comparison.comparison import Comparison, compare, pair
+from actuated_characters.report.comparison.comparison import RecordingComparison, compare, pair
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import RecordingError
 from msgs_config.messages.state import StampedState
@@ -67,7 +67,7 @@ def changed(state: StampedState, quantity: str, value: float) -> StampedState:
     return replace(state, **{quantity: array})
 
 
-def compared(first: Path, second: Path, tolerance: float | None = None) -> Comparison:
+def compared(first: Path, second: Path, tolerance: float | None = None) -> RecordingComparison:
     return compare(read_recording(first), read_recording(second), tolerance)
 
 
@@ -82,7 +82,7 @@ def turn(first: FloatArray, second: FloatArray) -> float:
     return float(np.linalg.norm(between))
 
 
-def assert_parts(comparison: Comparison, tick: int, quantity: str, dof: str) -> None:
+def assert_parts(comparison: RecordingComparison, tick: int, quantity: str, dof: str) -> None:
     assert not comparison.identical
     assert comparison.first is not None
     found = comparison.first

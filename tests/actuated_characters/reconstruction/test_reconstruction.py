@@ -20,7 +20,7 @@ from actuated_characters.cli import main
 from actuated_characters.reconstruction.checkpoint import checkpoint_path
 from actuated_characters.reconstruction.problem import Problem, duration_of
 from actuated_characters.reconstruction.reconstruction import Job, Reconstruction, reconstruct
-from actuated_characters.reconstruction.search import Progress, Settings, result, search
+from actuated_characters.reconstruction.search import Progress, SearchSettings, result, search
 from actuated_characters.reconstruction.workers import Workers
 from actuated_characters.reconstruction.world import Branch, Grown, Place, TrialWorld
 from actuated_characters.runs.planned_wrenches import parse_pushes_within
@@ -31,7 +31,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 PROJECT = Path(__file__).parents[3]
 QUICK = {"plan.samples": 8, "plan.rounds": 1, "plan.horizon": 0.2}
-SMALL = Settings(worlds=3, survivors=2, window=0.1)
+SMALL = SearchSettings(worlds=3, survivors=2, window=0.1)
 DURATION = 0.3  # s
 PROBLEM = Problem("humanoid", "kick", DURATION, {}, QUICK)
 WINDOW = 24  # ticks
@@ -137,14 +137,16 @@ class Numbered:
             yield None if lost else Grown(place, (), np.zeros(1), cost, 0.0)
 
 
-def progress_of(worlds: Numbered, windows: int, settings: Settings) -> tuple[int | None, Progress]:
+def progress_of(
+    worlds: Numbered, windows: int, settings: SearchSettings
+) -> tuple[int | None, Progress]:
     """Where a search is stuck, and its end."""
     progress = Progress([])
     return search(worlds, windows, settings, progress, lambda _: None), progress
 
 
 def test_the_best_worlds_are_kept_and_the_others_go_on_from_them() -> None:
-    stuck_at, progress = progress_of(Numbered(), 5, Settings(worlds=6, survivors=2))
+    stuck_at, progress = progress_of(Numbered(), 5, SearchSettings(worlds=6, survivors=2))
 
     best = result(progress)
     assert stuck_at is None and best is not None
@@ -155,7 +157,7 @@ def test_the_best_worlds_are_kept_and_the_others_go_on_from_them() -> None:
 def test_where_all_are_lost_it_goes_back_and_tries_others() -> None:
     worlds = Numbered(deadly=4)
 
-    stuck_at, progress = progress_of(worlds, 6, Settings(worlds=4, survivors=1))
+    stuck_at, progress = progress_of(worlds, 6, SearchSettings(worlds=4, survivors=1))
 
     assert stuck_at is None and progress.failures == 1
     assert worlds.grown == 4 * (3 + 1 + 2 + 3)  # to the third, lost, back by two, to the sixth
@@ -167,7 +169,7 @@ def test_who_is_stuck_gives_up_and_has_the_furthest_window() -> None:
             for grown in super().grow(branches):
                 yield None if grown is not None and grown.place.tick > 3 else grown
 
-    stuck_at, progress = progress_of(Deadly(), 6, Settings(worlds=2, survivors=1, tries=3))
+    stuck_at, progress = progress_of(Deadly(), 6, SearchSettings(worlds=2, survivors=1, tries=3))
 
     best = result(progress)
     assert stuck_at == 3 and best is not None

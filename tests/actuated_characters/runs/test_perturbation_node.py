@@ -12,7 +12,7 @@ import pytest
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.runs.execution import run_in_process
 from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_files import write_planned
 from actuated_characters.runs.planned_throws import PlannedThrow, read_throws
 from actuated_characters.runs.planned_wrenches import (
@@ -53,7 +53,7 @@ PUSHES: list[tuple[int, str, tuple[float, ...], tuple[float, float, float] | Non
 PLANNED = [PlannedPush(CLOCK.stamp_ns(tick), *what) for tick, *what in PUSHES]
 
 
-def plan_of(ticks: int = TICKS, **simulator: object) -> Plan:
+def plan_of(ticks: int = TICKS, **simulator: object) -> RunPlan:
     given = {"rate": RATE, "wrench_duration": HELD / RATE} | simulator
     return make_plan("humanoid", ticks / RATE, {"reference": "hold"}, given, {})
 
@@ -71,7 +71,7 @@ def as_acting(
     return ExternalWrench(LINKS.index(link), np.array(wrench), where, tick, HELD)
 
 
-def states_without_ros(plan: Plan, pushes: Sequence[ExternalWrench]) -> list[StampedState]:
+def states_without_ros(plan: RunPlan, pushes: Sequence[ExternalWrench]) -> list[StampedState]:
     """The states of a plan when simulation and controller are called one after the other."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
     setup = make_character_setup(plan.character, plan.simulator)

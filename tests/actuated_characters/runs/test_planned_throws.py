@@ -14,7 +14,7 @@ from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
 from actuated_characters.runs.execution import run_in_process
 from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_throws import (
     PlannedThrow,
     ThrowRequest,
@@ -50,11 +50,11 @@ WALK = {"reference": "clip", "clip": "walk"}
 
 def plan_of(
     seconds: float = 1.0, reference: dict[str, object] | None = None, **simulator: object
-) -> Plan:
+) -> RunPlan:
     return make_plan("humanoid", seconds, reference or HELD, simulator, {})
 
 
-def first_hit(plan: Plan, planned: PlannedThrow) -> tuple[int, tuple[str, ...], FloatArray]:
+def first_hit(plan: RunPlan, planned: PlannedThrow) -> tuple[int, tuple[str, ...], FloatArray]:
     """Run a plan until a ball first touches the character, by the engine's own list.
 
     Returns the tick of the state after that step, the links that it touches, and its motion (13,)
@@ -241,7 +241,7 @@ def test_no_more_balls_than_an_episode_may_have() -> None:
 class Made:
     """A run with throws over topics, and what it has left."""
 
-    plan: Plan
+    plan: RunPlan
     throws: list[PlannedThrow]
     directory: Path
     recording: Recording

@@ -12,8 +12,8 @@ from actuated_characters.studies.framework.result import StudyResult
 from actuated_characters.studies.framework.study import RunSpec
 from actuated_characters.studies.theory.euler import (
     Load,
-    Motion,
     RigidBody,
+    RigidBodyMotion,
     angular_acceleration,
     move,
 )
@@ -34,18 +34,20 @@ LOADS = (
 )
 
 
-def start(*spin: float) -> Motion:
+def start(*spin: float) -> RigidBodyMotion:
     """At the origin, turned, with a velocity, and turning at `spin` in rad/s."""
     turn = rotations.exp(np.array([0.3, -0.8, 0.5]))
-    return Motion(*(np.atleast_2d(part) for part in ([0.0] * 3, turn, [0.5, 0.0, 0.0], spin)))
+    return RigidBodyMotion(
+        *(np.atleast_2d(part) for part in ([0.0] * 3, turn, [0.5, 0.0, 0.0], spin))
+    )
 
 
-def angular_momentum(motion: Motion) -> FloatArray:
+def angular_momentum(motion: RigidBodyMotion) -> FloatArray:
     """About the centre, world axes."""
     return rotations.rotate(motion.turn_xyzw, BODY.inertia * motion.angular_velocity)
 
 
-def energy(motion: Motion) -> FloatArray:
+def energy(motion: RigidBodyMotion) -> FloatArray:
     twice: FloatArray = np.sum(BODY.inertia * motion.angular_velocity**2, axis=1)
     return 0.5 * twice
 
@@ -101,7 +103,7 @@ def test_the_residual_vanishes_for_eulers_own_step_and_shows_another_inertia() -
         in_body = rotations.rotate(rotations.conjugate(turn), in_world)
         spins.append(spins[-1] + step * angular_acceleration(BODY.inertia, spins[-1], in_body))
     still = np.tile(turn, (51, 1))
-    stepped = Motion(np.zeros((51, 3)), still, np.zeros((51, 3)), np.array(spins))
+    stepped = RigidBodyMotion(np.zeros((51, 3)), still, np.zeros((51, 3)), np.array(spins))
 
     # Act
     left = rigid_body.euler_residual(BODY.inertia, stepped, torque, step)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import (
     PARAMETERS,
     character_parameters,
@@ -33,7 +33,7 @@ QUICK = {
 }
 
 
-def walk(duration: float, **simulator: object) -> Plan:
+def walk(duration: float, **simulator: object) -> RunPlan:
     """A walk by joint torques alone."""
     return make_plan("humanoid", duration, {"reference": "clip", "clip": "walk"}, simulator, QUICK)
 

@@ -30,7 +30,7 @@ from controller_node.parameters import PARAMETERS, character_parameters, make_co
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.search import gauss_newton
 from controller_node.planner.search.plan_search import PlanSearch
-from controller_node.planner.search.round import Problem, improve
+from controller_node.planner.search.round import LeastSquaresProblem, improve
 from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -139,7 +139,7 @@ def test_a_round_finds_the_least_of_a_linear_problem_and_never_what_is_worse() -
         rows[places[:, 0] > 3.0] = np.inf
         return rows
 
-    problem = Problem(of_places, lambda rows: rows, 0.3, 20.0)
+    problem = LeastSquaresProblem(of_places, lambda rows: rows, 0.3, 20.0)
     cost = np.inf
     sensitivities, here = None, np.zeros(4)
     for number in range(12):
@@ -160,7 +160,9 @@ def test_a_round_finds_the_least_of_a_linear_problem_and_never_what_is_worse() -
 
 
 def test_nothing_is_found_where_all_comes_to_nothing() -> None:
-    nothing = Problem(lambda places: np.full((len(places), 3), np.inf), lambda rows: rows, 0.1, 4.0)
+    nothing = LeastSquaresProblem(
+        lambda places: np.full((len(places), 3), np.inf), lambda rows: rows, 0.1, 4.0
+    )
 
     found = improve(nothing, np.zeros(2), np.ones((9, 2)), None)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.runs.in_process import ticks_in_process
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.references import keyframes as module
 from controller_node.references.base import Motion, Reference, ReferenceState
 from controller_node.references.clip import ClipReference
@@ -316,7 +316,7 @@ def test_a_run_of_a_clip_begins_in_its_first_frame_and_moves() -> None:
     assert_begins(plan, first.configuration.position, first.velocity)
 
 
-def assert_begins(plan: Plan, position: FloatArray, velocity: FloatArray) -> None:
+def assert_begins(plan: RunPlan, position: FloatArray, velocity: FloatArray) -> None:
     """The plan says so, and so do the engine's first state and the reference beside it."""
     layout = plan.character.layout
     said = plan.simulator.numbers("initial_position"), plan.simulator.numbers("initial_velocity")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from sim_node.parameters import make_character_setup, make_settings
@@ -27,24 +27,24 @@ CASES: dict[str, tuple[str, dict[str, object], dict[str, object]]] = {
 
 
 @pytest.fixture(params=CASES, scope="module")
-def plan(request: pytest.FixtureRequest) -> Plan:
+def plan(request: pytest.FixtureRequest) -> RunPlan:
     name, reference, simulator = CASES[request.param]
     return make_plan(name, 10.0, reference, simulator, {"root_assistance": False})
 
 
 @pytest.fixture
-def simulation(plan: Plan) -> Iterator[Simulation]:
+def simulation(plan: RunPlan) -> Iterator[Simulation]:
     with fresh(plan) as simulation:
         yield simulation
 
 
-def fresh(plan: Plan) -> Simulation:
+def fresh(plan: RunPlan) -> Simulation:
     return Simulation(
         [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
     )
 
 
-def advance(plan: Plan, simulation: Simulation, ticks: int, noise: float = 0.0) -> FloatArray:
+def advance(plan: RunPlan, simulation: Simulation, ticks: int, noise: float = 0.0) -> FloatArray:
     """Advance under control with some noise (N m); what the states and efforts were (ticks, 3n)."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
     (simulated,), rng = simulation.characters, np.random.default_rng(3)
@@ -64,7 +64,7 @@ def advance(plan: Plan, simulation: Simulation, ticks: int, noise: float = 0.0) 
 
 @pytest.mark.parametrize("ticks", [1, 90])
 def test_a_simulation_returns_to_what_it_saved(
-    plan: Plan, simulation: Simulation, ticks: int
+    plan: RunPlan, simulation: Simulation, ticks: int
 ) -> None:
     advance(plan, simulation, ticks)
     saved, stamp = simulation.snapshot(), simulation.stamp_ns
@@ -82,7 +82,7 @@ def test_a_simulation_returns_to_what_it_saved(
 
 @pytest.mark.parametrize("dirty", [False, True])
 def test_another_simulation_goes_on_from_a_snapshot(
-    plan: Plan, simulation: Simulation, dirty: bool
+    plan: RunPlan, simulation: Simulation, dirty: bool
 ) -> None:
     advance(plan, simulation, 90)
     snapshot = pickle.loads(pickle.dumps(simulation.snapshot()))

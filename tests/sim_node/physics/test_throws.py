@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuated_characters.runs.plan import Plan, make_plan
+from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import CommandError, ConfigurationError
@@ -64,18 +64,18 @@ def wall(tmp_path: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def walk() -> Plan:
+def walk() -> RunPlan:
     return make_plan("humanoid", 1.0, {"reference": "clip", "clip": "walk"}, {}, {})
 
 
-def fresh(plan: Plan) -> Simulation:
+def fresh(plan: RunPlan) -> Simulation:
     return Simulation(
         [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
     )
 
 
 def walked(
-    plan: Plan,
+    plan: RunPlan,
     simulation: Simulation,
     ticks: int,
     throws: Mapping[int, Sequence[ProjectileThrow]] | None = None,
@@ -225,7 +225,7 @@ def test_balls_collide_with_each_other() -> None:
 # A character does not feel a ball before it is hit
 
 
-def test_a_walk_is_the_same_to_the_bit_until_a_ball_touches(walk: Plan) -> None:
+def test_a_walk_is_the_same_to_the_bit_until_a_ball_touches(walk: RunPlan) -> None:
     with fresh(walk) as run:
         alone, _ = walked(walk, run, 200)
     with fresh(walk) as run:
@@ -237,7 +237,7 @@ def test_a_walk_is_the_same_to_the_bit_until_a_ball_touches(walk: Plan) -> None:
     assert differs == list(range(differs[0], 200))
 
 
-def test_the_same_throws_lead_to_the_same_states(walk: Plan) -> None:
+def test_the_same_throws_lead_to_the_same_states(walk: RunPlan) -> None:
     throws = {30: [AT_CHEST, FAR], 50: [AT_CHEST]}
 
     with fresh(walk) as run:
@@ -253,7 +253,7 @@ def test_the_same_throws_lead_to_the_same_states(walk: Plan) -> None:
 # Balls whose time is over
 
 
-def with_lifetime(plan: Plan, seconds: float) -> Plan:
+def with_lifetime(plan: RunPlan, seconds: float) -> RunPlan:
     return replace(plan, simulator=Values({**plan.simulator, "ball_lifetime": seconds}))
 
 
@@ -295,7 +295,7 @@ def test_what_stood_against_a_ball_falls_when_it_is_taken_away(block: str) -> No
 @pytest.mark.parametrize("ticks", [20, 60, 110], ids=["before", "in flight", "after the impact"])
 @pytest.mark.parametrize("lifetime", [0.0, 0.3], ids=["forever", "for a time"])
 def test_a_saved_state_is_restored_whatever_was_thrown_since(
-    walk: Plan, ticks: int, lifetime: float
+    walk: RunPlan, ticks: int, lifetime: float
 ) -> None:
     throws = {30: [AT_CHEST], 31: [FAR], 120: [AT_CHEST]}
 
@@ -317,7 +317,7 @@ def test_a_saved_state_is_restored_whatever_was_thrown_since(
 
 
 @pytest.mark.parametrize("dirty", [0, 40], ids=["fresh", "with balls of its own"])
-def test_another_simulation_takes_a_state_over_with_its_balls(walk: Plan, dirty: int) -> None:
+def test_another_simulation_takes_a_state_over_with_its_balls(walk: RunPlan, dirty: int) -> None:
     throws = {30: [AT_CHEST], 31: [FAR]}
     walk = with_lifetime(walk, 0.3)
 
