@@ -25,6 +25,7 @@ from sim_node.initial_state import as_values
 from sim_node.node_settings import make_node_settings
 from sim_node.physics import simulation
 from sim_node.physics.wrenches import WrenchQueue
+from sim_node.simulation_factory import make_character_setup, make_settings
 
 if TYPE_CHECKING:
     from sensor_msgs.msg import JointState
@@ -138,8 +139,8 @@ class Simulation:
         everything = {"commanded_joints": _drivable(character), **begins, **given}
         self._values = resolve(simulator_parameters.PARAMETERS + own, everything)
         self.character = character
-        setup = simulator_parameters.make_character_setup(character, self._values)
-        settings = simulator_parameters.make_settings(self._values)
+        setup = make_character_setup(character, self._values)
+        settings = make_settings(self._values)
         self._simulation = simulation.Simulation([setup], settings)
         self._simulation.watches_contacts = watch_contacts
         self._pushes = WrenchQueue(character)

@@ -19,15 +19,9 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
-from sim_node.parameters import (
-    CharacterParameters,
-    SimulatorParameters,
-    load_parameters,
-    make_character_setup,
-    make_settings,
-)
-from sim_node.physics.simulation import Simulation
+from sim_node.parameters import CharacterParameters, SimulatorParameters, load_parameters
 from sim_node.physics.world import World
+from sim_node.simulation_factory import make_simulation
 
 _CHAINS = (1, 8, 32, 100)  # hinges
 _HUMANOIDS = (1, 2, 4, 8)
@@ -96,21 +90,13 @@ def humanoids(count: int) -> dict[str, object]:
     return {"character": "humanoid", "characters": names, **places}
 
 
-def make_simulation(cast: SimulatorParameters) -> Simulation:
-    """The simulation of a cast, without ROS."""
-    setups = [
-        make_character_setup(part.character, part.values, part.name) for part in cast.characters
-    ]
-    return Simulation(setups, make_settings(cast.values))
-
-
 def _measure(label: str, given: Mapping[str, object]) -> Cost:
-    cast = load_parameters(given)
-    dofs = sum(part.character.layout.size for part in cast.characters)
+    loaded = load_parameters(given)
+    dofs = sum(each.character.layout.size for each in loaded.characters)
     with timed_engine() as engine:
-        alone = np.median(1e6 * step_durations(cast))
+        alone = np.median(1e6 * step_durations(loaded))
     engine_us = 1e6 * float(np.median(engine[-_TICKS:]))
-    return Cost(label, dofs, engine_us, float(alone), _over_topics(cast, given))
+    return Cost(label, dofs, engine_us, float(alone), _over_topics(loaded, given))
 
 
 @contextmanager
@@ -128,9 +114,9 @@ def timed_engine() -> Iterator[list[float]]:
         yield durations
 
 
-def step_durations(cast: SimulatorParameters) -> FloatArray:
+def step_durations(loaded: SimulatorParameters) -> FloatArray:
     """Durations (ticks,) in s of the steps of a simulation without ROS and without efforts."""
-    with make_simulation(cast) as simulation:
+    with make_simulation(loaded) as simulation:
         efforts = [np.zeros(simulated.layout.size) for simulated in simulation.characters]
         times = []
         for _ in range(_WARM_UP + _TICKS + 1):
@@ -139,14 +125,14 @@ def step_durations(cast: SimulatorParameters) -> FloatArray:
     return np.diff(times)[_WARM_UP:]
 
 
-def _over_topics(cast: SimulatorParameters, given: Mapping[str, object]) -> float:
+def _over_topics(loaded: SimulatorParameters, given: Mapping[str, object]) -> float:
     """Median duration in µs of the ticks of `sim_node`, whose states are answered by zeros."""
     ticks = _WARM_UP + _TICKS
     with Nodes() as nodes:
         nodes.start(topics.SIM_NODE, {**given, "max_ticks": ticks})
         nodes.wait_until(lambda: nodes.reports)
         spinner = PollingExecutor(nodes.node)
-        limp = [_LimpController(nodes, part) for part in cast.characters]
+        limp = [_LimpController(nodes, each) for each in loaded.characters]
 
         def poll() -> None:
             answered = [controller.poll() for controller in limp]
@@ -163,10 +149,10 @@ def _over_topics(cast: SimulatorParameters, given: Mapping[str, object]) -> floa
 class _LimpController:
     """Answers the states of one character with zeros, at the least cost."""
 
-    def __init__(self, nodes: Nodes, part: CharacterParameters) -> None:
-        names = [n for n in part.character.layout.dof_names if not n.startswith("root_")]
-        self._states = DirectSubscription(nodes.node, topics.JOINT_STATES.under(part.name))
-        self._torques = topics.create_publisher(nodes.node, topics.JOINT_TORQUES.under(part.name))
+    def __init__(self, nodes: Nodes, each: CharacterParameters) -> None:
+        names = [n for n in each.character.layout.dof_names if not n.startswith("root_")]
+        self._states = DirectSubscription(nodes.node, topics.JOINT_STATES.under(each.name))
+        self._torques = topics.create_publisher(nodes.node, topics.JOINT_TORQUES.under(each.name))
         self._encoder, self._zeros = JointStateEncoder(names), np.zeros(len(names))
         self._decoder = JointStateDecoder()
 

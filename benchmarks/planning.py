@@ -22,8 +22,8 @@ from controller_node.planner.search.rollout_pool import RolloutPool
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.messages.clock import TickClock
-from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
+from sim_node.simulation_factory import make_character_setup, make_settings
 
 _RATE = 240  # Hz
 _WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}

@@ -1,25 +1,20 @@
 """`sim_node`: the simulation behind its topics, in lockstep with controllers or real time."""
 
 import time
-from collections.abc import Iterator
-from itertools import chain
 
-import numpy as np
 from rclpy.node import Node
 
 from msgs_config.errors import SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
-from msgs_config.messages.joint_state import encode_clock
 from msgs_config.messages.session import OwnSession, make_session
-from msgs_config.messages.topics import Outgoing
 from msgs_config.parameters import Values
 from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
 from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
-from sim_node.initial_state import as_values, begins_with_reference
+from sim_node.initial_state import as_values
 from sim_node.interface.character_interface import CharacterInterface
 from sim_node.interface.initial_state_topic import InitialStates
 from sim_node.interface.publisher_diagnosis import (
@@ -30,13 +25,14 @@ from sim_node.interface.publisher_diagnosis import (
 )
 from sim_node.interface.publishers import wait_for_subscribers
 from sim_node.interface.services import Services
+from sim_node.interface.simulator_publisher import SimulatorPublisher
 from sim_node.interface.world_interface import WorldInterface
 from sim_node.node_settings import make_node_settings
-from sim_node.parameters import load_parameters, make_character_setup, make_settings
+from sim_node.parameters import load_parameters
 from sim_node.physics.probe import probe_engine
-from sim_node.physics.simulation import Simulation
+from sim_node.simulation_factory import make_simulation
 from sim_node.timing.flow_control import FlowControl
-from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
+from sim_node.timing.lockstep import CommandStatus
 from sim_node.timing.rate_limiter import RateLimiter
 from sim_node.timing.run_control import RunControl
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
@@ -67,7 +63,9 @@ class SimNode(Node):
         self._watchdog = Watchdog(self._settings.republish_period, self._settings.lockstep_timeout)
         self._rate_limiter = RateLimiter(self._settings.tick_period)
         self._flow_control = FlowControl(
-            self._is_acknowledged, self._once_logger.log_once, not self._settings.is_realtime
+            self._publisher.is_acknowledged,
+            self._once_logger.log_once,
+            not self._settings.is_realtime,
         )
         self._next_diagnostics = 0.0
         self._timeouts = 0
@@ -81,16 +79,9 @@ class SimNode(Node):
         values, loaded = self._loaded.values, self._loaded.characters
         probes = [probe_engine(each.character, values.number("gravity")) for each in loaded]
         self._samples = [sample for sample, _ in probes]
-        setups = [
-            make_character_setup(each.character, each.values, each.name, inverse_mass)
-            for each, (_, inverse_mass) in zip(loaded, probes, strict=True)
-        ]
-        self._simulation = Simulation(setups, make_settings(values))
-        pairs = zip(self._simulation.characters, loaded, strict=True)
-        from_reference = [
-            simulated for simulated, each in pairs if begins_with_reference(each.values)
-        ]
-        self._initial_states = InitialStates(self, from_reference, values)
+        inverse_masses = [inverse_mass for _, inverse_mass in probes]
+        self._simulation = make_simulation(self._loaded, inverse_masses)
+        self._initial_states = InitialStates(self, self._simulation.characters, self._loaded)
 
     def _open_topics(self) -> None:
         own_session = OwnSession(self._session, self._once_logger.log_once)
@@ -106,7 +97,8 @@ class SimNode(Node):
             for character in self._simulation.characters
         ]
         self._world = WorldInterface(self, self._simulation, own_session, self._once_logger)
-        self._clock_topic = topics.create_publisher(self, topics.CLOCK)
+        publishers = [each.publishers for each in self._characters]
+        self._publisher = SimulatorPublisher(self, self._simulation, self._world, publishers)
         self._diagnostics = DiagnosticsPublisher(self)
         self._conflict_log = ConflictLog(self, self._once_logger)
         self._others = OtherSimulators(
@@ -130,7 +122,7 @@ class SimNode(Node):
             self._run_services.end(executor)
             self._publish_diagnostics()
             seconds = _FLUSH_TIME if self._finished else _STOP_FLUSH_TIME
-            if not (self._is_acknowledged(seconds) and self._diagnostics.flush(seconds)):
+            if not (self._publisher.is_acknowledged(seconds) and self._diagnostics.flush(seconds)):
                 self.get_logger().warning("a subscriber has not acknowledged the last messages")
             executor.close()
             self._simulation.close()
@@ -153,13 +145,9 @@ class SimNode(Node):
         if states:
             self._simulation.begin_in(states)
             declare(self, self._loaded.open, parameters.values)
-        terrain = self._simulation.settings.world.terrain
-        for each, own, sample in zip(
-            self._characters, parameters.characters, self._samples, strict=True
-        ):
-            each.publishers.publish_configuration(own.values, sample, terrain, parameters.names)
-        publishers = [each.publishers for each in self._characters]
-        wait_for_subscribers(self, publishers, self._settings.wait_for_subscribers, stop, executor)
+        self._publisher.publish_configurations(parameters, self._samples)
+        count = self._settings.wait_for_subscribers
+        wait_for_subscribers(self, self._publisher.of_characters, count, stop, executor)
         self._begin_episode()
 
     def _spin_once(self, executor: PollingExecutor) -> None:
@@ -192,14 +180,8 @@ class SimNode(Node):
                     self._on_conflict(each)
         return received
 
-    def _is_acknowledged(self, seconds: float) -> bool:
-        """Wait at most `seconds` until every subscriber has the last tick; whether it has."""
-        of_characters = [each.publishers.of_ticks for each in self._characters]
-        return topics.flush(chain(self._world.publishers, *of_characters), seconds)
-
     def _begin_episode(self) -> None:
-        for each in self._characters:
-            each.publishers.publish_episode(self._simulation.episode, self._simulation.stamp_ns)
+        self._publisher.publish_episode()
         self._begun = True
         self._rate_limiter.restart(time.monotonic())
         self._begin_tick()
@@ -208,18 +190,7 @@ class SimNode(Node):
         for each in self._characters:
             each.begin_tick()
         self._watchdog.restart(time.monotonic())
-        topics.publish_together(self._messages())
-        for each in self._characters:
-            each.publishers.publish_display(self._simulation.tick)
-
-    def _messages(self) -> Iterator[Outgoing]:
-        """The messages of a tick that are published before it can be answered, the states last."""
-        yield self._clock_topic, encode_clock(self._simulation.stamp_ns)
-        yield from self._world.messages()
-        for each in self._characters:
-            yield from each.publishers.before_state()
-        for each in self._characters:
-            yield each.publishers.state()
+        self._publisher.publish_tick()
 
     def _advance(self) -> None:
         simulation, characters = self._simulation, self._characters
@@ -253,8 +224,7 @@ class SimNode(Node):
         for event in self._watchdog.due(now):
             waits = self._control.runs and not self._complete
             if event is WatchdogEvent.REPUBLISH:
-                for each in self._characters:
-                    each.publishers.republish(with_state=waits, with_episode=self._others.seen)
+                self._publisher.republish(with_states=waits, with_episode=self._others.seen)
             elif waits and event is WatchdogEvent.EXPLAIN:
                 self.get_logger().warning(self._describe_waiting())
             elif waits and self._simulation.tick > FIRST_TICK:  # before that it just waits
@@ -276,9 +246,7 @@ class SimNode(Node):
             return
         self._timeouts += 1
         for each in self._characters:
-            assert isinstance(each.commands, LockstepBarrier)  # real time has no missing commands
-            last = each.last_effort
-            each.commands.fill_missing(last if action == "hold" else np.zeros_like(last))
+            each.fill_missing(holds=action == "hold")
 
     def _raise_fault(self, sentence: str, *, diverged: bool = False) -> None:
         if self._settings.on_fault == "abort":

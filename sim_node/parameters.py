@@ -1,23 +1,18 @@
-"""The parameters of `sim_node`, and the simulation that they make."""
+"""The parameters of `sim_node`."""
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from msgs_config import files
-from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
-from msgs_config.character.model import Character, UrdfOptions
-from msgs_config.character.urdf_check import check_urdf
-from msgs_config.errors import CharacterError, ConfigurationError, LayoutError
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError, LayoutError
 from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter, Value, Values, resolve
 from msgs_config.shared_parameters import (
     CHARACTER,
     COMMAND_DELAY,
     GRAVITY,
-    NO_GROUND,
     PLACEMENT,
     PLANE,
     RATE,
@@ -30,10 +25,6 @@ from sim_node.initial_state import (
     check_given,
     initial_state_parameters,
 )
-from sim_node.physics.probe import measure_inverse_mass
-from sim_node.physics.simulated_character import CharacterSetup
-from sim_node.physics.simulation import SimulationSettings
-from sim_node.physics.world import WorldSettings
 
 _LARGEST_COUNT = 2**62
 _FIRST = (CHARACTER, PLACEMENT)  # the others depend on them
@@ -253,53 +244,3 @@ def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
     except (ConfigurationError, LayoutError) as error:
         raise ConfigurationError(f"character '{name}': {error}" if name else str(error)) from error
     return CharacterParameters(name, character, values)
-
-
-def make_character_setup(
-    character: Character, values: Values, name: str = "", inverse_mass: FloatArray | None = None
-) -> CharacterSetup:
-    """The character's part in the simulation that the parameters' values say.
-
-    `inverse_mass` (n, n) is the inverse mass matrix near the rest pose, if it was measured before.
-    """
-    return CharacterSetup(
-        character=character,
-        commanded_joints=values.texts("commanded_joints"),
-        initial_position=values.numbers(POSITION),
-        initial_velocity=values.numbers(VELOCITY),
-        inverse_mass=measure_inverse_mass(character) if inverse_mass is None else inverse_mass,
-        name=name,
-    )
-
-
-def make_settings(values: Values) -> SimulationSettings:
-    """The settings of the simulation that the parameters' values say.
-
-    Raises:
-        CharacterError: the terrain's URDF cannot be read.
-    """
-    rate, substeps = values.integer("rate"), values.integer("substeps")
-    terrain, lifetime = values.text("terrain"), values.number("ball_lifetime")
-    return SimulationSettings(
-        rate_hz=rate,
-        substeps=substeps,
-        speed_limit=values.number("speed_limit"),
-        command_delay_ticks=values.integer("command_delay_ticks"),
-        ball_ticks=max(round(lifetime * rate), 1) if lifetime else 0,
-        world=WorldSettings(
-            step_s=1.0 / (rate * substeps),
-            gravity=values.number("gravity"),
-            friction=values.number("friction"),
-            link_friction=values.number("link_friction"),
-            solver_iterations=values.integer("solver_iterations"),
-            ground=terrain == PLANE,
-            terrain=None if terrain in (PLANE, NO_GROUND) else _read_terrain(terrain),
-        ),
-    )
-
-
-def _read_terrain(path: str) -> UrdfOptions:
-    urdf = files.resolve(path, Path.cwd(), CharacterError)
-    text = files.read_text(urdf, CharacterError)
-    check_urdf(urdf, text)
-    return UrdfOptions(urdf, text, fixed_base=True)

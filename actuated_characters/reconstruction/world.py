@@ -14,8 +14,8 @@ from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import SimulationError
-from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation, Snapshot
+from sim_node.simulation_factory import make_character_setup, make_settings
 
 
 @dataclass(frozen=True)

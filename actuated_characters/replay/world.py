@@ -13,15 +13,11 @@ from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.messages.clock import TickClock
 from msgs_config.parameters import Values, resolve
 from msgs_config.versions import describe_changes, installed_versions
-from sim_node.parameters import (
-    PARAMETERS,
-    character_parameters,
-    make_character_setup,
-    make_settings,
-)
+from sim_node.parameters import PARAMETERS, character_parameters
 from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.wrenches import ExternalWrench
+from sim_node.simulation_factory import make_character_setup, make_settings
 
 _GROUNDS = ("plane", "none")
 _MOST_BEHIND = 1  # states by which a recorder that is stopped may have more of one than of another

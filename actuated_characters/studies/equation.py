@@ -14,8 +14,8 @@ from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
-from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
+from sim_node.simulation_factory import make_character_setup, make_settings
 
 TITLE = "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part"
 RUNS = 3

@@ -1,5 +1,6 @@
 """ROS interface of one character: subscribes to commands and wrenches, publishes its state."""
 
+import numpy as np
 from rclpy.node import Node
 
 from msgs_config.arrays import FloatArray
@@ -113,6 +114,12 @@ class CharacterInterface:
                 kind=f"a {status.value} command{self._of}",
             )
         return status
+
+    def fill_missing(self, *, holds: bool) -> None:
+        """Command what is missing in lockstep: the last effort, or zero."""
+        assert isinstance(self.commands, LockstepBarrier)  # real time has no missing commands
+        last = self.last_effort
+        self.commands.fill_missing(last if holds else np.zeros_like(last))
 
     def take_effort(self) -> FloatArray:
         """The commanded effort (n,) of the tick that ends now."""

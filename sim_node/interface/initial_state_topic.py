@@ -9,12 +9,12 @@ from msgs_config.errors import LayoutError, MessageError, SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import Values
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from sim_node.initial_state import GIVEN, INITIAL_STATE, check_state
+from sim_node.initial_state import GIVEN, INITIAL_STATE, begins_with_reference, check_state
 from sim_node.interface.publisher_diagnosis import describe_publishers, publisher_names
+from sim_node.parameters import SimulatorParameters
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
@@ -28,13 +28,17 @@ class InitialStates:
     """The initial states that controllers have to publish."""
 
     def __init__(
-        self, node: Node, characters: Iterable[SimulatedCharacter], values: Values
+        self, node: Node, characters: Iterable[SimulatedCharacter], parameters: SimulatorParameters
     ) -> None:
         """Subscribe to the controllers of the characters that begin with their references."""
         self._node = node
-        self._timeout = values.number("initial_state_timeout")
-        speed_limit = values.number("speed_limit")
-        self._subscriptions = [_Subscription(node, each, speed_limit) for each in characters]
+        self._timeout = parameters.values.number("initial_state_timeout")
+        speed_limit = parameters.values.number("speed_limit")
+        self._subscriptions = [
+            _Subscription(node, each, speed_limit)
+            for each, own in zip(characters, parameters.characters, strict=True)
+            if begins_with_reference(own.values)
+        ]
 
     def wait(self, stop: StopSignal, executor: PollingExecutor) -> dict[str, StampedState]:
         """Wait for the states, by the characters' names; none if `stop` comes first.

@@ -16,6 +16,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Parameter, Values, resolve
 from sim_node import parameters as sim_parameters
+from sim_node.simulation_factory import make_character_setup
 from tests.support.urdf import link, robot, write_character
 
 FLAG = Parameter("flag", True, "a flag")
@@ -275,7 +276,7 @@ def test_the_name_that_a_parameter_had_before_is_taken_with_a_warning() -> None:
 def test_the_defaults_of_one_node_are_a_simulation(character: Character) -> None:
     values = resolve(sim_node_parameters(character), {})
 
-    made = sim_parameters.make_character_setup(character, values)
+    made = make_character_setup(character, values)
 
     assert made.commanded_joints == tuple(character.layout.actuated_joint_names)
     assert made.initial_position == character.rest_position

@@ -31,13 +31,9 @@ from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import placed
 from sim_node.initial_state import begins_with_reference
-from sim_node.parameters import (
-    CharacterParameters,
-    load_parameters,
-    make_character_setup,
-    make_settings,
-)
+from sim_node.parameters import CharacterParameters, load_parameters
 from sim_node.physics.simulation import Simulation
+from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.ros import Inbox, Process, Processes, SimulatorClient, stamp_ns
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -14,8 +14,8 @@ from sim_node.parameters import (
     WORLD_PARAMETERS,
     character_parameters,
     load_parameters,
-    make_settings,
 )
+from sim_node.simulation_factory import make_settings
 from tests.support.physics import (
     FLOATING_TURNED_FRAMES,
     box_character,

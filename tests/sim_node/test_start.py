@@ -12,9 +12,10 @@ from msgs_config import files
 from msgs_config.character.bullet import pybullet
 from msgs_config.character.robot_description import robot_description
 from msgs_config.messages import configuration
-from sim_node.parameters import load_parameters, make_character_setup, make_settings
+from sim_node.parameters import load_parameters
 from sim_node.physics.probe import probe_engine
 from sim_node.physics.simulation import Simulation
+from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.physics import DATA
 
 

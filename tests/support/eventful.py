@@ -13,9 +13,9 @@ from msgs_config.messages import configuration, topics
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 from msgs_config.parameters import Values
-from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
+from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.bags import Said, said_configuration, said_references, said_states
 from tests.support.bags import add_timed as add_timed
 from tests.support.bags import write_timed as write_timed

@@ -20,11 +20,11 @@ from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.node_settings import make_node_settings
-from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
 from sim_node.physics.wrenches import WrenchQueue
+from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.physics import read_wrenches
 
 

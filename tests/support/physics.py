@@ -30,6 +30,7 @@ from sim_node.physics.simulated_character import CharacterSetup, SimulatedCharac
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.world import World, WorldSettings
 from sim_node.physics.wrenches import ExternalWrench
+from sim_node.simulation_factory import make_character_setup, make_settings, make_simulation
 
 DATA = Path(__file__).parents[1] / "data"
 TURNED_FRAMES = [str(path) for path in sorted(DATA.glob("turned_frames*.yaml"))]
@@ -282,19 +283,12 @@ def simulation(name: str, **given: object) -> LoneSimulation:
     whole = character(name)
     parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
     values = resolve(parameters, given)
-    return LoneSimulation(
-        for_simulator.make_character_setup(whole, values), for_simulator.make_settings(values)
-    )
+    return LoneSimulation(make_character_setup(whole, values), make_settings(values))
 
 
 def joint_simulation(given: Mapping[str, object]) -> Simulation:
     """A simulation of several characters, with the parameters given."""
-    loaded = for_simulator.load_parameters(given)
-    setups = [
-        for_simulator.make_character_setup(each.character, each.values, each.name)
-        for each in loaded.characters
-    ]
-    return Simulation(setups, for_simulator.make_settings(loaded.values))
+    return make_simulation(for_simulator.load_parameters(given))
 
 
 def controller(name: str, **given: object) -> Controller:

@@ -25,7 +25,7 @@ from msgs_config.errors import RecordingError
 from msgs_config.messages import configuration
 from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.versions import installed_versions
-from sim_node.parameters import make_settings
+from sim_node.simulation_factory import make_settings
 from tests.support.bags import (
     CONFIGURATION,
     Made,

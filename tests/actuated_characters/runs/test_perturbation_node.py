@@ -27,9 +27,9 @@ from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.parameters import make_character_setup, make_settings
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
+from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.physics import character
 from tests.support.ros import Processes
 from tests.support.runs import family, run_plan

@@ -1,0 +1,72 @@
+"""Publishes what concerns the whole simulator: its ticks, episodes and configuration."""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
+
+from rclpy.node import Node
+
+from msgs_config.messages import topics
+from msgs_config.messages.joint_state import encode_clock
+from msgs_config.messages.probe import DynamicsSample
+from msgs_config.messages.topics import Outgoing
+from sim_node.interface.publishers import Publishers
+from sim_node.interface.world_interface import WorldInterface
+from sim_node.parameters import SimulatorParameters
+from sim_node.physics.simulation import Simulation
+
+
+class SimulatorPublisher:
+    """Publishes each tick in a row, in the order in which controllers may wait for its messages."""
+
+    def __init__(
+        self,
+        node: Node,
+        simulation: Simulation,
+        world: WorldInterface,
+        of_characters: Sequence[Publishers],
+    ) -> None:
+        """Offer the clock."""
+        self._simulation = simulation
+        self._world = world
+        self.of_characters = of_characters
+        self._clock_topic = topics.create_publisher(node, topics.CLOCK)
+
+    def publish_configurations(
+        self, parameters: SimulatorParameters, samples: Sequence[DynamicsSample]
+    ) -> None:
+        """Publish each character's parameters, and the dynamics that the engine has for it."""
+        terrain = self._simulation.settings.world.terrain
+        for each, own, sample in zip(
+            self.of_characters, parameters.characters, samples, strict=True
+        ):
+            each.publish_configuration(own.values, sample, terrain, parameters.names)
+
+    def publish_episode(self) -> None:
+        """Publish that the present tick is the first of an episode."""
+        for each in self.of_characters:
+            each.publish_episode(self._simulation.episode, self._simulation.stamp_ns)
+
+    def republish(self, *, with_states: bool, with_episode: bool) -> None:
+        """Publish the present states again, for late subscribers, or the episode."""
+        for each in self.of_characters:
+            each.republish(with_state=with_states, with_episode=with_episode)
+
+    def publish_tick(self) -> None:
+        """Publish the present tick; what is only displayed comes after the states."""
+        topics.publish_together(self._messages())
+        for each in self.of_characters:
+            each.publish_display(self._simulation.tick)
+
+    def is_acknowledged(self, seconds: float) -> bool:
+        """Wait at most `seconds` until every subscriber has the last tick; whether it has."""
+        of_ticks = [each.of_ticks for each in self.of_characters]
+        return topics.flush(chain(self._world.publishers, *of_ticks), seconds)
+
+    def _messages(self) -> Iterator[Outgoing]:
+        """The messages that are published before the tick can be answered, the states last."""
+        yield self._clock_topic, encode_clock(self._simulation.stamp_ns)
+        yield from self._world.messages()
+        for each in self.of_characters:
+            yield from each.before_state()
+        for each in self.of_characters:
+            yield each.state()

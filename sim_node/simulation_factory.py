@@ -1,0 +1,86 @@
+"""Makes the simulation that the parameters of `sim_node` say."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from msgs_config import files
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Character, UrdfOptions
+from msgs_config.character.urdf_check import check_urdf
+from msgs_config.errors import CharacterError
+from msgs_config.parameters import Values
+from msgs_config.shared_parameters import NO_GROUND, PLANE
+from sim_node.initial_state import POSITION, VELOCITY
+from sim_node.parameters import SimulatorParameters
+from sim_node.physics.probe import measure_inverse_mass
+from sim_node.physics.simulated_character import CharacterSetup
+from sim_node.physics.simulation import Simulation, SimulationSettings
+from sim_node.physics.world import WorldSettings
+
+
+def make_simulation(
+    parameters: SimulatorParameters, inverse_masses: Sequence[FloatArray | None] | None = None
+) -> Simulation:
+    """The simulation of all characters; `inverse_masses` as `make_character_setup` takes them.
+
+    Raises:
+        CharacterError: the engine rejects a character, or the terrain's URDF cannot be read.
+    """
+    characters = parameters.characters
+    setups = [
+        make_character_setup(each.character, each.values, each.name, inverse_mass)
+        for each, inverse_mass in zip(
+            characters, inverse_masses or [None] * len(characters), strict=True
+        )
+    ]
+    return Simulation(setups, make_settings(parameters.values))
+
+
+def make_character_setup(
+    character: Character, values: Values, name: str = "", inverse_mass: FloatArray | None = None
+) -> CharacterSetup:
+    """The character's part in the simulation that the parameters' values say.
+
+    `inverse_mass` (n, n) is the inverse mass matrix near the rest pose, if it was measured before.
+    """
+    return CharacterSetup(
+        character=character,
+        commanded_joints=values.texts("commanded_joints"),
+        initial_position=values.numbers(POSITION),
+        initial_velocity=values.numbers(VELOCITY),
+        inverse_mass=measure_inverse_mass(character) if inverse_mass is None else inverse_mass,
+        name=name,
+    )
+
+
+def make_settings(values: Values) -> SimulationSettings:
+    """The settings of the simulation that the parameters' values say.
+
+    Raises:
+        CharacterError: the terrain's URDF cannot be read.
+    """
+    rate, substeps = values.integer("rate"), values.integer("substeps")
+    terrain, lifetime = values.text("terrain"), values.number("ball_lifetime")
+    return SimulationSettings(
+        rate_hz=rate,
+        substeps=substeps,
+        speed_limit=values.number("speed_limit"),
+        command_delay_ticks=values.integer("command_delay_ticks"),
+        ball_ticks=max(round(lifetime * rate), 1) if lifetime else 0,
+        world=WorldSettings(
+            step_s=1.0 / (rate * substeps),
+            gravity=values.number("gravity"),
+            friction=values.number("friction"),
+            link_friction=values.number("link_friction"),
+            solver_iterations=values.integer("solver_iterations"),
+            ground=terrain == PLANE,
+            terrain=None if terrain in (PLANE, NO_GROUND) else _read_terrain(terrain),
+        ),
+    )
+
+
+def _read_terrain(path: str) -> UrdfOptions:
+    urdf = files.resolve(path, Path.cwd(), CharacterError)
+    text = files.read_text(urdf, CharacterError)
+    check_urdf(urdf, text)
+    return UrdfOptions(urdf, text, fixed_base=True)
