@@ -1,11 +1,10 @@
 """The controller without ROS: state in, effort and reference out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.balance import BalanceController, BalanceGains
+from controller_node.balance import BalanceController
 from controller_node.behaviours.base import (
     BehaviourChoice,
     BehaviourOutput,
@@ -19,7 +18,11 @@ from controller_node.control_laws import (
     LawContext,
     TrackingInput,
     make_law,
-    scale_gains,
+)
+from controller_node.controller_settings import (
+    ControllerSettings,
+    EffectiveGains,
+    effective_gains,
 )
 from controller_node.effort_series import EffortSeries
 from controller_node.model_check import check_agreement, check_inertia
@@ -37,27 +40,6 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.state import StampedReference, StampedState
-
-
-@dataclass(frozen=True)
-class ControllerSettings:
-    """The law, its gains and the balance, which may change from one tick to the next."""
-
-    law: str
-    gains: GainArrays
-    follows_velocity: bool  # the reference's; else the desired velocity is zero
-    balance: BalanceGains | None = None  # None: nothing but the law
-    strengths: FloatArray | None = None  # (b,) shares of the gains that count; None: all of them
-
-
-@dataclass(frozen=True)
-class _EffectiveGains:
-    """The gains in force until settings or strengths change."""
-
-    from_messages: FloatArray  # (b,) the strengths that messages set
-    strengths: FloatArray  # (b,) those times the settings' own
-    gains: GainArrays  # the settings' times these
-    assisted: bool  # whether the gains drive a floating base
 
 
 class Controller:
@@ -120,7 +102,7 @@ class Controller:
         self._law: Law = make_law(self._settings.law, self._context)
         self._behaviour = self._make_behaviour()
         self._strengths = StrengthSchedule(self.layout)
-        self._effective: _EffectiveGains | None = None
+        self._effective: EffectiveGains | None = None
         self._tracked = TrackedReference(
             self._character, self._own_reference, self.clock, episode_ns
         )
@@ -269,18 +251,11 @@ class Controller:
             assisted=effective.assisted,
         )
 
-    def _effective_gains(self, stamp_ns: int) -> _EffectiveGains:
+    def _effective_gains(self, stamp_ns: int) -> EffectiveGains:
         """The gains in force at a stamp, computed where settings or strengths change."""
         strengths = self._strengths.at(stamp_ns)
         if self._effective is None or self._effective.from_messages is not strengths:
-            gains, own = self._settings.gains, self._settings.strengths
-            both = strengths if own is None else own * strengths
-            if own is not None:
-                gains = scale_gains(self.layout, gains, own)
-            gains = scale_gains(self.layout, gains, strengths)
-            root = gains.stiffness[:6].any() or gains.damping[:6].any()
-            assisted = self.layout.has_floating_base and bool(root)
-            self._effective = _EffectiveGains(strengths, both, gains, assisted)
+            self._effective = effective_gains(self.layout, self._settings, strengths)
         return self._effective
 
     def _take(self, output: BehaviourOutput, stamp_ns: int) -> None:

@@ -9,11 +9,11 @@ import numpy as np
 from rclpy.node import Node
 
 from controller_node.actuation import describe_actuation
-from controller_node.behaviours.base import ModeReport
 from controller_node.interface.contact_subscription import ContactSubscription
 from controller_node.interface.publishers import Publishers, Reply
 from controller_node.interface.simulators import Simulators, check_simulator
 from controller_node.interface.stamped_topics import StampedTopics
+from controller_node.interface.state_decoder import StateDecoder
 from controller_node.parameters import (
     PARAMETERS,
     character_parameters,
@@ -21,13 +21,11 @@ from controller_node.parameters import (
     make_controller,
     make_settings,
 )
-from controller_node.planner.outlook import Outlook
 from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
-from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.session import ANONYMOUS, given_session
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
@@ -78,7 +76,7 @@ class ControllerNode(Node):
 
     def _open_topics(self) -> None:
         controller, logger = self._controller, self._once_logger
-        self._decoder = JointStateDecoder()
+        self._decoder = StateDecoder(self._layout, controller.clock)
         self._simulators = Simulators(
             self,
             given_session(self._values),
@@ -92,8 +90,6 @@ class ControllerNode(Node):
             else None
         )
         self._pending_state: bytes | None = None  # a state, for the contacts of its tick
-        self._published_mode: ModeReport | None = None
-        self._published_outlook: Outlook | None = None
         # after them: a simulator that has found this subscription has found the others as well
         self._states = DirectSubscription(self, topics.JOINT_STATES)
         joints = commanded_joints(self._character, self._values)
@@ -158,18 +154,9 @@ class ControllerNode(Node):
         if self._is_answered(raw):
             return
         with suppress(MessageError, LayoutError, ClockError):
-            state, _ = self._decode(raw)
+            state, _ = self._decoder.decode(raw)
             if state.effort is None:
                 self._begin_episode(state.stamp_ns)
-
-    def _decode(self, raw: bytes) -> tuple[StampedState, str]:
-        """The state in a message, whose stamp is a tick, and its `frame_id`."""
-        arrays = self._decoder.decode(raw)
-        state = state_in_layout(self._layout, arrays)
-        if not (np.isfinite(state.position).all() and np.isfinite(state.velocity).all()):
-            raise MessageError("it is not finite")
-        self._controller.clock.tick(state.stamp_ns)
-        return state, arrays.frame_id
 
     def _take_state(self, raw: bytes) -> None:
         if not self._is_heard():
@@ -180,7 +167,7 @@ class ControllerNode(Node):
             self._outputs.publish(self._last_reply)
             return
         try:
-            state, frame_id = self._decode(raw)
+            state, frame_id = self._decoder.decode(raw)
         except (MessageError, LayoutError, ClockError) as error:
             self._counts["ignored"] += 1
             self._once_logger.log_once(f"state ignored: {error}")
@@ -210,7 +197,8 @@ class ControllerNode(Node):
         self._last_reply = self._outputs.make_reply(raw, state, effort, reference)
         self._answer_times.add(time.perf_counter() - started)
         self._counts["answered"] += 1
-        self._publish_mode_and_plan(state.stamp_ns)
+        mode, outlook = self._controller.mode, self._controller.outlook
+        self._outputs.publish_changes(mode, outlook, state.stamp_ns)
         self._outputs.publish(self._last_reply)
         if self._upcoming is not None:
             self._take_parameters(self._upcoming)
@@ -229,16 +217,6 @@ class ControllerNode(Node):
             self._outputs.bind(self._simulators.bound or ANONYMOUS)
             if self._contacts is not None:
                 self._contacts.restart()
-
-    def _publish_mode_and_plan(self, stamp_ns: int) -> None:
-        """Publish the mode and the expectation of the plan, where they are new."""
-        mode, outlook = self._controller.mode, self._controller.outlook
-        if outlook is not None and outlook is not self._published_outlook:
-            self._published_outlook = outlook
-            self._outputs.publish_plan(outlook, stamp_ns)
-        if mode is not None and mode is not self._published_mode:
-            self._published_mode = mode
-            self._outputs.publish_mode(mode)
 
     def _is_heard(self) -> bool:
         """Whether all that are to hear the first answer are there; later ones wait for none."""
@@ -281,7 +259,7 @@ class ControllerNode(Node):
         """Forget the episode before; a first state that waits for its contacts may do it again."""
         self._episode_ns = stamp_ns
         self._controller.begin_episode(stamp_ns)
-        self._published_mode = None
+        self._outputs.begin_episode()
         if self._contacts is not None:
             self._contacts.begin()
 

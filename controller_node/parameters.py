@@ -9,7 +9,8 @@ from controller_node.balance import BalanceGains
 from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS, choose_behaviour
 from controller_node.behaviours.settings import check_terrain
 from controller_node.control_laws import LAWS, GainArrays
-from controller_node.controller import Controller, ControllerSettings
+from controller_node.controller import Controller
+from controller_node.controller_settings import ControllerSettings
 from controller_node.effort_series import read_effort_series
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.factory import make_planner

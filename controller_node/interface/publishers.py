@@ -1,4 +1,4 @@
-"""The publishers of the controller, and its answers to states."""
+"""The publishers of the controller, and its replies to states."""
 
 import json
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ from msgs_config.messages.wrenches import WORLD
 
 @dataclass(frozen=True)
 class Reply:
-    """An answer, kept: a state that comes again gets it again, and nothing is computed again."""
+    """The reply to a state; a state that comes again gets it again, without another computation."""
 
     raw_state: bytes
     state: StampedState
@@ -60,6 +60,8 @@ class Publishers:
         self._strengths = topics.create_publisher(node, topics.ACTIVE_STRENGTH)
         self._modes = topics.create_publisher(node, topics.MODE)
         self._plans = topics.create_publisher(node, topics.PLAN)
+        self._published_mode: ModeReport | None = None
+        self._published_outlook: Outlook | None = None
 
     def publish_initial_state(self, state: StampedState) -> None:
         """Publish in which state the reference begins."""
@@ -84,14 +86,14 @@ class Publishers:
     def make_reply(
         self, raw: bytes, state: StampedState, effort: FloatArray, reference: StampedReference
     ) -> Reply:
-        """The answer with an effort (n,) to a state, ready to be published."""
+        """The reply with an effort (n,) to a state, ready to be published."""
         torques = self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded])
         sent = np.zeros(self._layout.size)
         sent[self._commanded] = effort[self._commanded]
         return Reply(raw, state, sent, torques, self._session, reference)
 
     def publish(self, reply: Reply) -> None:
-        """Publish an answer, the torques first: the simulator goes on while the rest is made."""
+        """Publish a reply, the torques first: the simulator goes on while the rest is made."""
         self._torques.publish(reply.torques)
         topics.publish_together(self._beside_torques(reply))
 
@@ -128,14 +130,25 @@ class Publishers:
         message.name, message.effort = list(values), list(values.values())
         self._strengths.publish(message)
 
-    def publish_mode(self, report: ModeReport) -> None:
-        """Publish the mode, since when and why it holds, as JSON."""
-        self._modes.publish(String(data=json.dumps(report.content(), allow_nan=False)))
+    def begin_episode(self) -> None:
+        """Publish the next mode even where it is the one of before."""
+        self._published_mode = None
 
-    def publish_plan(self, outlook: Outlook, stamp_ns: int) -> None:
-        """Publish the expectation of a plan that was made in the state of a stamp."""
-        if self._plans.get_subscription_count():
-            self._plans.publish(plan_message(outlook, stamp_ns))
+    def publish_changes(
+        self, mode: ModeReport | None, outlook: Outlook | None, stamp_ns: int
+    ) -> None:
+        """Publish the mode as JSON, and the expectation of a plan, where they are new.
+
+        The mode's report tells since when and why it holds; `stamp_ns` is that of the state in
+        which the plan was made.
+        """
+        if outlook is not None and outlook is not self._published_outlook:
+            self._published_outlook = outlook
+            if self._plans.get_subscription_count():
+                self._plans.publish(plan_message(outlook, stamp_ns))
+        if mode is not None and mode is not self._published_mode:
+            self._published_mode = mode
+            self._modes.publish(String(data=json.dumps(mode.content(), allow_nan=False)))
 
     def _net_wrench(self, reply: Reply) -> bytes:
         """The serialised message."""

@@ -1,0 +1,42 @@
+"""What a controller may change from one tick to the next: its law, gains and balance."""
+
+from dataclasses import dataclass
+
+from controller_node.balance import BalanceGains
+from controller_node.control_laws import GainArrays, scale_gains
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointLayout
+
+
+@dataclass(frozen=True)
+class ControllerSettings:
+    """The law, its gains and the balance, which may change from one tick to the next."""
+
+    law: str
+    gains: GainArrays
+    follows_velocity: bool  # the reference's; else the desired velocity is zero
+    balance: BalanceGains | None = None  # None: nothing but the law
+    strengths: FloatArray | None = None  # (b,) shares of the gains that count; None: all of them
+
+
+@dataclass(frozen=True)
+class EffectiveGains:
+    """The gains in force until settings or strengths change."""
+
+    from_messages: FloatArray  # (b,) the strengths that messages set
+    strengths: FloatArray  # (b,) those times the settings' own
+    gains: GainArrays  # the settings' times these
+    assisted: bool  # whether the gains drive a floating base
+
+
+def effective_gains(
+    layout: JointLayout, settings: ControllerSettings, strengths: FloatArray
+) -> EffectiveGains:
+    """The settings' gains times their own strengths (b,) and those that messages set (b,)."""
+    gains, own = settings.gains, settings.strengths
+    both = strengths if own is None else own * strengths
+    if own is not None:
+        gains = scale_gains(layout, gains, own)
+    gains = scale_gains(layout, gains, strengths)
+    root = gains.stiffness[:6].any() or gains.damping[:6].any()
+    return EffectiveGains(strengths, both, gains, layout.has_floating_base and bool(root))
