@@ -288,18 +288,13 @@ def run(
     directory = Path(output).absolute()
     prepare_directory(directory, overwrite=overwrite)
     if in_process:
-        run_in_process(plan, directory, progress=_ignore)
+        run_in_process(plan, directory)
     else:
-        run_over_topics(plan, directory, write_bag=True, progress=_ignore)
+        run_over_topics(plan, directory, write_bag=True)
     metrics, _ = read_metrics(directory)
     return metrics
 
 
-def _ignore(ticks: int) -> None:
-    """Report no progress."""
-
-
 def _drivable(character: Character) -> list[str]:
     """The joints that have a motor, and the root of a floating base."""
-    root = ["root"] * character.layout.has_floating_base
-    return root + character.layout.actuated_joint_names
+    return ["root"] * character.layout.has_floating_base + character.layout.actuated_joint_names

@@ -32,7 +32,7 @@ def measure_replay(console: Console) -> list[Ratio]:
         directory = Path(folder) / "run"
         prepare_directory(directory, overwrite=False)
         plan = make_plan("humanoid", _DURATION, _WALK, {}, {})
-        run_over_topics(plan, directory, write_bag=True, progress=lambda ticks: None)
+        run_over_topics(plan, directory, write_bag=True)
         times = [time.process_time()]
         recordings = read_recordings(directory)
         times.append(time.process_time())

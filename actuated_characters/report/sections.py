@@ -11,7 +11,6 @@ from matplotlib.image import imsave
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.error_measures import (
     effort_sizes,
-    fall_time,
     limit_shares,
     vector_kinds,
 )
@@ -28,6 +27,7 @@ from actuated_characters.report.page import NOT_KNOWN, Illustration, Section, Ta
 from actuated_characters.report.planning import foresight, plan_chart
 from actuated_characters.report.reactions import TRACK, mode_line, thrown_line
 from actuated_characters.report.timing import lateness, pauses, wall_steps
+from actuated_characters.report.verdict import describe_end, tiles
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
 
@@ -42,12 +42,6 @@ STILLS = 8
 
 _MOST_LISTED = 200
 _PERCENTILE = 95
-_TILES = (
-    ("mean joint error", "joint_error_mean_rad", "rad"),
-    ("mean slider error", "slider_error_mean_m", "m"),
-    ("mean root error", "root_error_mean_m", "m"),
-    ("largest root error", "root_error_max_m", "m"),
-)
 _STATISTICS = ("mean", f"{_PERCENTILE} %", "largest")
 
 
@@ -100,35 +94,8 @@ class CharacterReport:
 
     def _result(self) -> Section:
         pictures, remarks = self._strip()
-        return Section("", pictures, remarks=remarks, verdict=self._verdict(), tiles=self._tiles())
-
-    def _verdict(self) -> str:
-        """A sentence on how the run ended."""
-        recording, law = self._recording, self._facts.law
-        length = f"{recording.times[-1]:.4g} s"
-        if not self._facts.reference:
-            verdict = f"A run of {length} without a reference"
-        elif self._metrics["fell"]:
-            height, desired = recording.position[:, 2], recording.reference_position[:, 2]
-            verdict = f"It fell at {fall_time(recording.times, height, desired):.3g} s of {length}"
-        elif self._metrics["fell"] is not None:
-            verdict = f"It tracked its reference for {length} without a fall"
-        else:
-            verdict = f"It tracked its reference for {length}"
-        return verdict + (f" (control law {law})." if law else ".")
-
-    def _tiles(self) -> list[tuple[str, str]]:
-        """The figures that support the verdict, as far as they could be measured."""
-        metrics = {name: value for name, value in self._metrics.items() if isinstance(value, float)}
-        tiles = [
-            (title, f"{metrics[key]:.3g} {unit}") for title, key, unit in _TILES if key in metrics
-        ]
-        force, weight = metrics.get("assist_force_mean_n"), metrics["body_weight_n"]
-        if force is not None and weight > 0.0:
-            tiles.append(("mean root force / weight", f"{force / weight:.3g}"))
-        if "saturated_fraction" in metrics:
-            tiles.append(("at effort limits", f"{100.0 * metrics['saturated_fraction']:.3g} %"))
-        return tiles
+        sentence = describe_end(self._recording, self._facts, self._metrics)
+        return Section("", pictures, remarks=remarks, verdict=sentence, tiles=tiles(self._metrics))
 
     def _strip(self) -> tuple[list[Illustration], list[str]]:
         """The picture of the character, or a note why there is none."""

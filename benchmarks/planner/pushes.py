@@ -12,7 +12,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
@@ -33,6 +33,7 @@ from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
 from actuated_characters.runs.planned_throws import PlannedThrow, plan_throws  # noqa: E402
 from actuated_characters.runs.planned_wrenches import PlannedPush, plan_push  # noqa: E402
 from benchmarks.planner.push_picture import draw  # noqa: E402
+from benchmarks.planner.walks import KINDS, Impulse, Walk, walks  # noqa: E402
 from controller_node.behaviours.base import Mode  # noqa: E402
 from controller_node.parameters import make_controller  # noqa: E402
 from controller_node.planner.anchor import Anchor  # noqa: E402
@@ -42,7 +43,6 @@ from msgs_config.geometry import rotations  # noqa: E402
 from msgs_config.messages.state import StampedReference, StampedState  # noqa: E402
 
 LOWEST, FARTHEST_TURN = 0.65, 1.5  # of the clip's height; rad
-CYCLE = 1.27  # s, of the walk
 LINK = "root"
 BALL = "mass=2.5 speed=8 target=chest at={:.4f} from={:.4f}"
 BALL_LIFETIME = 0.6  # s, of which it flies 0.2
@@ -50,53 +50,6 @@ MISSED = 0.2  # m, of the walk beside its clip
 EVERY = 0.1  # s, from one look to the next
 COLUMNS = ("kind", "upright", "fell at, s", "error 0, 1, 2, 3 s after, m", "away, m", "missed")
 NODES = ("sim_node", "controller_node")
-
-
-@dataclass(frozen=True)
-class Kind:
-    """How walks are pushed."""
-
-    forwards: float = 0.0  # N s
-    sideways: float | None = None  # N s; None: as hard from any side
-    hardest: float | None = None  # N s, likewise; None: all are as hard
-    pushes: int = 1
-    every: float = 2.0  # s
-    lasts: float = 0.2  # s, of each
-    balls: bool = False  # at the chest; the clip's heading is forwards
-    stands: bool = False  # instead of walking
-    duration: float = 8.5  # s
-    behaviour: str = "tracking"
-
-
-KINDS = {
-    "none": Kind(pushes=0, duration=20.0),
-    "10 N s every 2 s": Kind(10.0, pushes=9, lasts=0.1, duration=20.0),
-    "20 N s every 2 s": Kind(20.0, pushes=9, lasts=0.1, duration=20.0),
-    "48 or 60 N s": Kind(48.0, 60.0),
-    "77 or 96 N s": Kind(77.0, 96.0),
-    "balls": Kind(20.0, pushes=5, every=4.0, duration=20.0, balls=True),
-    "standing": Kind(12.0, pushes=11, every=5.0, lasts=0.1, duration=60.0, stands=True),
-    "any": Kind(40.0, hardest=240.0, duration=5.5),
-    "fall": Kind(200.0, duration=16.0, behaviour="active_ragdoll"),
-}
-
-
-@dataclass(frozen=True)
-class Impulse:
-    """A push at the root's centre of mass."""
-
-    time: float  # s
-    impulse: tuple[float, float]  # N s, forwards and to the left
-
-
-@dataclass(frozen=True)
-class Walk:
-    """A walk, and what comes to it."""
-
-    kind: str
-    seed: int
-    pushes: tuple[Impulse, ...]
-    settings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -109,27 +62,6 @@ class WalkResult:
     errors: tuple[float, ...]  # m, of the centre of mass, from where the clip has given way to
     away: float  # m, of the clip's centre of mass from its own place, at the end
     missed: int  # balls
-
-
-def walks(name: str, count: int, settings: tuple[str, ...]) -> list[Walk]:
-    """The walks of a kind, each with other pushes and another seed."""
-    return [
-        Walk(name, 1 + number, tuple(_pushes(name, number)), settings) for number in range(count)
-    ]
-
-
-def _pushes(name: str, number: int) -> Iterator[Impulse]:
-    kind, draws = KINDS[name], np.random.default_rng((number, len(name)))
-    for push in range(kind.pushes):
-        time = kind.every * push + 1.0 + draws.uniform(0.0, CYCLE)
-        side = draws.uniform(-math.pi, math.pi)
-        if kind.sideways is None:
-            size = draws.uniform(kind.forwards, kind.hardest) if kind.hardest else kind.forwards
-            impulse = size * math.cos(side), size * math.sin(side)
-        else:
-            sideways = math.copysign(kind.sideways, side)
-            impulse = (kind.forwards, 0.0) if number % 2 else (0.0, sideways)
-        yield Impulse(float(time), impulse)
 
 
 # A walk

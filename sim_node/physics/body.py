@@ -16,8 +16,8 @@ from msgs_config.character.bullet import load_urdf, pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order, frames, rotations
+from sim_node.physics.engine_defaults import remove_motors, set_link_dynamics
 
-_UNLIMITED_SPEED = 1e9  # Bullet clamps at 100 otherwise, and a divergence would stay unseen
 _FAR = 1e3  # m, beyond which the engine need not look for what is near
 
 
@@ -58,7 +58,10 @@ class Body:
         self._base_turn = turns[0]
         self._base_turn_back: list[float] = self._turns_back[0].tolist()
         self._find_joints(character)
-        self._remove_motors_and_damping(friction)
+        set_link_dynamics(client, self._body, friction)
+        pairs = zip(self._joints, self._axes, strict=True)
+        balls = [number for number, axes in pairs if axes is not None]
+        remove_motors(client, self._body, self._joints, balls)
         if not self._floating:
             pose = character.links[0].joint.pose_in_parent
             self._place_base(np.array(pose.position), np.array(pose.orientation_xyzw))
@@ -76,47 +79,12 @@ class Body:
         joints = [j for j in self._layout.joints if j.type is not JointType.FLOATING]
         self._joints = [numbers[joint.name] for joint in joints]
         self._entries = [joint.entries for joint in joints]
-        self._balls = [numbers[j.name] for j in joints if j.type is JointType.SPHERICAL]
         turns = {link.joint.name: link.inertial_pose.orientation_xyzw for link in character.links}
         # of each joint; the axes of a ball joint's inertial frame in its link's
         self._axes = [
             frames.axes(turns[joint.name]) if joint.type is JointType.SPHERICAL else None
             for joint in joints
         ]
-
-    def _remove_motors_and_damping(self, friction: float) -> None:
-        """Switch off the engine's default motors and damping, and set the friction."""
-        # One call a setting: a link silently loses some of those that share a call.
-        settings = (
-            {"linearDamping": 0.0, "angularDamping": 0.0},
-            {"jointDamping": 0.0},
-            {"lateralFriction": friction},
-            {"maxJointVelocity": _UNLIMITED_SPEED},
-        )
-        for link in range(-1, pybullet.getNumJoints(self._body, physicsClientId=self._client)):
-            for setting in settings:
-                pybullet.changeDynamics(self._body, link, **setting, physicsClientId=self._client)
-        for index in self._joints:
-            pybullet.setJointMotorControl2(
-                self._body,
-                index,
-                pybullet.POSITION_CONTROL,
-                positionGain=0.0,
-                targetVelocity=0.0,
-                force=0.0,
-                physicsClientId=self._client,
-            )
-        for index in self._balls:  # a ball joint has a second default motor
-            pybullet.setJointMotorControlMultiDof(
-                self._body,
-                index,
-                pybullet.POSITION_CONTROL,
-                targetPosition=rotations.IDENTITY_XYZW,
-                positionGain=0.0,
-                velocityGain=1.0,
-                force=(0.0, 0.0, 0.0),
-                physicsClientId=self._client,
-            )
 
     def read(self) -> tuple[FloatArray, FloatArray]:
         """Position and velocity (n,)."""

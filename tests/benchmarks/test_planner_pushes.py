@@ -8,7 +8,8 @@ import pytest
 
 from benchmarks.planner.clips import _with_mass
 from benchmarks.planner.push_picture import half_borne
-from benchmarks.planner.pushes import KINDS, _plan, _planned, _throws, walks
+from benchmarks.planner.pushes import _plan, _planned, _throws
+from benchmarks.planner.walks import KINDS, walks
 from msgs_config.character.loading import load_character
 from msgs_config.messages.clock import TickClock
 

@@ -148,7 +148,7 @@ def test_the_states_are_those_of_one_process_with_the_same_pushes_to_the_bit(pus
 def test_a_run_in_one_process_takes_the_same_pushes(pushed: Made, tmp_path: Path) -> None:
     prepare_directory(tmp_path / "run", overwrite=False)
 
-    run_in_process(plan_of(), tmp_path / "run", progress=lambda _: None, pushes=PLANNED)
+    run_in_process(plan_of(), tmp_path / "run", pushes=PLANNED)
 
     summary, _ = read_metrics(tmp_path / "run")
     assert summary["state_hash"] == pushed.summary["state_hash"]

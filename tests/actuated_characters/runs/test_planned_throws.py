@@ -283,7 +283,7 @@ def test_the_bag_says_what_was_thrown_and_where_it_went(thrown: Made) -> None:
 def test_a_run_in_one_process_takes_the_same_throws(thrown: Made, tmp_path: Path) -> None:
     prepare_directory(tmp_path / "run", overwrite=False)
 
-    run_in_process(thrown.plan, tmp_path / "run", progress=lambda _: None, throws=thrown.throws)
+    run_in_process(thrown.plan, tmp_path / "run", throws=thrown.throws)
 
     summary, _ = read_metrics(tmp_path / "run")
     assert summary["state_hash"] == thrown.summary["state_hash"]
@@ -336,7 +336,7 @@ def test_the_bag_says_what_the_controller_did_about_it(thrown: Made) -> None:
 def test_a_replay_through_topics_sends_the_balls_as_well(thrown: Made) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("ROS_DOMAIN_ID", raising=False)
-        result = replay_commands(thrown.directory, progress=lambda _: None, tell=lambda _: None)
+        result = replay_commands(thrown.directory, tell=lambda _: None)
 
     assert result.identical and result.states == 181
 
@@ -399,6 +399,6 @@ def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path
     with_both = [tick.following for tick in ticks_in_process(plan, pushes, throws)]
     with_one = [tick.following for tick in ticks_in_process(plan, pushes)]
     assert not np.array_equal(with_both[-1].position, with_one[-1].position)  # it has hit
-    run_in_process(plan, directory, progress=lambda _: None, pushes=pushes, throws=throws)
+    run_in_process(plan, directory, pushes=pushes, throws=throws)
     again, _ = read_metrics(directory)
     assert again["state_hash"] == summary["state_hash"]

@@ -1,0 +1,47 @@
+"""Bullet's defaults that a character does without: damping, a limit on speed, joint motors."""
+
+from collections.abc import Sequence
+
+from msgs_config.character.bullet import pybullet
+from msgs_config.geometry import rotations
+
+_UNLIMITED_SPEED = 1e9  # Bullet clamps at 100 otherwise, and a divergence would stay unseen
+
+
+def set_link_dynamics(client: int, body: int, friction: float) -> None:
+    """Switch off the damping of a body's links and joints, and set every link's friction."""
+    # One call a setting: a link silently loses some of those that share a call.
+    settings = (
+        {"linearDamping": 0.0, "angularDamping": 0.0},
+        {"jointDamping": 0.0},
+        {"lateralFriction": friction},
+        {"maxJointVelocity": _UNLIMITED_SPEED},
+    )
+    for link in range(-1, pybullet.getNumJoints(body, physicsClientId=client)):
+        for setting in settings:
+            pybullet.changeDynamics(body, link, **setting, physicsClientId=client)
+
+
+def remove_motors(client: int, body: int, joints: Sequence[int], balls: Sequence[int]) -> None:
+    """Switch off the motors that hold joints, by the engine's numbers; `balls` are among them."""
+    for index in joints:
+        pybullet.setJointMotorControl2(
+            body,
+            index,
+            pybullet.POSITION_CONTROL,
+            positionGain=0.0,
+            targetVelocity=0.0,
+            force=0.0,
+            physicsClientId=client,
+        )
+    for index in balls:  # a ball joint has a second default motor
+        pybullet.setJointMotorControlMultiDof(
+            body,
+            index,
+            pybullet.POSITION_CONTROL,
+            targetPosition=rotations.IDENTITY_XYZW,
+            positionGain=0.0,
+            velocityGain=1.0,
+            force=(0.0, 0.0, 0.0),
+            physicsClientId=client,
+        )
