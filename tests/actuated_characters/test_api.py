@@ -168,9 +168,9 @@ def test_a_mistake_is_one_clear_line(wrong, words, pendulum) -> None:  # type: i
 
 @pytest.mark.slow
 def test_a_run_over_topics_has_the_hash_of_the_lines_of_the_api(tmp_path: Path) -> None:
-    figures = ac.run("pendulum", 0.5, output=tmp_path / "run", controller=SWINGING)
+    metrics = ac.run("pendulum", 0.5, output=tmp_path / "run", controller=SWINGING)
 
-    assert figures["state_hash"] == hash_of_run("pendulum", 0.5, controller=SWINGING)
+    assert metrics["state_hash"] == hash_of_run("pendulum", 0.5, controller=SWINGING)
     with pytest.raises(ac.ActuatedCharactersError, match="overwrite"):
         ac.run("pendulum", 0.5, output=tmp_path / "run")
     joined = ac.run(
@@ -181,7 +181,7 @@ def test_a_run_over_topics_has_the_hash_of_the_lines_of_the_api(tmp_path: Path) 
         in_process=True,
         controller=SWINGING,
     )
-    assert joined["state_hash"] == figures["state_hash"]
+    assert joined["state_hash"] == metrics["state_hash"]
 
 
 @pytest.mark.slow

@@ -64,5 +64,5 @@ def test_a_shell_completes_commands_options_names_and_files(
     command = [sys.executable, "-m", "actuated_characters.cli"]
     subprocess.run(command, cwd=tmp_path, env=os.environ | asked, check=False)
 
-    answers = (tmp_path / "answer").read_text().split("\n")
-    assert {answer.strip() for answer in answers} == expected
+    completions = (tmp_path / "answer").read_text().split("\n")
+    assert {completion.strip() for completion in completions} == expected

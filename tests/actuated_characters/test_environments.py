@@ -52,11 +52,11 @@ def test_a_motion_that_is_tracked_is_worth_more_than_one_that_is_not_and_a_fall_
     rewards, ends = [], []
     controller = ac.Controller(ac.load_character("humanoid"), clip="walk", root_assistance=False)
     environment = make(clip="walk", ticks_per_step=1)
-    for answer in (lambda state: np.zeros(34), controller.compute_effort):
+    for policy in (lambda state: np.zeros(34), controller.compute_effort):
         environment.reset(seed=0)
         total, terminated = 0.0, False
         while not terminated and environment.simulation.time < 3.0:
-            effort = answer(environment.simulation.state)
+            effort = policy(environment.simulation.state)
             _, reward, terminated, truncated, _ = environment.step(effort[6:])
             assert 0.0 < reward <= 1.0
             assert not truncated
@@ -106,8 +106,8 @@ def test_what_diverges_ends_with_a_finite_observation() -> None:
 def test_a_placed_reference_is_in_its_world() -> None:
     environment = make(clip="walk", simulator={"placement": [2.0, 1.0, 0.0, 0.0]})
     position = environment.simulation.state.position
-    plain = make(clip="walk").simulation.state.position
-    np.testing.assert_allclose(position[:3] - plain[:3], (2.0, 1.0, 0.0), atol=1e-12)
+    nominal = make(clip="walk").simulation.state.position
+    np.testing.assert_allclose(position[:3] - nominal[:3], (2.0, 1.0, 0.0), atol=1e-12)
     environment.close()
 
 

@@ -177,14 +177,14 @@ def test_the_controller_publishes_it_with_the_stamp_of_the_state_that_it_answers
         simulator.send(state, lambda stamp=stamp: stamp in map(stamp_ns, wrenches.messages))
 
         # Assert
-        said = wrenches.last
+        published = wrenches.last
         efforts = dict(zip(torques.name, torques.effort, strict=True))
         root = np.array([efforts.get(f"root_{axis}", 0.0) for axis in ("x", "y", "z")])
         turning = np.array([efforts.get(f"root_r{axis}", 0.0) for axis in ("x", "y", "z")])
         in_world = rotations.matrix(rotations.exp(position[3:6])) @ turning
-        force, torque = said.wrench.force, said.wrench.torque
-        assert stamp_ns(said) == stamp
-        assert said.header.frame_id == "world"
+        force, torque = published.wrench.force, published.wrench.torque
+        assert stamp_ns(published) == stamp
+        assert published.header.frame_id == "world"
         assert [force.x, force.y, force.z] == root.tolist()
         np.testing.assert_allclose([torque.x, torque.y, torque.z], in_world, rtol=0.0, atol=1e-9)
         assert np.all(root != 0.0) if assistance else not root.any()

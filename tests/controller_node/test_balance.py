@@ -249,10 +249,12 @@ def test_the_effort_is_statics_by_hand(humanoid: Character, balance: BalanceCont
         ):
             if foot in below(humanoid, index):
                 load += np.cross(point - origins[index], force) + moment
-        held = -rotations.rotate(rotations.conjugate(turns[index]), load)
+        load_in_link = -rotations.rotate(rotations.conjugate(turns[index]), load)
         is_hinge = link.joint.type is JointType.REVOLUTE
         entries = humanoid.layout.joint(link.joint.name).entries
-        expected[entries] = held @ np.array(link.joint.axis_in_child) if is_hinge else held
+        expected[entries] = (
+            load_in_link @ np.array(link.joint.axis_in_child) if is_hinge else load_in_link
+        )
 
     # Act
     effort = balance.effort(model, BalanceGains())

@@ -91,8 +91,8 @@ def test_columns_may_come_in_any_order_and_those_that_are_missing_are_zero(tmp_p
 
     effort = read_effort_series(LAYOUT, file).at(0.0)
 
-    said = {"wrist_x": 1.0, "wrist_y": 2.0, "wrist_z": 3.0, "elbow": 4.0}
-    assert effort.tolist() == [said.get(name, 0.0) for name in LAYOUT.dof_names]
+    efforts = {"wrist_x": 1.0, "wrist_y": 2.0, "wrist_z": 3.0, "elbow": 4.0}
+    assert effort.tolist() == [efforts.get(name, 0.0) for name in LAYOUT.dof_names]
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"], ids=["Unix", "Windows", "old Mac"])

@@ -205,15 +205,15 @@ def test_the_integral_begins_at_zero_though_the_first_states_of_the_episode_were
     driver = controller("pendulum", law="pid", **{"gains.hinge.i": 100.0})
     clock, rest = driver.clock, np.array(character("pendulum").rest_position)
 
-    def answer(position: FloatArray, tick: int, episode: int) -> float:
+    def compute(position: FloatArray, tick: int, episode: int) -> float:
         state = StampedState(clock.stamp_ns(tick), position, np.zeros(1), np.zeros(1))
         return float(driver.compute_effort(state, clock.stamp_ns(episode))[0][0])
 
     for tick in range(1, 13):
-        answer(rest - 0.5, tick, episode=1)
+        compute(rest - 0.5, tick, episode=1)
 
-    assert answer(rest, 13, episode=1) > 1.0
-    assert answer(rest, 13 + 15, episode=13) == 0.0
+    assert compute(rest, 13, episode=1) > 1.0
+    assert compute(rest, 13 + 15, episode=13) == 0.0
 
 
 def test_the_same_state_twice_does_not_advance_the_integral() -> None:

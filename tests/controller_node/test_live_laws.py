@@ -142,7 +142,7 @@ def test_looking_whether_settings_can_be_taken_changes_nothing(series: str) -> N
 # Over the topics
 
 
-def said(simulator: ControllerClient, **expected: object) -> dict[str, Any]:
+def await_configuration(simulator: ControllerClient, **expected: object) -> dict[str, Any]:
     """The configuration that holds these values, once it has come."""
 
     def found() -> dict[str, Any] | None:
@@ -189,7 +189,7 @@ def test_laws_and_gains_of_a_hinge_are_their_closed_forms_from_the_next_state_on
         in_pid = in_pid or value == "pid"
         expected = law(error, velocity, integral)
         assert torques.effort[0] == pytest.approx(expected, rel=1e-9, abs=1e-12), (name, value)
-        content = said(simulator, **{name: value})
+        content = await_configuration(simulator, **{name: value})
         assert content["parameters_after_stamp_ns"] == CLOCK.stamp_ns(tick - 1)
         assert simulator.get_parameters(NODE, [name]) == [value]
 
@@ -230,7 +230,7 @@ def test_what_runs_the_humanoid_is_changed_step_by_step(
         last = effort
         for name, value in changes[tick - 1 : tick]:
             assert simulator.set_parameter(NODE, name, value) == (True, "")
-            content = said(simulator, **{name: value})
+            content = await_configuration(simulator, **{name: value})
             assert content["parameters_after_stamp_ns"] == state.stamp_ns
             in_force[name] = value
 
@@ -239,12 +239,12 @@ def test_a_change_before_the_first_answer_counts_from_the_beginning(
     processes: Processes, simulator: ControllerClient
 ) -> None:
     processes.controller("pendulum")
-    assert said(simulator)["parameters_after_stamp_ns"] is None
+    assert await_configuration(simulator)["parameters_after_stamp_ns"] is None
 
     taken, _ = simulator.set_parameter(NODE, "law", "zero")
 
     assert taken
-    assert said(simulator, law="zero")["parameters_after_stamp_ns"] is None
+    assert await_configuration(simulator, law="zero")["parameters_after_stamp_ns"] is None
     torques = simulator.ask(as_message("pendulum", some_state("pendulum", 1)))
     assert list(torques.effort) == [0.0]
 
@@ -271,7 +271,8 @@ def test_changes_that_come_together_are_taken_all_or_none(
 ) -> None:
     processes.controller("pendulum")
     simulator.ask(as_message("pendulum", some_state("pendulum", 1)))
-    said(simulator, law="stable_pd")  # the first one; only the last one would come later
+    # the first one; only the last one would come later
+    await_configuration(simulator, law="stable_pd")
     together: list[dict[str, object]] = [
         {"gains.hinge.p": 80.0, "law": "feedforward"},  # there is no file for it
         {"gains.hinge.p": 80.0, "gains.hinge.d": -1.0},
@@ -293,7 +294,7 @@ def test_changes_that_come_together_are_taken_all_or_none(
     assert [result.successful for result in results] == [False, False, True]
     assert "CSV file" in results[0].reason and "-1.0" in results[1].reason
     assert torques.effort[0] == pytest.approx(90.0 * (TARGET - state.position[0]), rel=1e-12)
-    content = said(simulator, law="p")
+    content = await_configuration(simulator, law="p")
     assert content["parameters"]["gains.hinge.p"] == 90.0
     assert content["parameters_after_stamp_ns"] == FIRST
     assert len(simulator.configuration) == 2  # the refused ones were not worth a message

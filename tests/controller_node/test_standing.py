@@ -17,7 +17,7 @@ TOES = ["toeFR", "toeFL", "toeRR", "toeRL"]
 TOE_RADIUS = 0.03  # m, in the robot's URDF
 
 
-def held(name: str, seconds: float, with_root: bool) -> tuple[LoneSimulation, float]:
+def stand(name: str, seconds: float, with_root: bool) -> tuple[LoneSimulation, float]:
     """A simulation whose rest pose was held, and the largest share of an effort limit used."""
     layout = character(name).layout
     commanded = [*(["root"] if with_root else []), *layout.actuated_joint_names]
@@ -31,7 +31,7 @@ def held(name: str, seconds: float, with_root: bool) -> tuple[LoneSimulation, fl
 
 @pytest.mark.parametrize("name", ["franka_panda", "kuka"])
 def test_an_arm_holds_its_rest_pose(name: str) -> None:
-    run, share = held(name, seconds=4.0, with_root=False)
+    run, share = stand(name, seconds=4.0, with_root=False)
 
     assert np.abs(run.state.velocity).max() < 1e-6
     assert run.state.position == pytest.approx(character(name).rest_position, abs=0.1)
@@ -45,7 +45,7 @@ def test_the_quadruped_stands_still_on_its_four_feet(with_root: bool) -> None:
     toes = [index for index, link in enumerate(whole.links) if link.name in TOES]
 
     # Act
-    run, share = held("laikago", seconds=6.0, with_root=with_root)
+    run, share = stand("laikago", seconds=6.0, with_root=with_root)
 
     # Assert
     assert np.abs(run.state.velocity).max() < 0.01

@@ -98,11 +98,11 @@ def _kill_one(nodes: Nodes, run: Path, compression: str, life: float, found: _Fo
     """Start a recorder, kill it and recover what it leaves; False if it was a deaf one."""
     parameters = {"directory": str(run), "compression": compression}
     recorder = nodes.start(topics.RECORDER_NODE, {**parameters, "progress_period": 0.1})
-    said, spoke_at = _kill(recorder, life)
-    if not _FIRST_STATE.search(said):
+    output, spoke_at = _kill(recorder, life)
+    if not _FIRST_STATE.search(output):
         found.deaf += 1
         return False
-    complete = said[: said.rfind("\n") + 1].splitlines()
+    complete = output[: output.rfind("\n") + 1].splitlines()
     flushed = [int(line.split()[1]) for line in complete if line.startswith("flushed ")]
     last_flushed = max(flushed, default=0)
     try:
@@ -116,14 +116,14 @@ def _kill_one(nodes: Nodes, run: Path, compression: str, life: float, found: _Fo
         raise RuntimeError("the bag of a killed recorder is complete")
     _check(run / BAG, recovered.contents.counts, last_flushed, found)
     found.recovered += 1
-    unreadable = [lost for lost in recovered.contents.unreadable if not _CUT_OFF.fullmatch(lost)]
+    unreadable = [part for part in recovered.contents.unreadable if not _CUT_OFF.fullmatch(part)]
     if unreadable:
         raise RuntimeError(f"unreadable: {'; '.join(unreadable)}")
     if last_flushed:  # else there are only latched messages, as old as they may be
-        lost = spoke_at - recovered.contents.last_log_time_ns / NANOSECONDS_PER_SECOND
-        found.most_lost = max(found.most_lost, lost)
-        if lost > _MOST_LOST:
-            raise RuntimeError(f"the last {unreadable:.2f} s are lost")
+        gap = spoke_at - recovered.contents.last_log_time_ns / NANOSECONDS_PER_SECOND
+        found.most_lost = max(found.most_lost, gap)
+        if gap > _MOST_LOST:
+            raise RuntimeError(f"the last {gap:.2f} s are lost")
     return True
 
 
@@ -134,12 +134,12 @@ def _kill(recorder: Child, life: float) -> tuple[str, float]:
         All that it said, and the wall time of its last word, s: on a busy machine it may have had
         no turn since.
     """
-    said, spoke_at, listens = "", 0.0, False
+    output, spoke_at, listens = "", 0.0, False
     deadline = time.monotonic() + _PATIENCE
     while time.monotonic() < deadline:
-        if len(word := recorder.stdout) > len(said):
-            said, spoke_at = word, time.time()
-            if not listens and _FIRST_STATE.search(said):
+        if len(word := recorder.stdout) > len(output):
+            output, spoke_at = word, time.time()
+            if not listens and _FIRST_STATE.search(output):
                 listens, deadline = True, time.monotonic() + life
         if recorder.exit_code is not None:
             raise RuntimeError(f"the recorder ended by itself: {recorder.last_words()}")

@@ -190,12 +190,12 @@ def main() -> int:
         }
         rclpy.init()
         noise = _Noise(Node("noise"), session)
-        waiting = {"wait_for_subscribers": 2}
+        parameters = {"wait_for_subscribers": 2}
         started = {
             topics.CONTROLLER_NODE: children.start_node(
                 topics.CONTROLLER_NODE, {**given, **_MOVING}
             ),
-            topics.SIM_NODE: children.start_node(topics.SIM_NODE, {**given, **first, **waiting}),
+            topics.SIM_NODE: children.start_node(topics.SIM_NODE, {**given, **first, **parameters}),
         }
         growth = run(messages, started, noise)
         ended = [node for node, child in started.items() if child.exit_code is not None]

@@ -39,7 +39,7 @@ from msgs_config.messages.clock import TickClock  # noqa: E402
 from msgs_config.messages.joint_state import JointStateDecoder  # noqa: E402
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches  # noqa: E402
 from msgs_config.runtime.polling import DirectSubscription  # noqa: E402
-from tests.endurance.soak_findings import MEMORY_PERIOD, Findings  # noqa: E402
+from tests.endurance.soak_report import MEMORY_PERIOD, SoakReport  # noqa: E402
 
 _RATE = 240  # Hz
 _MOST_GROWTH = 5.0  # MB
@@ -56,7 +56,7 @@ Progress = Callable[[int], None]
 _Disturbance = Iterator[Future | None]
 
 
-def soak(ticks: int, seed: int, progress: Progress) -> Findings:
+def soak(ticks: int, seed: int, progress: Progress) -> SoakReport:
     """Run simulator and controller for a number of ticks with seeded disturbances.
 
     Raises:
@@ -105,9 +105,9 @@ class _Soak:
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
         self._tick = 0
-        self._found = Findings()
+        self._found = SoakReport()
 
-    def run(self, progress: Progress) -> Findings:
+    def run(self, progress: Progress) -> SoakReport:
         """Until the simulator has ended by itself."""
         found = self._found
         started_at = heard_at = time.monotonic()
@@ -220,7 +220,7 @@ class _Soak:
 
     def _look_at_memory(self) -> None:
         for name, child in self._started.items():
-            self._found.memory.setdefault(name, []).append(private_memory(child))
+            self._found.megabytes.setdefault(name, []).append(private_memory(child))
 
     def _judge(self) -> None:
         found = self._found

@@ -6,7 +6,7 @@ import pytest
 
 from msgs_config.runtime.polling import DirectSubscription
 from tests.endurance import soak as soak_module
-from tests.endurance import soak_findings
+from tests.endurance import soak_report
 from tests.endurance.soak import soak
 
 
@@ -15,15 +15,15 @@ def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     del domain  # the processes inherit it
-    monkeypatch.setattr(soak_findings, "SETTLED", 2_000)
-    for module in (soak_module, soak_findings):
+    monkeypatch.setattr(soak_report, "SETTLED", 2_000)
+    for module in (soak_module, soak_report):
         monkeypatch.setattr(module, "MEMORY_PERIOD", 500)
 
     found = soak(5_000, seed=2, progress=lambda tick: None)
 
     assert found.problems == []
     assert found.ticks == 5_000
-    assert all(len(samples) == 11 for samples in found.memory.values())
+    assert all(len(samples) == 11 for samples in found.megabytes.values())
     assert set(found.growth) == {"sim_node", "controller_node"}
     assert set(found.disturbances) == {"push", "pause", "reset", "set_gain", "set_duration"}
 

@@ -34,7 +34,7 @@ from sim_node.initial_state import begins_with_reference
 from sim_node.parameters import CharacterParameters, load_parameters
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_settings
-from tests.support.ros import Inbox, Process, Processes, SimulatorClient, stamp_ns
+from tests.support.ros import Process, Processes, ReceivedMessages, SimulatorClient, stamp_ns
 
 CONFIG = Path(__file__).parents[2] / "config"
 SIMULATOR, CONTROLLER = "/sim_node", "/controller_node"
@@ -150,11 +150,11 @@ WAITING = "[sim_node]: waiting for "  # rightly, where controllers take long to 
 
 
 def complaints(nodes: Iterable[Process]) -> list[str]:
-    said = [line for node in nodes for line in node.stderr.splitlines()]
-    return [line for line in said if WAITING not in line]
+    lines = [line for node in nodes for line in node.stderr.splitlines()]
+    return [line for line in lines if WAITING not in line]
 
 
-def have_been_answered(states: Inbox) -> bool:
+def have_been_answered(states: ReceivedMessages) -> bool:
     """Whether some states have come, of a character that is moved by torques."""
     stamps = {stamp_ns(state) for state in states.messages}
     return len(stamps) >= A_FEW_TICKS and any(any(state.effort) for state in states.messages)

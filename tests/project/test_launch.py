@@ -173,9 +173,9 @@ def test_all_nodes_end_when_one_ends(name: str) -> None:
 
 @pytest.mark.parametrize("name", FILES)
 def test_every_argument_has_a_description_and_a_default(name: str) -> None:
-    for said in launch_file(name).declared.values():
-        assert said["description"]
-        assert isinstance(said["default_value"], str)
+    for declaration in launch_file(name).declared.values():
+        assert declaration["description"]
+        assert isinstance(declaration["default_value"], str)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -212,9 +212,9 @@ def test_what_is_handed_to_an_included_file_is_an_argument_of_it(name: str) -> N
 
 @pytest.mark.parametrize("name", FILES)
 def test_the_parameter_file_ships(name: str) -> None:
-    for argument, said in launch_file(name).declared.items():
+    for argument, declaration in launch_file(name).declared.items():
         if argument == "config":
-            assert (PROJECT / "config" / said["default_value"]).is_file()
+            assert (PROJECT / "config" / declaration["default_value"]).is_file()
 
 
 def test_controllers_stand_in_the_namespaces_of_the_two_characters() -> None:

@@ -63,12 +63,12 @@ def imported(file: str) -> Iterator[str]:
 
 def state_path() -> list[str]:
     """Every file that is imported on the way from a message to the next state."""
-    found, waiting = set[str](), list(ENTRANCES)
-    while waiting:
-        file = waiting.pop()
+    found, unread = set[str](), list(ENTRANCES)
+    while unread:
+        file = unread.pop()
         if file not in found:
             found.add(file)
-            waiting += imported(file)
+            unread += imported(file)
     return sorted(found - HOME - NO_STATES)
 
 

@@ -37,7 +37,7 @@ from tests.support.ros import (
 )
 
 HUMANOID = character("humanoid").layout
-SAID = topics.INITIAL_STATE.of(topics.CONTROLLER_NODE)
+INITIAL_STATE = topics.INITIAL_STATE.of(topics.CONTROLLER_NODE)
 SPEED_LIMIT = 500.0
 THIRD = 1.0 / 3.0  # of 17 digits
 ANSWERED = {"hinge": 0.25}
@@ -173,21 +173,21 @@ def test_a_controller_says_where_its_reference_begins_also_to_who_comes_late(
 ) -> None:
     processes.controller("humanoid", reference="clip", clip="walk", placement=[1.0, 2.0, 0.0, 0.5])
     placement = [1.0, 2.0, 0.0, 0.5]
-    said = []
+    states = []
     for name in ("early", "late"):
         client = Client(context, name)
-        inbox = client.listen(SAID)
+        inbox = client.listen(INITIAL_STATE)
         client.spin_until(lambda inbox=inbox: inbox.messages, "an initial state")
-        said.append(inbox.last)
+        states.append(inbox.last)
         client.close()
 
     first = reference_state("humanoid", reference="clip", clip="walk")
-    assert said[0] == said[1]
-    assert tuple(said[0].name) == HUMANOID.dof_names
-    assert stamp_ns(said[0]) == 0
-    assert list(said[0].velocity)[6:] == first.velocity.tolist()[6:]
-    assert list(said[0].position)[6:] == first.position.tolist()[6:]
-    assert np.allclose(said[0].position[:2], np.array(placement[:2]), atol=0.1)
+    assert states[0] == states[1]
+    assert tuple(states[0].name) == HUMANOID.dof_names
+    assert stamp_ns(states[0]) == 0
+    assert list(states[0].velocity)[6:] == first.velocity.tolist()[6:]
+    assert list(states[0].position)[6:] == first.position.tolist()[6:]
+    assert np.allclose(states[0].position[:2], np.array(placement[:2]), atol=0.1)
 
 
 # The simulator's node
@@ -222,17 +222,17 @@ def test_the_simulator_begins_where_it_is_told_and_tells_all_of_it(
     assert "'controller_node/initial_state' has no publisher" in line
     assert not client.states.messages and not client.configuration.messages
 
-    client.speak(SAID).publish(pendulum_state())
+    client.speak(INITIAL_STATE).publish(pendulum_state())
 
     assert begins_in(client.first_state()) == ([THIRD], [-THIRD])
     names = ["initial_state", "initial_position", "initial_velocity"]
-    said = ["reference", [THIRD], [-THIRD]]
+    expected = ["reference", [THIRD], [-THIRD]]
     values = client.get_parameters(topics.SIM_NODE, names)
-    assert [values[0], *map(list, values[1:])] == said
+    assert [values[0], *map(list, values[1:])] == expected
     late = join("late")
     late.spin_until(lambda: late.configuration.messages, "the configuration")
     parameters = json.loads(late.configuration.last.data)["parameters"]
-    assert [parameters[name] for name in names] == said
+    assert [parameters[name] for name in names] == expected
     assert simulator.stderr.count("waiting for the initial state") == 1
 
 
@@ -240,7 +240,7 @@ def test_entries_are_matched_by_name(processes: Processes, client: SimulatorClie
     position, velocity = random_state(character("humanoid"), np.random.default_rng(5))
     order = [*range(6, HUMANOID.size), *range(6)]
     names = [HUMANOID.dof_names[entry] for entry in order]
-    client.speak(SAID).publish(
+    client.speak(INITIAL_STATE).publish(
         joint_state(0, names, position[order].tolist(), velocity[order].tolist())
     )
 
@@ -255,12 +255,12 @@ def test_entries_are_matched_by_name(processes: Processes, client: SimulatorClie
 def test_a_state_that_is_there_already_is_taken_without_a_word_and_again_after_a_reset(
     processes: Processes, client: SimulatorClient
 ) -> None:
-    client.speak(SAID).publish(pendulum_state())
+    client.speak(INITIAL_STATE).publish(pendulum_state())
     simulator = asking(processes)
     first = client.first_state()
     assert begins_in(first) == ([THIRD], [-THIRD])
     assert simulator.stderr == ""
-    state = client.answer(first, ANSWERED)
+    state = client.advance(first, ANSWERED)
 
     client.reset()
 
@@ -282,14 +282,14 @@ WRONG: list[tuple[JointState | bytes, str]] = [  # and a part of what is said of
 def test_what_cannot_be_is_rejected_each_in_a_line_and_the_next_one_taken(
     processes: Processes, client: SimulatorClient
 ) -> None:
-    said, simulator = client.speak(SAID), asking(processes)
+    publisher, simulator = client.speak(INITIAL_STATE), asking(processes)
     for message, expected in WRONG:
-        said.publish(message)
+        publisher.publish(message)
         line = wait_for_line(client, simulator, expected)
         assert "initial state rejected: " in line
     assert not client.states.messages
 
-    said.publish(pendulum_state())
+    publisher.publish(pendulum_state())
 
     assert begins_in(client.first_state()) == ([THIRD], [-THIRD])
     lines = [line for line in simulator.stderr.splitlines() if "rejected" in line]
@@ -311,9 +311,9 @@ def test_without_a_state_in_time_it_ends_with_what_is_missing_and_the_remedy(
     timeout: float,
     expected: str,
 ) -> None:
-    said = client.speak(topics.JOINT_STATES if message is None else SAID)
+    publisher = client.speak(topics.JOINT_STATES if message is None else INITIAL_STATE)
     if message is not None:
-        said.publish(message)
+        publisher.publish(message)
 
     simulator = asking(processes, initial_state_timeout=timeout)
 
@@ -347,20 +347,20 @@ def test_services_and_parameters_answer_while_it_waits(
     names = client.list_parameters(topics.SIM_NODE)
     assert "initial_state" in names and "initial_position" not in names
     client.reset()
-    client.speak(SAID).publish(pendulum_state())
+    client.speak(INITIAL_STATE).publish(pendulum_state())
 
     second = client.state(2)  # the reset has consumed a tick
     assert client.pause(False).message == "running"
-    client.answer(second, ANSWERED)
+    client.advance(second, ANSWERED)
     assert begins_in(second) == ([THIRD], [-THIRD])
 
 
 def test_while_several_controllers_say_a_state_none_counts(
     processes: Processes, client: SimulatorClient, context: Context
 ) -> None:
-    own, other = client.speak(SAID), Client(context, "other")
+    own, other = client.speak(INITIAL_STATE), Client(context, "other")
     own.publish(pendulum_state(0.1))
-    other.speak(SAID).publish(pendulum_state(0.2))
+    other.speak(INITIAL_STATE).publish(pendulum_state(0.2))
     simulator = asking(processes)
     line = wait_for_line(client, simulator, "waiting")
     assert "several" in line and "/test_client" in line and "/other" in line
@@ -383,8 +383,8 @@ def test_each_of_several_characters_is_told_by_its_own_controller(
     assert "'two/controller_node/initial_state'" in line
     assert "three" not in line
     first = [join(f"at_{name}", name) for name in ("one", "two", "three")]
-    client.speak(SAID.under("two")).publish(pendulum_state(0.2))
-    client.speak(SAID.under("one")).publish(pendulum_state(0.1))
+    client.speak(INITIAL_STATE.under("two")).publish(pendulum_state(0.2))
+    client.speak(INITIAL_STATE.under("one")).publish(pendulum_state(0.1))
 
     states = [begins_in(each.first_state()) for each in first]
 

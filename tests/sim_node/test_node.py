@@ -88,7 +88,7 @@ def test_who_comes_late_hears_configuration_and_episode_too(
     processes: Processes, client: SimulatorClient, join: Join
 ) -> None:
     processes.simulator(republish_period=SOON)
-    client.answer(client.first_state(), {})
+    client.advance(client.first_state(), {})
     client.spin_until(lambda: client.configuration.messages, "configuration")
 
     late = join("late")
@@ -152,12 +152,12 @@ def test_old_and_future_stamps_are_counted_and_dropped(
     processes: Processes, client: SimulatorClient
 ) -> None:
     processes.simulator(max_ticks=2)
-    state = client.answer(client.first_state(), {"hinge": 1.0})
+    state = client.advance(client.first_state(), {"hinge": 1.0})
 
     client.command(TICK_NS, {"hinge": 1.0})
     client.command(stamp_ns(state) + TICK_NS, {"hinge": 8.0})
     client.command(0, {"hinge": 9.0})
-    state = client.answer(state, {"hinge": 2.0})
+    state = client.advance(state, {"hinge": 2.0})
 
     assert list(state.effort) == [2.0]
     client.reported(tick=3, accepted=2, stale=2, future=1)
@@ -203,7 +203,7 @@ def test_after_a_conflict_it_goes_on_when_it_is_told_to_and_asks_again(
     assert response.success
     client.spin_until(lambda: len(client.states) == 2, "the state again")
     assert client.states.raw[0] == client.states.raw[1]
-    state = client.answer(state, {"left_elbow": 4.0})
+    state = client.advance(state, {"left_elbow": 4.0})
     assert efforts_of(state)["left_elbow"] == 4.0
 
 
@@ -246,7 +246,7 @@ def test_a_malformed_command_is_rejected_whole_and_the_reason_named(
     for names, efforts, _ in MALFORMED.values():
         client.torques.publish(joint_state(stamp_ns(state), names, effort=efforts))
     client.torques.publish(b"\x00\x01\x00\x00\xff\xff\xff\xff")
-    state = client.answer(state, {"right_knee": 3.0})  # would conflict if any had been taken
+    state = client.advance(state, {"right_knee": 3.0})  # would conflict if any had been taken
 
     applied = {name: effort for name, effort in efforts_of(state).items() if effort}
     assert applied == {"right_knee": 3.0}
@@ -265,7 +265,7 @@ def test_a_wrong_message_at_every_tick_is_told_once(
 
     for _ in range(20):
         client.command(stamp_ns(state), {"tail": 1.0})
-        state = client.answer(state, {})
+        state = client.advance(state, {})
 
     client.reported(rejected=20)
     assert simulator.stderr.count("'tail'") == 1
@@ -300,12 +300,12 @@ def test_it_ends_well_after_its_last_tick_and_the_last_state_arrives(
     state = client.first_state()
 
     for _ in range(3):
-        state = client.answer(state, {"hinge": 1.0})
+        state = client.advance(state, {"hinge": 1.0})
 
     assert tick_of(state) == 4
     assert simulator.wait() == 0
-    said = simulator.stderr.splitlines()  # on a busy machine that it waits for this test
-    assert all("waiting for commands" in line for line in said)
+    lines = simulator.stderr.splitlines()  # on a busy machine that it waits for this test
+    assert all("waiting for commands" in line for line in lines)
 
 
 def test_a_timeout_does_not_run_before_the_first_command(
@@ -317,14 +317,14 @@ def test_a_timeout_does_not_run_before_the_first_command(
     wait_for_repeats(client, 5)
 
     assert simulator.exit_code is None
-    client.answer(client.states.last, {})
+    client.advance(client.states.last, {})
 
 
 def test_a_timeout_aborts_and_names_what_is_missing(
     processes: Processes, client: SimulatorClient
 ) -> None:
     simulator = processes.simulator("humanoid", lockstep_timeout=NO_TIME)
-    state = client.answer(client.first_state(), {})
+    state = client.advance(client.first_state(), {})
 
     client.command(stamp_ns(state), all_but_left_elbow(state))
 
@@ -341,7 +341,7 @@ def test_a_timeout_fills_in_the_last_command_or_zero_and_counts_it(
     simulator = processes.simulator(lockstep_timeout=NO_TIME, on_timeout=action, max_ticks=4)
     state = client.first_state()
 
-    client.answer(state, {"hinge": 1.5})
+    client.advance(state, {"hinge": 1.5})
 
     assert simulator.wait() == 0
     assert list(client.state(2).effort) == [1.5]
@@ -354,14 +354,14 @@ def test_a_timeout_pauses_until_it_is_told_to_go_on(
     processes: Processes, client: SimulatorClient
 ) -> None:
     simulator = processes.simulator(lockstep_timeout=NO_TIME, on_timeout="pause")
-    state = client.answer(client.first_state(), {})
+    state = client.advance(client.first_state(), {})
 
     status = client.reported(paused=True, tick=2)
     assert status.level == status.ERROR
     assert "no command within" in status.message
     assert client.pause(False).success
 
-    client.answer(state, {})
+    client.advance(state, {})
     assert simulator.exit_code is None
 
 
@@ -375,7 +375,7 @@ def test_it_pauses_on_request_and_goes_on(processes: Processes, client: Simulato
     assert status.level == status.OK
     assert client.pause(False).message == "running"
 
-    assert list(client.answer(state, {"hinge": 2.0}).effort) == [2.0]
+    assert list(client.advance(state, {"hinge": 2.0}).effort) == [2.0]
 
 
 def test_a_divergence_aborts_and_names_the_joint(
@@ -398,7 +398,7 @@ def test_a_signal_ends_it_promptly_and_well_while_somebody_listens(
     processes: Processes, client: SimulatorClient, number: signal.Signals
 ) -> None:
     simulator = processes.simulator()
-    client.answer(client.first_state(), {})
+    client.advance(client.first_state(), {})
 
     simulator.send(number)
 

@@ -156,14 +156,14 @@ def test_a_command_is_held_and_then_zero_is_applied(
     client.command(answered, {"hinge": 1.5})
     wait_for_ticks(client, 80)
 
-    held = sorted(tick for tick, effort in efforts(client).items() if effort)
-    assert held
-    assert held == list(range(held[0], held[-1] + 1))
-    assert {efforts(client)[tick] for tick in held} == {1.5}
+    commanded = sorted(tick for tick, effort in efforts(client).items() if effort)
+    assert commanded
+    assert commanded == list(range(commanded[0], commanded[-1] + 1))
+    assert {efforts(client)[tick] for tick in commanded} == {1.5}
     if stamped:  # from when it came, which is not known, to when the state is too old
-        assert held[-1] == round(answered * 240e-9) + HELD_TICKS + delay
+        assert commanded[-1] == round(answered * 240e-9) + HELD_TICKS + delay
     else:
-        assert len(held) == HELD_TICKS
+        assert len(commanded) == HELD_TICKS
     status = client.reported(accepted=1, command_timeouts=1, command_age_ms="none")
     assert status.level == status.OK
 

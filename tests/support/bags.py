@@ -20,7 +20,7 @@ from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE)
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
 
-Said = tuple[Topic, bytes]
+RawMessage = tuple[Topic, bytes]
 """A topic and a message on it, serialised."""
 
 
@@ -36,13 +36,13 @@ class Made:
         """The states, each once."""
         return [self.ticks[0].state, *(tick.following for tick in self.ticks)]
 
-    def messages(self) -> list[Said]:
+    def messages(self) -> list[RawMessage]:
         """What a recorder hears of it."""
         references = [tick.reference for tick in self.ticks if tick.reference is not None]
         return [
-            said_configuration(self.plan),
-            *said_states(self.plan, self.states),
-            *said_references(self.plan, references),
+            raw_configuration(self.plan),
+            *raw_states(self.plan, self.states),
+            *raw_references(self.plan, references),
         ]
 
 
@@ -57,53 +57,57 @@ def make_run(
     return Made(plan, list(ticks_in_process(plan)))
 
 
-def said_configuration(plan: RunPlan, name: str = "", characters: Sequence[str] = ()) -> Said:
+def raw_configuration(plan: RunPlan, name: str = "", characters: Sequence[str] = ()) -> RawMessage:
     text = configuration.describe(plan.character, plan.simulator, name=name, characters=characters)
     return CONFIGURATION, serialize_message(String(data=text))
 
 
-def said_states(plan: RunPlan, states: Iterable[StampedState]) -> list[Said]:
+def raw_states(plan: RunPlan, states: Iterable[StampedState]) -> list[RawMessage]:
     encoder = JointStateEncoder(plan.character.layout.dof_names)
-    said = []
+    messages = []
     for state in states:
         effort = () if state.effort is None else (state.effort,)
         raw = encoder.encode(state.stamp_ns, state.position, state.velocity, *effort)
-        said.append((topics.JOINT_STATES, raw))
-    return said
+        messages.append((topics.JOINT_STATES, raw))
+    return messages
 
 
-def said_references(plan: RunPlan, references: Iterable[StampedReference]) -> list[Said]:
+def raw_references(plan: RunPlan, references: Iterable[StampedReference]) -> list[RawMessage]:
     encoder = JointStateEncoder(plan.character.layout.dof_names)
     return [(REFERENCE, encoder.encode(r.stamp_ns, r.position, r.velocity)) for r in references]
 
 
-def said_wrenches(topic: Topic, wrenches: Iterable[WrenchArrays]) -> list[Said]:
+def raw_wrenches(topic: Topic, wrenches: Iterable[WrenchArrays]) -> list[RawMessage]:
     return [(topic, encode_wrenches(each)) for each in wrenches]
 
 
-def write_bag(path: Path, messages: Sequence[Said], namespace: str = "") -> Path:
+def write_bag(path: Path, messages: Sequence[RawMessage], namespace: str = "") -> Path:
     """Write a bag of messages in the order given; the directory."""
     return write_timed(path, _numbered(messages), namespace)
 
 
-def add_to(bag: BagWriter, messages: Sequence[Said], namespace: str = "") -> None:
+def add_to(bag: BagWriter, messages: Sequence[RawMessage], namespace: str = "") -> None:
     """Write messages into a bag that is open, all their topics in one namespace."""
     add_timed(bag, _numbered(messages), namespace)
 
 
-def _numbered(messages: Sequence[Said]) -> list[tuple[Said, int]]:
+def _numbered(messages: Sequence[RawMessage]) -> list[tuple[RawMessage, int]]:
     """Messages a nanosecond apart."""
-    return [(said, 1_000_000 + number) for number, said in enumerate(messages)]
+    return [(message, 1_000_000 + number) for number, message in enumerate(messages)]
 
 
-def write_timed(path: Path, messages: Sequence[tuple[Said, int]], namespace: str = "") -> Path:
+def write_timed(
+    path: Path, messages: Sequence[tuple[RawMessage, int]], namespace: str = ""
+) -> Path:
     """Write a bag of messages with their wall times, in the order given; the directory."""
     with BagWriter(path) as bag:
         add_timed(bag, messages, namespace)
     return path
 
 
-def add_timed(bag: BagWriter, messages: Sequence[tuple[Said, int]], namespace: str = "") -> None:
+def add_timed(
+    bag: BagWriter, messages: Sequence[tuple[RawMessage, int]], namespace: str = ""
+) -> None:
     """Write messages with their wall times into a bag that is open."""
     names = {f"/{topic.under(namespace).name}": topic for (topic, _), _ in messages}
     for name, topic in names.items():

@@ -16,7 +16,7 @@ from msgs_config.parameters import Values
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
 from sim_node.simulation_factory import make_character_setup, make_settings
-from tests.support.bags import Said, said_configuration, said_references, said_states
+from tests.support.bags import RawMessage, raw_configuration, raw_references, raw_states
 from tests.support.bags import add_timed as add_timed
 from tests.support.bags import write_timed as write_timed
 from tests.support.physics import read_wrenches
@@ -36,19 +36,19 @@ class Eventful:
     contacts: list[WrenchArrays] = field(default_factory=list)
     pushes: list[WrenchArrays] = field(default_factory=list)
     log_times_ns: list[int] = field(default_factory=list)  # of the states
-    said_by_controller: list[Said] = field(default_factory=list)
+    from_controller: list[RawMessage] = field(default_factory=list)
 
-    def messages(self, *, contacts: bool = True) -> list[tuple[Said, int]]:
+    def messages(self, *, contacts: bool = True) -> list[tuple[RawMessage, int]]:
         """All messages with their wall times."""
         first, times = self.log_times_ns[0], self.log_times_ns
         by_stamp = {s.stamp_ns: t for s, t in zip(self.states, times, strict=True)}
-        timed = [(said_configuration(self.plan), first - 2 * MS)]
-        timed += [(said, first - MS) for said in self.said_by_controller]
-        timed += list(zip(said_states(self.plan, self.states), times, strict=True))
-        references = said_references(self.plan, self.references)
+        timed = [(raw_configuration(self.plan), first - 2 * MS)]
+        timed += [(message, first - MS) for message in self.from_controller]
+        timed += list(zip(raw_states(self.plan, self.states), times, strict=True))
+        references = raw_references(self.plan, self.references)
         timed += [
-            (said, by_stamp[reference.stamp_ns])
-            for said, reference in zip(references, self.references, strict=True)
+            (message, by_stamp[reference.stamp_ns])
+            for message, reference in zip(references, self.references, strict=True)
         ]
         for topic, wrenches in (
             (topics.APPLIED_WRENCH, self.pushes),
@@ -108,10 +108,10 @@ def eventful_run(
             assert contacts is not None
             run.pushes.append(pushes)
             run.contacts.append(contacts)
-    run.said_by_controller.append(said_controller(plan, plan.controller))
+    run.from_controller.append(raw_controller(plan, plan.controller))
     return run
 
 
-def said_controller(plan: RunPlan, values: Values, since_ns: int | None = None) -> Said:
+def raw_controller(plan: RunPlan, values: Values, since_ns: int | None = None) -> RawMessage:
     text = configuration.describe(plan.character, values, since_ns)
     return CONTROLLER, serialize_message(String(data=text))

@@ -29,7 +29,7 @@ HUMBLE_QOS = """- history: 3
   avoid_ros_namespace_conventions: false"""
 
 
-class Said(NamedTuple):
+class TextMessage(NamedTuple):
     """A text on a topic."""
 
     topic: str
@@ -42,17 +42,17 @@ class Said(NamedTuple):
         return b"\x00\x01\x00\x00" + len(data).to_bytes(4, "little") + data
 
 
-SAID = [Said("/a" if number % 3 else "/b", number, f"text {number}") for number in range(30)]
+SENT = [TextMessage("/a" if number % 3 else "/b", number, f"text {number}") for number in range(30)]
 
 
-def texts(bag: Path) -> list[Said]:
+def texts(bag: Path) -> list[TextMessage]:
     """What a bag of texts says, by the project's own reader."""
-    return [Said(m.topic, m.log_time_ns, m.decode().data) for m in read_messages(bag)]
+    return [TextMessage(m.topic, m.log_time_ns, m.decode().data) for m in read_messages(bag)]
 
 
 def write_mcap(
     file: Path,
-    said: Iterable[Said],
+    messages: Iterable[TextMessage],
     *,
     chunk_size: int = 200,
     compression: CompressionType = CompressionType.ZSTD,
@@ -67,25 +67,25 @@ def write_mcap(
         writer.start(profile=profile, library="test")
         schema = writer.register_schema(TEXT, "ros2msg", b"string data\n")
         channels: dict[str, int] = {}
-        for topic, log_time_ns, text in said:
+        for topic, log_time_ns, text in messages:
             if topic not in channels:
                 metadata = {"offered_qos_profiles": HUMBLE_QOS, "topic_type_hash": "RIHS01_ab"}
                 channels[topic] = writer.register_channel(topic, serialization, schema, metadata)
-            raw = Said(topic, log_time_ns, text).cdr
+            raw = TextMessage(topic, log_time_ns, text).cdr
             writer.add_message(channels[topic], log_time_ns, raw, log_time_ns)
         if close:
             writer.finish()
     return file
 
 
-def write_humble_db3(file: Path, said: Iterable[Said], journal: str = "DELETE") -> Path:
+def write_humble_db3(file: Path, messages: Iterable[TextMessage], journal: str = "DELETE") -> Path:
     """An SQLite file with the tables of ROS 2 Humble."""
-    return _write_db3(file, said, journal, "", ())
+    return _write_db3(file, messages, journal, "", ())
 
 
-def write_jazzy_db3(file: Path, said: Iterable[Said]) -> Path:
+def write_jazzy_db3(file: Path, messages: Iterable[TextMessage]) -> Path:
     """An SQLite file with the tables of ROS 2 Jazzy."""
-    _write_db3(file, said, "DELETE", ", type_description_hash TEXT NOT NULL", ("RIHS01_ab",))
+    _write_db3(file, messages, "DELETE", ", type_description_hash TEXT NOT NULL", ("RIHS01_ab",))
     with closing(sqlite3.connect(file)) as database:
         database.executescript(
             f"""
@@ -104,7 +104,7 @@ def write_jazzy_db3(file: Path, said: Iterable[Said]) -> Path:
 
 
 def _write_db3(
-    file: Path, said: Iterable[Said], journal: str, column: str, value: tuple[str, ...]
+    file: Path, messages: Iterable[TextMessage], journal: str, column: str, value: tuple[str, ...]
 ) -> Path:
     with closing(sqlite3.connect(file)) as database:
         database.execute(f"PRAGMA journal_mode={journal}")
@@ -118,7 +118,7 @@ def _write_db3(
             """
         )
         numbers: dict[str, int] = {}
-        for each in said:
+        for each in messages:
             if each.topic not in numbers:
                 numbers[each.topic] = len(numbers) + 1
                 row = (numbers[each.topic], each.topic, TEXT, "cdr", HUMBLE_QOS, *value)

@@ -29,9 +29,9 @@ def assert_moves_as_it_says(
         moved = layout.difference(before.configuration, after.configuration)
         gained = after.velocity - before.velocity
         scale = 1.0 + np.abs(now.velocity).max() + np.abs(now.acceleration).max()
-        for quotient, said in ((moved, now.velocity), (gained, now.acceleration)):
+        for quotient, given in ((moved, now.velocity), (gained, now.acceleration)):
             np.testing.assert_allclose(
-                quotient / (2.0 * _HALF_STEP), said, rtol=0.0, atol=tolerance * scale**2
+                quotient / (2.0 * _HALF_STEP), given, rtol=0.0, atol=tolerance * scale**2
             )
         assert_consistent(layout, now)
 

@@ -205,7 +205,7 @@ class Processes:
 
 
 @dataclass
-class Inbox:
+class ReceivedMessages:
     """What has come on a topic, oldest first."""
 
     messages: list[Any] = field(default_factory=list)  # which a test may clear
@@ -255,9 +255,9 @@ class Client:
         self._executor.shutdown()
         self.node.destroy_node()
 
-    def listen(self, topic: Topic, qos: QoSProfile | None = None) -> Inbox:
+    def listen(self, topic: Topic, qos: QoSProfile | None = None) -> ReceivedMessages:
         """Subscribe to a topic."""
-        inbox = Inbox()
+        inbox = ReceivedMessages()
 
         def keep(raw: bytes, info: dict[str, int]) -> None:
             inbox.raw.append(raw)
@@ -401,7 +401,7 @@ class SimulatorClient(Client):
         """Command some degrees of freedom."""
         self.torques.publish(joint_state(stamp, list(efforts), effort=list(efforts.values())))
 
-    def answer(self, state: JointState, efforts: Mapping[str, float]) -> JointState:
+    def advance(self, state: JointState, efforts: Mapping[str, float]) -> JointState:
         """Command every motor, with zero where nothing is said; gives the state that follows."""
         motors = [name for name in state.name if not name.startswith(f"{ROOT}_")]
         self.command(stamp_ns(state), dict.fromkeys(motors, 0.0) | dict(efforts))
@@ -412,7 +412,7 @@ class SimulatorClient(Client):
         motors = [name for name in state.name if not name.startswith(f"{ROOT}_")]
         for _ in range(ticks):
             torques = rng.uniform(-20.0, 20.0, len(motors)).tolist()
-            state = self.answer(state, dict(zip(motors, torques, strict=True)))
+            state = self.advance(state, dict(zip(motors, torques, strict=True)))
         return state
 
     def reported(self, *, answering: JointState | None = None, **expected: object) -> Any:

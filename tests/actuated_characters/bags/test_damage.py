@@ -14,7 +14,7 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recovery import recover
 from actuated_characters.bags.writer import BagWriter
 from msgs_config.errors import RecordingError
-from tests.support.foreign_bags import SAID, write_humble_db3, write_mcap
+from tests.support.foreign_bags import SENT, write_humble_db3, write_mcap
 
 pytestmark = pytest.mark.slow
 
@@ -26,8 +26,8 @@ def own(storage: str, compression: str) -> Callable[[Path], None]:
         with BagWriter(bag, storage=storage, compression=compression) as writer:
             for topic in ("/a", "/b"):
                 writer.add_topic(topic, String, QoSProfile(depth=10))
-            for number, said in enumerate(SAID):
-                writer.write(said.topic, said.cdr, said.log_time_ns)
+            for number, sent in enumerate(SENT):
+                writer.write(sent.topic, sent.cdr, sent.log_time_ns)
                 if number % 10 == 9:
                     writer.flush()
 
@@ -37,7 +37,7 @@ def own(storage: str, compression: str) -> Callable[[Path], None]:
 def foreign(compression: CompressionType, **options: object) -> Callable[[Path], None]:
     def make(bag: Path) -> None:
         bag.mkdir()
-        file = write_mcap(bag / "bag.mcap", SAID, compression=compression, **options)  # type: ignore[arg-type]
+        file = write_mcap(bag / "bag.mcap", SENT, compression=compression, **options)  # type: ignore[arg-type]
         shutil.move(file, bag / "bag_0.mcap")
 
     return make
@@ -45,7 +45,7 @@ def foreign(compression: CompressionType, **options: object) -> Callable[[Path],
 
 def humble(bag: Path) -> None:
     bag.mkdir()
-    write_humble_db3(bag / "bag_0.db3", SAID)
+    write_humble_db3(bag / "bag_0.db3", SENT)
 
 
 KINDS = {
@@ -96,7 +96,7 @@ def test_a_damaged_file_is_read_or_is_one_clear_error(tmp_path: Path, kind: str,
         return
     file = storage_file(bag) if name == "storage" else bag / "metadata.yaml"
     sound, path = file.read_bytes(), bag if has_metadata else file
-    assert len(list(read_messages(path))) == len(SAID)
+    assert len(list(read_messages(path))) == len(SENT)
     refused = 0
     for damaged in mutants(sound, READ, np.random.default_rng(1)):
         file.write_bytes(damaged)
@@ -129,10 +129,10 @@ def test_a_damaged_file_is_recovered_or_is_one_clear_error(tmp_path: Path, kind:
             assert [file.name for file in bag.parent.iterdir()] == ["bag"]
         else:
             recovered += 1
-            raw = {said.cdr for said in SAID}
-            kept = [message for message in read_messages(bag) if message.raw in raw]
+            raw = {sent.cdr for sent in SENT}
+            survivors = [message for message in read_messages(bag) if message.raw in raw]
             assert found.contents.counts.total() == len(list(read_messages(bag)))
-            assert kept or found.contents.unreadable
+            assert survivors or found.contents.unreadable
         damaged_bag = bag.with_name("bag.damaged")
         original = (damaged_bag if damaged_bag.exists() else bag) / sound.name
         assert original.read_bytes() == damaged

@@ -9,8 +9,8 @@ from mcap.writer import CompressionType, IndexType
 from actuated_characters.bags.reader import read_messages
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import (
-    SAID,
-    Said,
+    SENT,
+    TextMessage,
     texts,
     write_humble_db3,
     write_jazzy_db3,
@@ -18,7 +18,7 @@ from tests.support.foreign_bags import (
     write_metadata,
 )
 
-UNORDERED = SAID[10:] + SAID[:10]
+UNORDERED = SENT[10:] + SENT[:10]
 
 
 @pytest.fixture
@@ -34,11 +34,11 @@ def bag(tmp_path: Path) -> Path:
 def test_a_bag_of_humble_and_each_other_version_is_read_from_sqlite(
     bag: Path, version: int
 ) -> None:
-    (write_jazzy_db3 if version == 9 else write_humble_db3)(bag / "bag_0.db3", SAID)
+    (write_jazzy_db3 if version == 9 else write_humble_db3)(bag / "bag_0.db3", SENT)
     prefix = "bag/" if version < 4 else ""  # then relative to the parent
     write_metadata(bag, version, "sqlite3", [f"{prefix}bag_0.db3"], ["/a", "/b"])
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
 
 
 @pytest.mark.parametrize("version", [9, 10, 17])
@@ -46,14 +46,14 @@ def test_a_bag_of_humble_and_each_other_version_is_read_from_sqlite(
 def test_a_bag_of_jazzy_and_later_is_read_from_mcap(
     bag: Path, version: int, compression: CompressionType
 ) -> None:
-    write_mcap(bag / "bag_0.mcap", SAID, compression=compression)
+    write_mcap(bag / "bag_0.mcap", SENT, compression=compression)
     write_metadata(bag, version, "mcap", ["bag_0.mcap"], ["/a", "/b"], new_field={"of": "later"})
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
 
 
 def test_a_later_version_without_a_field_that_is_needed_is_named(bag: Path) -> None:
-    write_mcap(bag / "bag_0.mcap", SAID)
+    write_mcap(bag / "bag_0.mcap", SENT)
     write_metadata(bag, 10, "mcap", [], ["/a"], relative_file_paths=None)
 
     with pytest.raises(RecordingError, match=r"version 10, later than 9\) lacks a field or has"):
@@ -66,19 +66,19 @@ def test_a_later_version_without_a_field_that_is_needed_is_named(bag: Path) -> N
 @pytest.mark.parametrize("suffix", ["mcap", "db3"])
 def test_the_files_of_a_split_bag_are_read_as_one_by_log_time(bag: Path, suffix: str) -> None:
     names = [f"bag_{number}.{suffix}" for number in range(3)]
-    parts = [SAID[:10], [*SAID[10:20], SAID[25]], [*SAID[20:25], *SAID[26:]]]  # 25 came too early
+    parts = [SENT[:10], [*SENT[10:20], SENT[25]], [*SENT[20:25], *SENT[26:]]]  # 25 came too early
     for name, part in zip(names, parts, strict=True):
         (write_mcap if suffix == "mcap" else write_humble_db3)(bag / name, part)
     storage = "mcap" if suffix == "mcap" else "sqlite3"
     write_metadata(bag, 9, storage, names, ["/a", "/b"])
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
 
 
 @pytest.mark.parametrize("mode", ["FILE", "file"])
 def test_files_that_are_compressed_as_a_whole_are_read(bag: Path, mode: str) -> None:
     names = ["bag_0.db3", "bag_1.db3"]
-    for name, part in zip(names, (SAID[:15], SAID[15:]), strict=True):
+    for name, part in zip(names, (SENT[:15], SENT[15:]), strict=True):
         file = write_humble_db3(bag / name, part)
         (bag / f"{name}.zstd").write_bytes(zstd.compress(file.read_bytes()))
         file.unlink()
@@ -92,15 +92,17 @@ def test_files_that_are_compressed_as_a_whole_are_read(bag: Path, mode: str) -> 
         compression_format="zstd",
     )
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
 
 
 def test_messages_that_are_compressed_one_by_one_are_read(
     bag: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plain = Said.cdr
-    monkeypatch.setattr(Said, "cdr", property(lambda said: zstd.compress(plain.fget(said))))
-    write_humble_db3(bag / "bag_0.db3", SAID)
+    uncompressed = TextMessage.cdr
+    monkeypatch.setattr(
+        TextMessage, "cdr", property(lambda sent: zstd.compress(uncompressed.fget(sent)))
+    )
+    write_humble_db3(bag / "bag_0.db3", SENT)
     write_metadata(
         bag,
         6,
@@ -111,7 +113,7 @@ def test_messages_that_are_compressed_one_by_one_are_read(
         compression_format="zstd",
     )
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
 
 
 # One file, in any order, with any index
@@ -131,22 +133,22 @@ def test_messages_that_are_compressed_one_by_one_are_read(
     ],
     ids=str,
 )
-@pytest.mark.parametrize("said", [SAID, UNORDERED], ids=["ordered", "unordered"])
+@pytest.mark.parametrize("sent", [SENT, UNORDERED], ids=["ordered", "unordered"])
 def test_a_single_mcap_file_is_read_by_log_time(
-    tmp_path: Path, options: dict[str, object], said: list[Said]
+    tmp_path: Path, options: dict[str, object], sent: list[TextMessage]
 ) -> None:
-    file = write_mcap(tmp_path / "from_foxglove.mcap", said, **options)  # type: ignore[arg-type]
+    file = write_mcap(tmp_path / "from_foxglove.mcap", sent, **options)  # type: ignore[arg-type]
 
-    assert texts(file) == SAID
+    assert texts(file) == SENT
     assert [each.topic for each in read_messages(file, ["/b"])] == ["/b"] * 10
 
 
 def test_a_single_sqlite_file_is_read(tmp_path: Path) -> None:
-    assert texts(write_humble_db3(tmp_path / "one.db3", UNORDERED)) == SAID
+    assert texts(write_humble_db3(tmp_path / "one.db3", UNORDERED)) == SENT
 
 
 def test_a_topic_without_messages_is_known_from_the_metadata(bag: Path) -> None:
-    write_mcap(bag / "bag_0.mcap", SAID)
+    write_mcap(bag / "bag_0.mcap", SENT)
     write_metadata(bag, 9, "mcap", ["bag_0.mcap"], ["/a", "/b", "/silent"])
 
     assert list(read_messages(bag, ["/silent"])) == []
@@ -178,7 +180,7 @@ def test_a_topic_without_messages_is_known_from_the_metadata(bag: Path) -> None:
 def test_metadata_that_cannot_be_used_is_one_clear_line(
     bag: Path, changes: dict[str, object], sentence: str
 ) -> None:
-    write_mcap(bag / "bag_0.mcap", SAID)
+    write_mcap(bag / "bag_0.mcap", SENT)
     write_metadata(bag, 9, "mcap", ["bag_0.mcap"], ["/a", "/b"])
     text = (bag / "metadata.yaml").read_text()
     write_metadata(bag, 9, "mcap", ["bag_0.mcap"], ["/a", "/b"], **changes)
@@ -203,16 +205,16 @@ def test_metadata_that_is_none_is_one_clear_line(bag: Path, text: str) -> None:
 
 def test_a_file_of_no_ros_or_of_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="'/b' is serialised as json, not as cdr"):
-        texts(write_mcap(tmp_path / "json.mcap", SAID, serialization="json"))
+        texts(write_mcap(tmp_path / "json.mcap", SENT, serialization="json"))
     with pytest.raises(RecordingError, match="its profile is not 'ros2'"):
-        texts(write_mcap(tmp_path / "other.mcap", SAID, profile="x"))
+        texts(write_mcap(tmp_path / "other.mcap", SENT, profile="x"))
     (tmp_path / "notes.txt").write_text("hello")
     with pytest.raises(RecordingError, match=r"notes.txt is no .mcap or .db3 file"):
         texts(tmp_path / "notes.txt")
 
 
 def test_an_sqlite_file_beside_its_journal_is_not_taken_for_complete(bag: Path) -> None:
-    write_humble_db3(bag / "bag_0.db3", SAID)
+    write_humble_db3(bag / "bag_0.db3", SENT)
     write_metadata(bag, 5, "sqlite3", ["bag_0.db3"], ["/a", "/b"])
     (bag / "bag_0.db3-journal").write_bytes(b"what was not committed")
 

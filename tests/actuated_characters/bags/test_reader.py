@@ -14,7 +14,7 @@ from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.writer import BagWriter
 from msgs_config.errors import RecordingError
-from tests.support.foreign_bags import SAID
+from tests.support.foreign_bags import SENT
 
 QOS = QoSProfile(depth=10)
 # It gives `char` a hash of its own, where ROS makes it uint8; all other types are right.
@@ -26,8 +26,8 @@ def recording(tmp_path: Path) -> Path:
     with BagWriter(tmp_path / "walk.1") as writer:
         for topic in ("/a", "/b", "/silent"):
             writer.add_topic(topic, String, QOS)
-        for said in SAID:
-            writer.write(said.topic, said.cdr, said.log_time_ns)
+        for sent in SENT:
+            writer.write(sent.topic, sent.cdr, sent.log_time_ns)
     return tmp_path / "walk.1"
 
 

@@ -24,13 +24,13 @@ from msgs_config.messages.wrenches import WrenchArrays
 from tests.support.bags import (
     CONFIGURATION,
     Made,
-    Said,
+    RawMessage,
     add_to,
     make_run,
-    said_configuration,
-    said_references,
-    said_states,
-    said_wrenches,
+    raw_configuration,
+    raw_references,
+    raw_states,
+    raw_wrenches,
     write_bag,
 )
 
@@ -128,14 +128,14 @@ def test_names_may_come_in_any_order(walk: Made, tmp_path: Path) -> None:
     ]
 
     recording = read_recording(
-        write_bag(tmp_path / "bag", [said_configuration(walk.plan), *shuffled])
+        write_bag(tmp_path / "bag", [raw_configuration(walk.plan), *shuffled])
     )
 
     assert_same_states(recording, walk)
     assert np.isnan(recording.reference_position).all()
 
 
-def published_again(made: Made) -> list[Said]:
+def published_again(made: Made) -> list[RawMessage]:
     configuration, *states = without_rows(made)
     again = [states[0], *states[:3], states[1], states[2], *states[3:], states[-1]]
     return [configuration, *again]
@@ -149,7 +149,7 @@ def published_again(made: Made) -> list[Said]:
     ],
 )
 def test_a_repeated_state_counts_once_and_an_early_one_counts_too(
-    pendulum: Made, tmp_path: Path, make: Callable[[Made], list[Said]]
+    pendulum: Made, tmp_path: Path, make: Callable[[Made], list[RawMessage]]
 ) -> None:
     recording = read_recording(write_bag(tmp_path / "bag", make(pendulum)))
 
@@ -163,7 +163,7 @@ def test_a_tick_that_was_a_reset_has_no_effort(pendulum: Made, tmp_path: Path) -
     recording = read_recording(
         write_bag(
             tmp_path / "bag",
-            [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)],
+            [raw_configuration(pendulum.plan), *raw_states(pendulum.plan, states)],
         )
     )
 
@@ -181,9 +181,9 @@ def test_a_reference_counts_at_its_stamp(pendulum: Made, tmp_path: Path) -> None
         write_bag(
             tmp_path / "bag",
             [
-                *said_references(pendulum.plan, [third, of_nobody]),
-                said_configuration(pendulum.plan),
-                *said_states(pendulum.plan, pendulum.states),
+                *raw_references(pendulum.plan, [third, of_nobody]),
+                raw_configuration(pendulum.plan),
+                *raw_states(pendulum.plan, pendulum.states),
             ],
         )
     )
@@ -200,7 +200,7 @@ def test_wrenches_belong_to_the_tick_that_their_stamp_ends(
     stamps = [state.stamp_ns for state in pendulum.states]
     touch = WrenchArrays.of_rows(stamps[3], ["rod"], [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)], [])
     nothing = WrenchArrays.of_rows(stamps[6], [], [], [])
-    messages = [*pendulum.messages(), *said_wrenches(topic, [nothing, touch])]
+    messages = [*pendulum.messages(), *raw_wrenches(topic, [nothing, touch])]
 
     recording = read_recording(write_bag(tmp_path / "bag", messages))
 
@@ -230,10 +230,10 @@ def test_a_long_recording_is_read_in_a_moment(walk: Made, tmp_path: Path) -> Non
     bag = write_bag(
         tmp_path / "bag",
         [
-            said_configuration(walk.plan),
-            *said_states(walk.plan, states),
-            *said_references(walk.plan, stand_ins),
-            *said_wrenches(topics.CONTACTS, touch),
+            raw_configuration(walk.plan),
+            *raw_states(walk.plan, states),
+            *raw_references(walk.plan, stand_ins),
+            *raw_wrenches(topics.CONTACTS, touch),
         ],
     )
 
@@ -272,30 +272,30 @@ def test_a_bag_that_was_not_finished_is_none(pendulum: Made, tmp_path: Path) -> 
     assert "no complete recording" in refusal(tmp_path)
 
 
-def without_rows(made: Made, *rows: int) -> list[Said]:
-    kept = [state for row, state in enumerate(made.states) if row not in rows]
-    return [said_configuration(made.plan), *said_states(made.plan, kept)]
+def without_rows(made: Made, *rows: int) -> list[RawMessage]:
+    states = [state for row, state in enumerate(made.states) if row not in rows]
+    return [raw_configuration(made.plan), *raw_states(made.plan, states)]
 
 
-def with_another_first_state(made: Made) -> list[Said]:
+def with_another_first_state(made: Made) -> list[RawMessage]:
     other = replace(made.states[0], position=made.states[0].position + 1e-15)
-    return [*without_rows(made), *said_states(made.plan, [other])]
+    return [*without_rows(made), *raw_states(made.plan, [other])]
 
 
-def with_another_configuration(made: Made) -> list[Said]:
-    return [*made.messages(), said_configuration(make_run("pendulum", 0.01, gravity=1.0).plan)]
+def with_another_configuration(made: Made) -> list[RawMessage]:
+    return [*made.messages(), raw_configuration(make_run("pendulum", 0.01, gravity=1.0).plan)]
 
 
-def with_a_heavier_text(made: Made) -> list[Said]:
+def with_a_heavier_text(made: Made) -> list[RawMessage]:
     heavier = made.plan.character.loading.urdf_text.replace("1.0", "2.0")
-    return [said_without(made.plan, urdf=heavier), *made.messages()[1:]]
+    return [raw_without(made.plan, urdf=heavier), *made.messages()[1:]]
 
 
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
         (lambda made: made.messages()[:1], "no states"),
-        (lambda made: said_states(made.plan, made.states), "sim_node/configuration"),
+        (lambda made: raw_states(made.plan, made.states), "sim_node/configuration"),
         (lambda made: without_rows(made, 0), "in the middle of an episode"),
         (lambda made: without_rows(made, 4, 5), "the states of ticks 5 to 6 are missing"),
         (lambda made: without_rows(made, 1, 3, 5, 7), "ticks 2, 4, 6 and 1 more times are mis"),
@@ -305,12 +305,12 @@ def with_a_heavier_text(made: Made) -> list[Said]:
     ],
 )
 def test_a_bag_that_is_no_whole_recording_is_refused(
-    pendulum: Made, tmp_path: Path, make: Callable[[Made], list[Said]], sentence: str
+    pendulum: Made, tmp_path: Path, make: Callable[[Made], list[RawMessage]], sentence: str
 ) -> None:
     assert sentence in refusal(write_bag(tmp_path / "bag", make(pendulum)))
 
 
-def write_both(path: Path, left: list[Said], right: list[Said]) -> Path:
+def write_both(path: Path, left: list[RawMessage], right: list[RawMessage]) -> Path:
     """A bag of two characters, each in its namespace."""
     with BagWriter(path) as bag:
         add_to(bag, right, "right")
@@ -340,7 +340,7 @@ def test_each_of_several_characters_has_its_own_states(
 def test_they_come_in_the_order_of_their_world(pendulum: Made, tmp_path: Path) -> None:
     names = ("right", "left")
     left, right = (
-        [said_configuration(pendulum.plan, name, names), *pendulum.messages()[1:]]
+        [raw_configuration(pendulum.plan, name, names), *pendulum.messages()[1:]]
         for name in ("left", "right")
     )
 
@@ -354,9 +354,9 @@ def test_what_comes_before_an_episode_is_left_out(pendulum: Made, tmp_path: Path
     states = list(pendulum.states)
     states[4] = replace(states[4], effort=None)
     messages = [
-        said_configuration(pendulum.plan),
-        *said_states(pendulum.plan, states[2:]),
-        *said_references(pendulum.plan, [tick.reference for tick in pendulum.ticks]),  # type: ignore[misc]
+        raw_configuration(pendulum.plan),
+        *raw_states(pendulum.plan, states[2:]),
+        *raw_references(pendulum.plan, [tick.reference for tick in pendulum.ticks]),  # type: ignore[misc]
     ]
 
     recording = read_recording(write_bag(tmp_path / "bag", messages))
@@ -372,14 +372,14 @@ def test_what_comes_before_an_episode_is_left_out(pendulum: Made, tmp_path: Path
 def test_commands_are_there_as_they_were_sent(pendulum: Made, tmp_path: Path) -> None:
     encoder, stamps = JointStateEncoder(["hinge"]), [s.stamp_ns for s in pendulum.states]
     sent = [(stamps[3], 1.5), (stamps[3], 2.5), (0, 3.5), (stamps[0], 4.5)]
-    said = [
+    messages = [
         (topics.JOINT_TORQUES, encoder.encode(stamp, effort=np.array([effort])))
         for stamp, effort in sent
     ]
     no_command = (topics.JOINT_TORQUES, b"\0\1\0\0 nonsense")
 
     recording = read_recording(
-        write_bag(tmp_path / "bag", [*pendulum.messages(), *said, no_command])
+        write_bag(tmp_path / "bag", [*pendulum.messages(), *messages, no_command])
     )
 
     found = {row: c for row, c in enumerate(recording.commands) if c}
@@ -397,9 +397,9 @@ def test_what_a_controller_says_of_itself_is_there_once(pendulum: Made, tmp_path
         configuration.describe(plan.character, plan.controller, since_ns=since)
         for since in (None, None, pendulum.states[3].stamp_ns)
     ]
-    said = [(topic, serialize_message(String(data=text))) for text in (*texts, "no JSON")]
+    messages = [(topic, serialize_message(String(data=text))) for text in (*texts, "no JSON")]
 
-    recording = read_recording(write_bag(tmp_path / "bag", [*pendulum.messages(), *said]))
+    recording = read_recording(write_bag(tmp_path / "bag", [*pendulum.messages(), *messages]))
 
     assert [c.after_stamp_ns for c in recording.controller] == [None, pendulum.states[3].stamp_ns]
     assert recording.controller[0].parameters["rate"] == 240
@@ -410,9 +410,9 @@ def test_a_parameter_of_an_old_bag_has_its_present_name(pendulum: Made, tmp_path
     text = configuration.describe(plan.character, plan.controller, since_ns=None)
     assert '"balance.enabled"' in text
     old = text.replace('"balance.enabled"', '"balance"')
-    said = [(topic, serialize_message(String(data=old)))]
+    messages = [(topic, serialize_message(String(data=old)))]
 
-    recording = read_recording(write_bag(tmp_path / "bag", [*pendulum.messages(), *said]))
+    recording = read_recording(write_bag(tmp_path / "bag", [*pendulum.messages(), *messages]))
 
     assert recording.controller[0].parameters["balance.enabled"] is False
     assert "balance" not in recording.controller[0].parameters
@@ -429,7 +429,7 @@ def own_character(folder: Path) -> Path:
     return file
 
 
-def said_without(plan: RunPlan, *names: str, **changes: object) -> Said:
+def raw_without(plan: RunPlan, *names: str, **changes: object) -> RawMessage:
     """The simulator's configuration without some entries, and with others changed."""
     text = configuration.describe(plan.character, plan.simulator)
     content = {key: value for key, value in json.loads(text).items() if key not in names}
@@ -456,7 +456,7 @@ NEW = ("character_path", "urdf_path", "meshes", "name", "characters")  # in a co
 def test_an_older_bag_has_its_character_in_its_texts_too(tmp_path: Path) -> None:
     file = own_character(tmp_path)
     made = make_run(str(file), 0.02)
-    bag = write_bag(tmp_path / "bag", [said_without(made.plan, *NEW), *made.messages()[1:]])
+    bag = write_bag(tmp_path / "bag", [raw_without(made.plan, *NEW), *made.messages()[1:]])
     assert read_recording(bag).character == made.plan.character
 
     file.write_text(file.read_text() + "feet: [rod]\n")
@@ -468,8 +468,8 @@ def test_an_older_bag_has_its_character_in_its_texts_too(tmp_path: Path) -> None
 
 def test_meshes_of_an_older_bag_are_those_of_the_same_text(tmp_path: Path) -> None:
     made = make_run("franka_panda", 0.01)
-    older, rest = said_without(made.plan, *NEW), made.messages()[1:]
-    other = said_without(made.plan, *NEW, urdf=made.plan.character.loading.urdf_text + "<!-- -->")
+    older, rest = raw_without(made.plan, *NEW), made.messages()[1:]
+    other = raw_without(made.plan, *NEW, urdf=made.plan.character.loading.urdf_text + "<!-- -->")
 
     recording = read_recording(write_bag(tmp_path / "same", [older, *rest]))
 
@@ -485,22 +485,22 @@ def test_a_mesh_that_is_another_one_or_missing_is_named(tmp_path: Path) -> None:
     path = Path(pybullet_data.getDataPath()) / "franka_panda/meshes/collision/hand.obj"
     assert hashes[name] == hashlib.sha256(path.read_bytes()).hexdigest()
 
-    other = said_without(made.plan, meshes=hashes | {name: "0" * 64})
+    other = raw_without(made.plan, meshes=hashes | {name: "0" * 64})
     line = refusal(write_bag(tmp_path / "other", [other, *made.messages()[1:]]))
     assert "is not the one that it was" in line and path.name in line
     urdf = made.plan.character.loading.urdf_text.replace(name, f"{name}.gone.obj")
-    gone = said_without(made.plan, urdf=urdf)
+    gone = raw_without(made.plan, urdf=urdf)
     line = refusal(write_bag(tmp_path / "gone", [gone, *made.messages()[1:]]))
     assert f"{path.name}.gone.obj" in line
 
 
-@pytest.mark.parametrize("said", ["no JSON", "{}", '{"character": 1, "joints": []}'])
+@pytest.mark.parametrize("reason", ["no JSON", "{}", '{"character": 1, "joints": []}'])
 def test_a_configuration_of_somebody_else_is_refused(
-    pendulum: Made, tmp_path: Path, said: str
+    pendulum: Made, tmp_path: Path, reason: str
 ) -> None:
     messages = [
-        (CONFIGURATION, serialize_message(String(data=said))),
-        *said_states(pendulum.plan, pendulum.states),
+        (CONFIGURATION, serialize_message(String(data=reason))),
+        *raw_states(pendulum.plan, pendulum.states),
     ]
 
     with pytest.raises(MessageError, match=r"recording .*bag: .*configuration"):
@@ -510,7 +510,7 @@ def test_a_configuration_of_somebody_else_is_refused(
 def test_states_of_something_else_are_refused(pendulum: Made, tmp_path: Path) -> None:
     state = StampedState(pendulum.states[0].stamp_ns, np.zeros(1), np.zeros(1), None)
     raw = JointStateEncoder(["elbow"]).encode(state.stamp_ns, state.position, state.velocity)
-    messages = [said_configuration(pendulum.plan), (topics.JOINT_STATES, raw)]
+    messages = [raw_configuration(pendulum.plan), (topics.JOINT_STATES, raw)]
 
     with pytest.raises(ActuatedCharactersError, match="elbow"):
         read_recording(write_bag(tmp_path / "bag", messages))

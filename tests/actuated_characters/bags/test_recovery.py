@@ -21,7 +21,7 @@ from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.runs.run_directory import SUMMARY, read_metrics, write_metrics
 from msgs_config.errors import RecordingError
 from tests.support.bags import add_to, make_run
-from tests.support.foreign_bags import SAID, texts
+from tests.support.foreign_bags import SENT, texts
 from tests.support.limits import file_size_limit, unprivileged
 from tests.support.ros import Process, wait_until
 
@@ -65,11 +65,11 @@ def unclosed(bag: Path, compression: str = "none") -> BagWriter:
     writer = BagWriter(bag, compression=compression)
     for topic in ("/a", "/b"):
         writer.add_topic(topic, String, LATCHED_QOS if topic == "/b" else QOS)
-    for said in SAID:
-        writer.write(said.topic, said.cdr, said.log_time_ns)
+    for sent in SENT:
+        writer.write(sent.topic, sent.cdr, sent.log_time_ns)
     writer.flush()
     for number in range(5):
-        writer.write("/a", SAID[1].cdr, 100 + number)
+        writer.write("/a", SENT[1].cdr, 100 + number)
     return writer
 
 
@@ -131,7 +131,7 @@ def test_all_that_was_flushed_is_recovered_with_type_hash_and_qos(
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
     assert recovered.contents.counts == {"/a": 20, "/b": 10}
     assert recovered.damaged == tmp_path / "bag.damaged"
     after = {file.name: file.read_bytes() for file in (tmp_path / "bag.damaged").iterdir()}
@@ -170,7 +170,7 @@ def test_a_bag_whose_recorder_is_still_at_work_is_left_to_it(
 
     writer.close()
 
-    assert len(texts(tmp_path / "bag")) == len(SAID) + 5
+    assert len(texts(tmp_path / "bag")) == len(SENT) + 5
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
 
 
@@ -180,14 +180,14 @@ def test_a_file_that_was_being_compressed_is_read_once(tmp_path: Path) -> None:
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID and recovered.contents.unreadable == []
+    assert texts(bag) == SENT and recovered.contents.unreadable == []
 
 
 def test_topics_without_messages_are_kept(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "alive" / "bag")
     for topic in ("/a", "/silent"):
         writer.add_topic(topic, String, QOS)
-    writer.write("/a", SAID[1].cdr, 1)
+    writer.write("/a", SENT[1].cdr, 1)
     writer.flush()
 
     recover(leave(writer, tmp_path / "bag"))
@@ -230,7 +230,7 @@ def test_a_bag_that_another_recorder_writes_is_left_to_it(tmp_path: Path) -> Non
 
     with (bag / "bag.mcap").open("rb"):  # who reads does no harm
         recover(bag)
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
 
 
 def snapshot(bag: Path) -> dict[str, tuple[int, bytes]]:
@@ -244,7 +244,7 @@ def test_a_complete_bag_is_not_touched(tmp_path: Path) -> None:
     recovered = recover(tmp_path / "bag")
 
     assert recovered.damaged is None
-    assert recovered.contents.counts.total() == len(SAID) + 5
+    assert recovered.contents.counts.total() == len(SENT) + 5
     assert snapshot(tmp_path / "bag") == before
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
 
@@ -310,7 +310,7 @@ def test_a_recovery_that_is_killed_between_its_renames_is_finished_by_the_next(
 
     recover(bag)
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
     assert sorted(path.name for path in tmp_path.iterdir()) == ["alive", "bag", "bag.damaged"]
 
 
@@ -333,10 +333,10 @@ def test_a_run_gets_its_figures_again(tmp_path: Path) -> None:
 
     recovered = recover(run)
 
-    listener = MetricsCollector()
+    collector = MetricsCollector()
     for message in read_messages(tmp_path / "alive" / "bag"):
-        listener.take(message.topic.removeprefix("/"), message.raw, message.log_time_ns)
-    expected, expected_series = listener.results()
+        collector.take(message.topic.removeprefix("/"), message.raw, message.log_time_ns)
+    expected, expected_series = collector.results()
     write_metrics(tmp_path / "expected", expected, expected_series)
     assert recovered.measured == [run]
     for found, same in zip(read_metrics(run), read_metrics(tmp_path / "expected"), strict=True):
@@ -386,7 +386,7 @@ def test_a_run_of_something_else_is_recovered_without_figures(tmp_path: Path) ->
 
     recovered = recover(run)
 
-    assert texts(run / "bag") == SAID
+    assert texts(run / "bag") == SENT
     assert recovered.measured == []
     assert "sim_node/configuration" in recovered.unmeasured
 

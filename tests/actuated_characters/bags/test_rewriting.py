@@ -17,8 +17,8 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recovery import recover
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import (
-    SAID,
-    Said,
+    SENT,
+    TextMessage,
     texts,
     write_humble_db3,
     write_mcap,
@@ -36,7 +36,7 @@ def bag(tmp_path: Path) -> Path:
 def test_a_truncated_file_of_ros2_bag_record_is_recovered_up_to_the_cut(
     bag: Path, compression: CompressionType
 ) -> None:
-    file = write_mcap(bag / "bag_0.mcap", SAID, compression=compression, chunk_size=150)
+    file = write_mcap(bag / "bag_0.mcap", SENT, compression=compression, chunk_size=150)
     chunks = [each for each in records(file.read_bytes()) if each[0] == CHUNK]
     _, begin, end = chunks[len(chunks) // 2]
     os.truncate(file, (begin + end) // 2)
@@ -44,56 +44,56 @@ def test_a_truncated_file_of_ros2_bag_record_is_recovered_up_to_the_cut(
     recovered = recover(bag)
 
     read = texts(bag)
-    assert read == SAID[: len(read)]
-    assert 5 < len(read) < len(SAID)
-    (lost,) = recovered.contents.unreadable
-    assert lost.startswith("bag_0.mcap: ")
+    assert read == SENT[: len(read)]
+    assert 5 < len(read) < len(SENT)
+    (part,) = recovered.contents.unreadable
+    assert part.startswith("bag_0.mcap: ")
     with Reader(bag) as reader:
         assert {connection.digest for connection in reader.connections} == {"RIHS01_ab"}
 
 
 def test_a_damaged_chunk_in_the_middle_is_left_out_and_said(bag: Path) -> None:
     file = write_mcap(
-        bag / "bag_0.mcap", SAID, compression=CompressionType.NONE, chunk_size=150, close=False
+        bag / "bag_0.mcap", SENT, compression=CompressionType.NONE, chunk_size=150, close=False
     )
     data = bytearray(file.read_bytes())
-    data[data.index(SAID[15].cdr) + 10] ^= 1
+    data[data.index(SENT[15].cdr) + 10] ^= 1
     file.write_bytes(data)
 
     recovered = recover(bag)
 
     read = texts(bag)
-    assert SAID[15] not in read
-    assert {SAID[0], SAID[-5]} <= set(read)
-    assert read == [said for said in SAID if said in read]
+    assert SENT[15] not in read
+    assert {SENT[0], SENT[-5]} <= set(read)
+    assert read == [sent for sent in SENT if sent in read]
     assert recovered.contents.unreadable == ["bag_0.mcap: damaged chunk (1)"]
 
 
 def test_topics_whose_first_chunk_is_damaged_are_taken_from_the_files_end(bag: Path) -> None:
-    file = write_mcap(bag / "bag_0.mcap", SAID, compression=CompressionType.NONE, chunk_size=150)
+    file = write_mcap(bag / "bag_0.mcap", SENT, compression=CompressionType.NONE, chunk_size=150)
     data = bytearray(file.read_bytes())
-    data[data.index(SAID[0].cdr) + 10] ^= 1
+    data[data.index(SENT[0].cdr) + 10] ^= 1
     file.write_bytes(data)
     (bag / "metadata.yaml").write_text("cut off")
 
     recover(bag)
 
-    assert SAID[-1] in texts(bag)
+    assert SENT[-1] in texts(bag)
 
 
 def test_split_files_come_together_in_the_order_of_their_numbers(bag: Path) -> None:
     for number in range(12):
-        part = SAID[number * 2 : number * 2 + 2]
+        part = SENT[number * 2 : number * 2 + 2]
         write_mcap(bag / f"bag_{number}.mcap", part, chunk_size=1, close=number < 11)
 
     recover(bag)
 
-    assert texts(bag) == SAID[:24]
+    assert texts(bag) == SENT[:24]
     assert [file.name for file in bag.glob("*.mcap")] == ["bag.mcap"]
 
 
 def test_a_type_that_is_not_installed_is_recovered_with_the_hash_of_its_text(bag: Path) -> None:
-    file = write_mcap(bag / "bag_0.mcap", SAID, close=False, compression=CompressionType.NONE)
+    file = write_mcap(bag / "bag_0.mcap", SENT, close=False, compression=CompressionType.NONE)
     data = file.read_bytes().replace(b"std_msgs/msg/String", b"own_msgs/msg/Sample")
     data = data.replace(b"topic_type_hash", b"topic_type_hasx")
     (bag / "bag_0.mcap").write_bytes(_without_checksums(data))
@@ -137,42 +137,42 @@ ENTRIES_LENGTH = 9 + 2  # bytes into a message's index
 
 @pytest.mark.parametrize("bit", [3, 16, 47, 63])
 def test_of_a_chunk_whose_inner_length_lies_nothing_else_is_lost(bag: Path, bit: int) -> None:
-    file = plain(bag)
+    file = uncompressed(bag)
     data = bytearray(file.read_bytes())
     _, begin, end = [each for each in records(bytes(data)) if each[0] == CHUNK][2]
-    gone = {said for said in SAID if said.cdr in data[begin:end]}
+    gone = {sent for sent in SENT if sent.cdr in data[begin:end]}
     data[begin + DATA_LENGTH + bit // 8] ^= 1 << bit % 8
     file.write_bytes(data)
 
     recovered = recover(bag)
 
     if bit in (16, 47):  # the record ends where it ends
-        assert texts(bag) == SAID and recovered.contents.unreadable == []
+        assert texts(bag) == SENT and recovered.contents.unreadable == []
     else:
-        assert texts(bag) == [said for said in SAID if said not in gone]
+        assert texts(bag) == [sent for sent in SENT if sent not in gone]
         assert recovered.contents.unreadable == ["bag_0.mcap: damaged chunk (1)"]
 
 
 @pytest.mark.parametrize(("kind", "bit"), [(CHUNK, 2), (MESSAGE_INDEX, 3), (CHUNK, 0), (CHUNK, 4)])
 def test_a_record_of_another_kind_ends_nothing(bag: Path, kind: int, bit: int) -> None:
     """By one bit a chunk is a footer, an index or unknown, and an index the end of the data."""
-    file = plain(bag)
+    file = uncompressed(bag)
     data = bytearray(file.read_bytes())
     _, begin, end = [each for each in records(bytes(data)) if each[0] == kind][2]
-    gone = {said for said in SAID if kind == CHUNK and said.cdr in data[begin:end]}
+    gone = {sent for sent in SENT if kind == CHUNK and sent.cdr in data[begin:end]}
     data[begin] ^= 1 << bit
     file.write_bytes(data)
 
     recovered = recover(bag)
 
-    assert texts(bag) == [said for said in SAID if said not in gone]
+    assert texts(bag) == [sent for sent in SENT if sent not in gone]
     assert bool(recovered.contents.unreadable) == (bit == 4)
 
 
 @pytest.mark.parametrize("kind", [MESSAGE_INDEX, FOOTER])
 def test_a_record_that_no_message_needs_may_be_damaged(bag: Path, kind: int) -> None:
     """The lengths in the indices of chunks, and where the summary begins."""
-    file = write_mcap(bag / "bag_0.mcap", SAID, chunk_size=150)
+    file = write_mcap(bag / "bag_0.mcap", SENT, chunk_size=150)
     data = bytearray(file.read_bytes())
     for found, begin, _ in list(records(bytes(data))):
         if found == kind == MESSAGE_INDEX:
@@ -184,38 +184,38 @@ def test_a_record_that_no_message_needs_may_be_damaged(bag: Path, kind: int) -> 
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID and recovered.contents.unreadable == []
+    assert texts(bag) == SENT and recovered.contents.unreadable == []
 
 
 @pytest.mark.parametrize("left", [1, 8, 9, 10])
 def test_the_head_of_a_record_without_its_content_is_no_loss(bag: Path, left: int) -> None:
     """A killed recorder may have written the nine bytes alone: no message was behind them."""
-    file = plain(bag)
+    file = uncompressed(bag)
     begins = [begin for kind, begin, _ in records(file.read_bytes()) if kind == CHUNK]
     os.truncate(file, begins[-1] + left)
 
     recovered = recover(bag)
 
     read = texts(bag)
-    assert read == SAID[: len(read)] and len(read) > len(SAID) // 2
+    assert read == SENT[: len(read)] and len(read) > len(SENT) // 2
     assert recovered.contents.unreadable == (
         [] if left < 10 else ["bag_0.mcap: bytes cut off (10)"]
     )
 
 
 def test_a_tail_of_zeros_is_no_record(bag: Path) -> None:
-    file = plain(bag)
+    file = uncompressed(bag)
     with file.open("ab") as stream:
         stream.truncate(file.stat().st_size + (1 << 30))
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
     assert recovered.contents.unreadable == [f"bag_0.mcap: bytes cut off ({1 << 30})"]
 
 
 def test_a_message_that_is_cut_off_swallows_none_behind_it(bag: Path) -> None:
-    file = plain(bag)
+    file = uncompressed(bag)
     data = bytearray(file.read_bytes())
     _, begin, end = next(each for each in records(bytes(data)) if each[0] == CHUNK)
     inside = DATA_LENGTH + 8
@@ -227,12 +227,12 @@ def test_a_message_that_is_cut_off_swallows_none_behind_it(bag: Path) -> None:
 
     recovered = recover(bag)
 
-    assert texts(bag) == [said for said in SAID if said.cdr not in data[begin:end]]
+    assert texts(bag) == [sent for sent in SENT if sent.cdr not in data[begin:end]]
     assert "bytes cut off" in recovered.contents.unreadable[0]
 
 
 def test_many_losses_are_one_line(bag: Path) -> None:
-    many = [Said("/a", number, f"text {number}") for number in range(3000)]
+    many = [TextMessage("/a", number, f"text {number}") for number in range(3000)]
     file = write_mcap(bag / "bag_0.mcap", many, compression=CompressionType.ZSTD, close=False)
     data = bytearray(file.read_bytes())
     _, begin, end = next(each for each in records(bytes(data)) if each[0] == CHUNK)
@@ -247,10 +247,10 @@ def test_many_losses_are_one_line(bag: Path) -> None:
     assert len(str(caught.value)) < 500
 
 
-def plain(bag: Path) -> Path:
+def uncompressed(bag: Path) -> Path:
     """A file of several chunks, not compressed and without checksums."""
     file = write_mcap(
-        bag / "bag_0.mcap", SAID, compression=CompressionType.NONE, chunk_size=150, close=False
+        bag / "bag_0.mcap", SENT, compression=CompressionType.NONE, chunk_size=150, close=False
     )
     file.write_bytes(_without_checksums(file.read_bytes()))
     return file
@@ -262,9 +262,11 @@ def plain(bag: Path) -> Path:
 @contextmanager
 def compressing_each(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Have messages written as `ros2 bag record --compression-mode message` does."""
-    plain = Said.cdr
+    uncompressed = TextMessage.cdr
     with monkeypatch.context() as patch:
-        patch.setattr(Said, "cdr", property(lambda said: zstd.compress(plain.fget(said))))
+        patch.setattr(
+            TextMessage, "cdr", property(lambda sent: zstd.compress(uncompressed.fget(sent)))
+        )
         yield
 
 
@@ -272,29 +274,29 @@ def test_messages_that_rosbag2_compressed_are_recovered(
     bag: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with compressing_each(monkeypatch):
-        write_mcap(bag / "bag_0.mcap", SAID, compression=CompressionType.NONE, close=False)
+        write_mcap(bag / "bag_0.mcap", SENT, compression=CompressionType.NONE, close=False)
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID and recovered.contents.unreadable == []
+    assert texts(bag) == SENT and recovered.contents.unreadable == []
 
 
 def test_messages_that_rosbag2_compressed_in_a_file_without_an_index_are_read(
     bag: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with compressing_each(monkeypatch):
-        write_mcap(bag / "bag_0.mcap", SAID, use_chunking=False)
+        write_mcap(bag / "bag_0.mcap", SENT, use_chunking=False)
     how = {"compression_format": "zstd", "compression_mode": "MESSAGE"}
     write_metadata(bag, 9, "mcap", ["bag_0.mcap"], ["/a", "/b"], **how)
 
-    assert texts(bag) == SAID
+    assert texts(bag) == SENT
 
 
 def test_a_part_that_was_compressed_as_a_whole_is_not_left_out_in_silence(bag: Path) -> None:
-    file = write_mcap(bag / "bag_0.mcap", SAID[:20])
+    file = write_mcap(bag / "bag_0.mcap", SENT[:20])
     (bag / "bag_0.mcap.zstd").write_bytes(zstd.compress(file.read_bytes()))
     file.unlink()
-    write_mcap(bag / "bag_1.mcap", SAID[20:], close=False)
+    write_mcap(bag / "bag_1.mcap", SENT[20:], close=False)
 
     with pytest.raises(
         RecordingError, match=r"bag_0.mcap.zstd is compressed as a whole; 'zstd -d'"
@@ -303,24 +305,24 @@ def test_a_part_that_was_compressed_as_a_whole_is_not_left_out_in_silence(bag: P
 
 
 def test_an_sqlite_file_needs_no_recovering(bag: Path) -> None:
-    write_humble_db3(bag / "bag_0.db3", SAID)
+    write_humble_db3(bag / "bag_0.db3", SENT)
 
     with pytest.raises(RecordingError, match=r"bag_0.db3 is SQLite's, .*; give the file itself"):
         recover(bag)
 
-    assert [message.raw for message in read_messages(bag / "bag_0.db3")] == [s.cdr for s in SAID]
+    assert [message.raw for message in read_messages(bag / "bag_0.db3")] == [s.cdr for s in SENT]
 
 
 def test_messages_that_a_bag_cannot_hold_are_left_out_and_named(bag: Path) -> None:
-    write_mcap(bag / "bag_0.mcap", SAID[:2])
-    write_mcap(bag / "bag_1.mcap", SAID[2:4], serialization="json")
-    other = write_mcap(bag / "bag_2.mcap", SAID[4:5], compression=CompressionType.NONE, close=False)
+    write_mcap(bag / "bag_0.mcap", SENT[:2])
+    write_mcap(bag / "bag_1.mcap", SENT[2:4], serialization="json")
+    other = write_mcap(bag / "bag_2.mcap", SENT[4:5], compression=CompressionType.NONE, close=False)
     data = other.read_bytes().replace(b"std_msgs/msg/String", b"own_msgs/msg/Sample")
     other.write_bytes(_without_checksums(data))
 
     recovered = recover(bag)
 
-    assert texts(bag) == SAID[:2]
+    assert texts(bag) == SENT[:2]
     assert recovered.contents.unreadable == [
         "bag_1.mcap: message on '/a' as json, not as cdr (1), "
         "message on '/b' as json, not as cdr (1)",

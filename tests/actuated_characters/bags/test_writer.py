@@ -33,7 +33,7 @@ from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.writer import BagWriter
 from msgs_config.errors import ConfigurationError, RecordingError
-from tests.support.foreign_bags import Said
+from tests.support.foreign_bags import TextMessage
 from tests.support.limits import file_size_limit, unprivileged
 
 QOS = QoSProfile(depth=5000)
@@ -43,7 +43,7 @@ CHUNK_SIZE = 2**20  # of rosbags, in bytes: one file has several as soon as it i
 KINDS = [(s, c) for s in ("mcap", "sqlite3") for c in ("none", "zstd")]
 EACH_KIND = pytest.mark.parametrize(("storage", "compression"), KINDS)
 EACH_STORAGE = pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-HELLO = Said("/text", 0, "hello").cdr
+HELLO = TextMessage("/text", 0, "hello").cdr
 
 
 def sample_messages() -> dict[str, Any]:

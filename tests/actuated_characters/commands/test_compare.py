@@ -20,12 +20,12 @@ from tests.support.bags import (
     Made,
     add_to,
     make_run,
-    said_configuration,
-    said_references,
-    said_states,
+    raw_configuration,
+    raw_references,
+    raw_states,
     write_bag,
 )
-from tests.support.eventful import Eventful, eventful_run, said_controller, write_timed
+from tests.support.eventful import Eventful, eventful_run, raw_controller, write_timed
 
 FORCE = (400.0, 0.0, 0.0)
 
@@ -48,9 +48,9 @@ def pushed() -> Eventful:
 def bag_of(path: Path, made: Made, states: Sequence[StampedState]) -> Path:
     references = [tick.reference for tick in made.ticks if tick.reference is not None]
     messages = [
-        said_configuration(made.plan),
-        *said_states(made.plan, states),
-        *said_references(made.plan, references),
+        raw_configuration(made.plan),
+        *raw_states(made.plan, states),
+        *raw_references(made.plan, references),
     ]
     return write_bag(path, messages)
 
@@ -211,7 +211,7 @@ def test_parameters_and_gains_that_differ_are_listed(
 ) -> None:
     other = eventful_run("humanoid", 24, friction=0.5)
     stiffer = {**other.plan.controller, "gains.neck.p": 123.0}
-    other.said_by_controller = [said_controller(other.plan, stiffer)]  # type: ignore[arg-type]
+    other.from_controller = [raw_controller(other.plan, stiffer)]  # type: ignore[arg-type]
     first = write_timed(tmp_path / "first", humanoid.messages())
     second = write_timed(tmp_path / "second", other.messages())
 
@@ -220,8 +220,8 @@ def test_parameters_and_gains_that_differ_are_listed(
     assert comparison.simulator == {"friction": (0.9, 0.5)}
     assert comparison.controller == {"gains.neck.p": (100.0, 123.0)}
     main(["compare", str(first), str(second)])
-    said = capsys.readouterr().out
-    assert "friction" in said and "gains.neck.p" in said and "state_hash" in said
+    output = capsys.readouterr().out
+    assert "friction" in output and "gains.neck.p" in output and "state_hash" in output
 
 
 def test_the_growth_is_drawn(

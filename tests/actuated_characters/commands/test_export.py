@@ -86,8 +86,8 @@ def test_a_file_is_not_overwritten_unasked_and_what_cannot_be_written_is_one_lin
     bag, file = write_bag(tmp_path / "bag", pendulum.messages()), tmp_path / "states.csv"
     for nowhere in ("nowhere/states.csv", "."):
         assert exported(bag, "--output", tmp_path / nowhere) == 1
-        said = capsys.readouterr().err
-        assert said.startswith("error: cannot write") and said.count("\n") == 1
+        output = capsys.readouterr().err
+        assert output.startswith("error: cannot write") and output.count("\n") == 1
     file.write_text("mine")
 
     assert exported(bag, "--output", file) == 1
@@ -108,8 +108,8 @@ def test_one_of_several_characters_is_named(
             add_to(bag, pendulum.messages(), namespace)
 
     assert exported(tmp_path, "--output", file) == 1
-    said = capsys.readouterr().err
-    assert "left" in said and "right" in said and said.count("\n") == 1
+    output = capsys.readouterr().err
+    assert "left" in output and "right" in output and output.count("\n") == 1
     assert not file.exists()
     assert exported(tmp_path, "--output", file, "--character", "left") == 0
     assert len(table(file)) == len(pendulum.states)

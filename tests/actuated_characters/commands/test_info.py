@@ -18,17 +18,16 @@ from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.topics import Topic
-from tests.support.bags import Made, add_to, make_run, said_configuration, said_states, write_bag
+from tests.support.bags import Made, add_to, make_run, raw_configuration, raw_states, write_bag
 from tests.support.eventful import (
     MS,
     START_NS,
     Eventful,
     eventful_run,
-    said_controller,
+    raw_controller,
     write_timed,
 )
-from tests.support.foreign_bags import Said as SaidText
-from tests.support.foreign_bags import write_humble_db3, write_metadata
+from tests.support.foreign_bags import TextMessage, write_humble_db3, write_metadata
 
 PUSH = (100.0, 0.0, 50.0)
 TICKS = 60
@@ -53,8 +52,8 @@ def facts(fall: Eventful, tmp_path_factory: pytest.TempPathFactory) -> BagFacts:
     messages = fall.messages()
     changed = {**fall.plan.controller, "gain_scale.p": 2.0}
     since = fall.states[20].stamp_ns
-    said = said_controller(fall.plan, changed, since)  # type: ignore[arg-type]
-    messages.append((said, fall.log_times_ns[20]))
+    configuration = raw_controller(fall.plan, changed, since)  # type: ignore[arg-type]
+    messages.append((configuration, fall.log_times_ns[20]))
     messages.sort(key=lambda each: each[1])
     directory = tmp_path_factory.mktemp("fall")
     write_timed(directory / "bag", messages)
@@ -189,7 +188,7 @@ def test_missing_ticks_are_named_and_states_that_came_again_count_once(
         look_at(
             write_bag(
                 tmp_path / f"{len(states)}",
-                [said_configuration(pendulum.plan), *said_states(pendulum.plan, states)],
+                [raw_configuration(pendulum.plan), *raw_states(pendulum.plan, states)],
             )
         )
         for states in (some, twice)
@@ -218,15 +217,19 @@ def test_a_bag_of_something_else_has_its_topics(
 
     assert main(["info", str(bag)]) == 0
 
-    said = capsys.readouterr().out
-    assert "/chatter" in said and "std_msgs/msg/String" in said
-    assert "sim_node/configuration" in said  # what is missing for more
+    output = capsys.readouterr().out
+    assert "/chatter" in output and "std_msgs/msg/String" in output
+    assert "sim_node/configuration" in output  # what is missing for more
 
 
 @pytest.mark.parametrize("version", [4, 5, 9, 12])
 def test_bags_of_other_versions_of_rosbag2_have_their_topics(tmp_path: Path, version: int) -> None:
-    said = [SaidText("/a", 5_000, "1"), SaidText("/b", 7_000, "2"), SaidText("/a", 9_000, "3")]
-    write_humble_db3(tmp_path / "bag_0.db3", said)
+    messages = [
+        TextMessage("/a", 5_000, "1"),
+        TextMessage("/b", 7_000, "2"),
+        TextMessage("/a", 9_000, "3"),
+    ]
+    write_humble_db3(tmp_path / "bag_0.db3", messages)
     write_metadata(tmp_path, version, "sqlite3", ["bag_0.db3"], ["/a", "/b", "/c"])
 
     facts = look_at(tmp_path)
@@ -238,7 +241,7 @@ def test_bags_of_other_versions_of_rosbag2_have_their_topics(tmp_path: Path, ver
 
 
 @pytest.mark.parametrize(
-    "said",
+    "reason",
     [
         "no JSON",
         "[]",
@@ -248,12 +251,12 @@ def test_bags_of_other_versions_of_rosbag2_have_their_topics(tmp_path: Path, ver
     ],
 )
 def test_a_configuration_of_somebody_else_does_no_harm(
-    pendulum: Made, tmp_path: Path, said: str
+    pendulum: Made, tmp_path: Path, reason: str
 ) -> None:
     configuration = topics.CONFIGURATION.of(topics.SIM_NODE)
     messages = [
-        (configuration, serialize_message(String(data=said))),
-        *said_states(pendulum.plan, pendulum.states),
+        (configuration, serialize_message(String(data=reason))),
+        *raw_states(pendulum.plan, pendulum.states),
     ]
 
     facts = look_at(write_bag(tmp_path / "bag", messages))
@@ -294,7 +297,7 @@ def test_the_tables_are_printed(
 
     assert main(["info", str(facts.contents.bag)]) == 0
 
-    said = capsys.readouterr().out
+    output = capsys.readouterr().out
     for words in (
         "humanoid, 34 degrees of freedom",
         "chest at 0.04167 s for 0.05 s",
@@ -303,7 +306,7 @@ def test_the_tables_are_printed(
         "missing ticks",
         "gains and limits in force",
     ):
-        assert words in said
+        assert words in output
 
 
 # The wall clock

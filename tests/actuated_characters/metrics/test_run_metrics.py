@@ -23,7 +23,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.state import StampedReference, StampedState
-from tests.support.bags import Made, make_run, said_configuration, said_references, said_states
+from tests.support.bags import Made, make_run, raw_configuration, raw_references, raw_states
 from tests.support.physics import character
 
 RATE = 100
@@ -109,13 +109,13 @@ def measured(
 def test_a_ball_joints_error_is_the_angle_between_its_two_rotations(
     found: tuple[float, ...], desired: tuple[float, ...], angle: float
 ) -> None:
-    figures = measured([(entries(chest=found), entries(chest=desired), NONE)])
+    metrics = measured([(entries(chest=found), entries(chest=desired), NONE)])
 
-    assert figures["joint_error_mean_rad"] == pytest.approx(angle / 2.0, abs=1e-9)  # and the knee
+    assert metrics["joint_error_mean_rad"] == pytest.approx(angle / 2.0, abs=1e-9)  # and the knee
 
 
 def test_errors_are_means_over_joints_and_ticks_of_angles_and_distances() -> None:
-    figures = measured(
+    metrics = measured(
         [
             # a hinge that turns knows its turns; the root's turn is none of a joint
             (entries(knee=4.0, turn=(0.0, 0.0, 1.0)), entries(knee=-2.0), NONE),
@@ -124,15 +124,15 @@ def test_errors_are_means_over_joints_and_ticks_of_angles_and_distances() -> Non
         ]
     )
 
-    assert figures["joint_error_mean_rad"] == pytest.approx((6.0 + 1.0 + 0.8) / 2.0 / 3.0)
-    assert figures["root_error_mean_m"] == pytest.approx((0.0 + 5.0 + 1.0) / 3.0)
-    assert figures["root_error_max_m"] == pytest.approx(5.0)
-    assert figures["slider_error_mean_m"] == pytest.approx((0.0 + 7.0 + 2.0) / 3.0)
-    assert figures["slider_error_max_m"] == pytest.approx(7.0)
+    assert metrics["joint_error_mean_rad"] == pytest.approx((6.0 + 1.0 + 0.8) / 2.0 / 3.0)
+    assert metrics["root_error_mean_m"] == pytest.approx((0.0 + 5.0 + 1.0) / 3.0)
+    assert metrics["root_error_max_m"] == pytest.approx(5.0)
+    assert metrics["slider_error_mean_m"] == pytest.approx((0.0 + 7.0 + 2.0) / 3.0)
+    assert metrics["slider_error_max_m"] == pytest.approx(7.0)
 
 
 def test_ticks_without_a_reference_have_no_error_but_count() -> None:
-    figures = measured(
+    metrics = measured(
         [
             (entries(knee=1.0), None, NONE),
             (entries(knee=1.0), entries(knee=0.5), NONE),
@@ -140,11 +140,11 @@ def test_ticks_without_a_reference_have_no_error_but_count() -> None:
         ]
     )
 
-    assert figures["ticks"] == 3
-    assert figures["joint_error_mean_rad"] == pytest.approx(0.25)
-    assert figures["root_error_mean_m"] == 0.0
-    assert figures["fell"] is False
-    assert figures["saturated_fraction"] == pytest.approx(1.0 / 9.0)
+    assert metrics["ticks"] == 3
+    assert metrics["joint_error_mean_rad"] == pytest.approx(0.25)
+    assert metrics["root_error_mean_m"] == 0.0
+    assert metrics["fell"] is False
+    assert metrics["saturated_fraction"] == pytest.approx(1.0 / 9.0)
 
 
 def test_what_cannot_be_measured_is_none() -> None:
@@ -153,8 +153,8 @@ def test_what_cannot_be_measured_is_none() -> None:
     of_reference = ("joint_error_mean_rad", "root_error_mean_m", "root_error_max_m", "fell")
 
     alone = measured([(np.array([0.5]), np.array([1.0]), np.array([5.0]))], slider)
-    for figures in (measured([(entries(), None, NONE)]), measured([]), alone):
-        assert all(figures[name] is None for name in of_reference)
+    for metrics in (measured([(entries(), None, NONE)]), measured([]), alone):
+        assert all(metrics[name] is None for name in of_reference)
 
     assert alone["assist_force_mean_n"] is None
     assert (alone["saturated_fraction"], alone["slider_error_mean_m"]) == (1.0, 0.5)
@@ -165,19 +165,19 @@ def test_what_cannot_be_measured_is_none() -> None:
 
 
 def test_assistance_is_the_length_of_the_roots_force_and_weight_is_the_bodys() -> None:
-    figures = measured(
+    metrics = measured(
         [
             (entries(), entries(), entries((0.0, 3.0, -4.0), turn=(9.0, 9.0, 9.0))),
             (entries(), entries(), efforts(root=(2.0, 0.0, 0.0))),
         ]
     )
 
-    assert figures["assist_force_mean_n"] == pytest.approx(3.5)
-    assert figures["body_weight_n"] == pytest.approx(200.0)
+    assert metrics["assist_force_mean_n"] == pytest.approx(3.5)
+    assert metrics["body_weight_n"] == pytest.approx(200.0)
 
 
 def test_a_joint_at_its_limit_is_saturated_and_a_ball_joint_by_its_length() -> None:
-    figures = measured(
+    metrics = measured(
         [
             (entries(), entries(), efforts(chest=(6.0, 0.0, -8.0), knee=4.99)),
             (entries(), entries(), efforts(chest=(9.9, 0.0, 0.0), knee=-5.0)),
@@ -186,7 +186,7 @@ def test_a_joint_at_its_limit_is_saturated_and_a_ball_joint_by_its_length() -> N
         ]
     )
 
-    assert figures["saturated_fraction"] == pytest.approx(2.0 / 12.0)  # three joints, four ticks
+    assert metrics["saturated_fraction"] == pytest.approx(2.0 / 12.0)  # three joints, four ticks
 
 
 @pytest.mark.parametrize(
@@ -197,10 +197,10 @@ def test_actuators_are_the_commanded_degrees_of_freedom(
 ) -> None:
     known = replace(KNOWN, parameters={**KNOWN.parameters, "commanded_joints": commanded})
 
-    figures = measured([], known)
+    metrics = measured([], known)
 
-    assert (figures["actuators"], figures["root_actuators"]) == (count, of_root)
-    assert figures["degrees_of_freedom"] == 11
+    assert (metrics["actuators"], metrics["root_actuators"]) == (count, of_root)
+    assert metrics["degrees_of_freedom"] == 11
 
 
 # The fall
@@ -228,7 +228,7 @@ def test_it_fell_if_the_root_is_below_half_of_a_reference_that_stands(
 
 
 @pytest.mark.parametrize(
-    ("centre", "lost"),
+    ("centre", "fails"),
     [
         ((0.59, 0.0, 0.9), False),
         ((0.0, 0.61, 0.9), True),
@@ -237,9 +237,9 @@ def test_it_fell_if_the_root_is_below_half_of_a_reference_that_stands(
     ],
 )
 def test_a_motion_is_lost_where_the_centre_of_mass_is_far_or_low(
-    centre: tuple[float, ...], lost: bool
+    centre: tuple[float, ...], fails: bool
 ) -> None:
-    assert is_lost(np.array(centre), np.array((0.0, 0.0, 0.9))) is lost
+    assert is_lost(np.array(centre), np.array((0.0, 0.0, 0.9))) is fails
 
 
 # Time
@@ -251,12 +251,12 @@ def test_a_motion_is_lost_where_the_centre_of_mass_is_far_or_low(
 def test_simulated_time_is_that_between_the_first_and_the_last_state(
     count: int, wall_time: float, factor: float | None
 ) -> None:
-    figures = measured([(entries(), entries(), NONE)] * count, wall_time=wall_time)
+    metrics = measured([(entries(), entries(), NONE)] * count, wall_time=wall_time)
 
-    assert figures["ticks"] == count
-    assert figures["sim_time_s"] == pytest.approx(count / RATE)
-    assert figures["wall_time_s"] == wall_time
-    assert figures["real_time_factor"] == (None if factor is None else pytest.approx(factor))
+    assert metrics["ticks"] == count
+    assert metrics["sim_time_s"] == pytest.approx(count / RATE)
+    assert metrics["wall_time_s"] == wall_time
+    assert metrics["real_time_factor"] == (None if factor is None else pytest.approx(factor))
 
 
 @pytest.mark.parametrize("count", [255, 256, 257, 513])
@@ -268,16 +268,16 @@ def test_where_one_block_ends_and_the_next_begins_does_not_matter(count: int) ->
         here, there = (entries(root=rng.normal(size=3), knee=rng.normal()) for _ in range(2))
         ticks.append((here, there, applied))
 
-    figures = measured(ticks)
+    metrics = measured(ticks)
 
     roots = [math.dist(here[:3], there[:3]) for here, there, _ in ticks]
     knees = [abs(here[9] - there[9]) for here, there, _ in ticks]
     at_limit = [int(math.hypot(*e[6:9]) >= 10.0) + int(e[9] == 5.0) for *_, e in ticks]
-    assert figures["ticks"] == count
-    assert figures["root_error_mean_m"] == pytest.approx(np.mean(roots))
-    assert figures["root_error_max_m"] == pytest.approx(max(roots))
-    assert figures["joint_error_mean_rad"] == pytest.approx(np.mean(knees) / 2.0)
-    assert figures["saturated_fraction"] == pytest.approx(sum(at_limit) / (3 * count))
+    assert metrics["ticks"] == count
+    assert metrics["root_error_mean_m"] == pytest.approx(np.mean(roots))
+    assert metrics["root_error_max_m"] == pytest.approx(max(roots))
+    assert metrics["joint_error_mean_rad"] == pytest.approx(np.mean(knees) / 2.0)
+    assert metrics["saturated_fraction"] == pytest.approx(sum(at_limit) / (3 * count))
 
 
 def test_the_series_has_one_row_a_tick_and_looking_at_it_changes_nothing() -> None:
@@ -368,12 +368,12 @@ REFERENCES = [reference(tick, entries(knee=0.2 * tick)) for tick in range(1, 11)
 
 
 def test_each_state_meets_its_reference_and_the_effort_that_the_next_state_tells() -> None:
-    figures, missing = assembled([*STATES[:3], *REFERENCES[:3]])
+    metrics, missing = assembled([*STATES[:3], *REFERENCES[:3]])
 
     assert missing == 0
-    assert figures["ticks"] == 2  # what is applied to the last state nobody has said yet
-    assert figures["joint_error_mean_rad"] == pytest.approx((0.1 + 0.2) / 2.0 / 2.0)
-    assert figures["state_hash"] == hash_of(*STATES[:3])
+    assert metrics["ticks"] == 2  # what is applied to the last state nobody has said yet
+    assert metrics["joint_error_mean_rad"] == pytest.approx((0.1 + 0.2) / 2.0 / 2.0)
+    assert metrics["state_hash"] == hash_of(*STATES[:3])
 
 
 PAIRS = list(zip(STATES, REFERENCES, strict=True))
@@ -416,13 +416,13 @@ RESET = [*STATES[:5], replace(STATES[5], effort=None), *STATES[6:]]
 def test_a_tick_that_cannot_be_measured_leaves_the_others_theirs(
     states: list[StampedState], references: list[StampedReference], measured_ticks: tuple[int, ...]
 ) -> None:
-    figures, missing = assembled([*states, *references])
+    metrics, missing = assembled([*states, *references])
 
     assert missing == 0
-    assert figures["ticks"] == (9 if states is STATES else 8)
+    assert metrics["ticks"] == (9 if states is STATES else 8)
     errors = [0.1 * tick / 2.0 for tick in measured_ticks]
-    assert figures["joint_error_mean_rad"] == pytest.approx(np.mean(errors))
-    assert figures["state_hash"] == hash_of(*states)
+    assert metrics["joint_error_mean_rad"] == pytest.approx(np.mean(errors))
+    assert metrics["state_hash"] == hash_of(*states)
 
 
 def test_references_wait_only_for_the_states_that_they_belong_to() -> None:
@@ -473,7 +473,7 @@ def pendulum(**simulator: object) -> Made:
 
 
 def configuration_message(**given: object) -> Message:
-    return CONFIGURATION, said_configuration(pendulum(**given).plan)[1], 0
+    return CONFIGURATION, raw_configuration(pendulum(**given).plan)[1], 0
 
 
 def report(name: str, published_ns: int, **values: object) -> Message:
@@ -486,8 +486,8 @@ def pendulum_messages() -> list[Message]:
     """What a recorder hears of a pendulum: in each ms a state, and its reference; and a torque."""
     made = pendulum()
     references = [tick.reference for tick in made.ticks if tick.reference is not None]
-    states = enumerate(said_states(made.plan, made.states), start=1)
-    desired = enumerate(said_references(made.plan, references), start=1)
+    states = enumerate(raw_states(made.plan, made.states), start=1)
+    desired = enumerate(raw_references(made.plan, references), start=1)
     messages = [(REFERENCE, raw, at * MILLISECOND) for at, (_, raw) in desired]
     messages += [(STATE, raw, at * MILLISECOND) for at, (_, raw) in states]
     messages.append((TORQUE, b"", MILLISECOND + 1000))
@@ -495,39 +495,39 @@ def pendulum_messages() -> list[Message]:
 
 
 def heard(messages: Iterable[Message]) -> MetricsCollector:
-    listener = MetricsCollector()
+    collector = MetricsCollector()
     for message in messages:
-        listener.take(*message)
-    return listener
+        collector.take(*message)
+    return collector
 
 
 def test_a_listener_gives_the_figures_of_the_run_that_it_hears() -> None:
-    listener = heard([configuration_message(), *pendulum_messages()])
+    collector = heard([configuration_message(), *pendulum_messages()])
 
-    figures, series = listener.results()
+    metrics, series = collector.results()
 
-    assert figures["character"] == "pendulum"
-    assert listener.last_tick == 21
-    assert listener.missing_ticks == figures["missing_ticks"] == 0
-    assert figures["ticks"] == 20
-    assert figures["sim_time_s"] == pytest.approx(20 / 240, abs=1e-8)
-    assert figures["wall_time_s"] == pytest.approx(0.020 - 1e-6)  # first torque to last state
-    assert figures["rejected_commands"] is figures["duplicate_commands"] is None  # nobody said
+    assert metrics["character"] == "pendulum"
+    assert collector.last_tick == 21
+    assert collector.missing_ticks == metrics["missing_ticks"] == 0
+    assert metrics["ticks"] == 20
+    assert metrics["sim_time_s"] == pytest.approx(20 / 240, abs=1e-8)
+    assert metrics["wall_time_s"] == pytest.approx(0.020 - 1e-6)  # first torque to last state
+    assert metrics["rejected_commands"] is metrics["duplicate_commands"] is None  # nobody said
     mass_kg = character("pendulum").mass
-    assert figures["body_weight_n"] == pytest.approx(9.81 * mass_kg)
+    assert metrics["body_weight_n"] == pytest.approx(9.81 * mass_kg)
     assert list(series) == list(COLUMNS)
     assert {len(column) for column in series.values()} == {20}
-    assert figures["state_hash"] == hash_of(*pendulum().states)
+    assert metrics["state_hash"] == hash_of(*pendulum().states)
 
 
 def test_early_and_repeated_messages_change_nothing() -> None:
     messages, configured = pendulum_messages(), configuration_message()
     topic, raw, _ = messages[-1]
-    figures = heard([configured, *messages]).results()[0]
+    metrics = heard([configured, *messages]).results()[0]
 
-    assert heard([*messages, configured]).results()[0] == figures
-    assert heard([configured, *messages[:30], configured, *messages[30:]]).results()[0] == figures
-    assert heard([configured, *messages, (topic, raw, 10**12)]).results()[0] == figures
+    assert heard([*messages, configured]).results()[0] == metrics
+    assert heard([configured, *messages[:30], configured, *messages[30:]]).results()[0] == metrics
+    assert heard([configured, *messages, (topic, raw, 10**12)]).results()[0] == metrics
 
 
 def test_commands_are_counted_as_the_simulator_reports_them_last() -> None:
@@ -539,16 +539,16 @@ def test_commands_are_counted_as_the_simulator_reports_them_last() -> None:
         report(SIMULATOR, 8),
     ]
 
-    figures = heard([configuration_message(), *messages, *pendulum_messages()]).results()[0]
+    metrics = heard([configuration_message(), *messages, *pendulum_messages()]).results()[0]
 
-    assert (figures["rejected_commands"], figures["duplicate_commands"]) == (4, 5)
+    assert (metrics["rejected_commands"], metrics["duplicate_commands"]) == (4, 5)
 
 
 def test_a_simulator_that_is_restarted_is_an_error() -> None:
-    listener = heard([configuration_message(), *pendulum_messages()])
+    collector = heard([configuration_message(), *pendulum_messages()])
 
     with pytest.raises(RecordingError, match="restarted"):
-        listener.take(*configuration_message(gravity=1.62))
+        collector.take(*configuration_message(gravity=1.62))
 
 
 def test_without_a_simulator_there_are_no_figures() -> None:
@@ -559,10 +559,10 @@ def test_without_a_simulator_there_are_no_figures() -> None:
 @pytest.mark.parametrize("topic", [STATE, REFERENCE, topics.DIAGNOSTICS.name, CONFIGURATION])
 @pytest.mark.parametrize("raw", [b"", b"\x00\x01\x00\x00\xff\xff\xff\xff"], ids=["no", "some"])
 def test_bytes_that_are_no_message_are_an_error_of_the_projects_own(topic: str, raw: bytes) -> None:
-    listener = heard([configuration_message(), *pendulum_messages()])
-    before = listener.results()[0]
+    collector = heard([configuration_message(), *pendulum_messages()])
+    before = collector.results()[0]
 
     with pytest.raises(ActuatedCharactersError):
-        listener.take(topic, raw, 0)
+        collector.take(topic, raw, 0)
 
-    assert listener.results()[0] == before
+    assert collector.results()[0] == before

@@ -132,9 +132,9 @@ class Numbered:
             place = Place(tick + len(branch.seeds), cast(Any, None), cast(Any, None))
             self.grown += 1
             failures = branch.seeds[-1] // 2**10 % 2**10
-            lost = place.tick >= self.deadly and not failures
+            fails = place.tick >= self.deadly and not failures
             cost = float(branch.seeds[-1] % 2**10)
-            yield None if lost else Grown(place, (), np.zeros(1), cost, 0.0)
+            yield None if fails else Grown(place, (), np.zeros(1), cost, 0.0)
 
 
 def progress_of(
@@ -366,10 +366,10 @@ def test_the_command_writes_a_file_and_a_table(
         ]
     )
 
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     assert code == 0
-    assert "centre of mass error" in said
-    assert f"play it over topics: actuated_characters run --clip {output}" in said
+    assert "centre of mass error" in printed
+    assert f"play it over topics: actuated_characters run --clip {output}" in printed
     assert json.loads(output.read_text())["Reconstruction"]["clip"] == "kick"
 
 
@@ -456,13 +456,13 @@ def test_ctrl_c_leaves_no_process_and_what_was_found(tmp_path: Path, *, early: b
             240.0,  # compiled for the first time on a slow machine
         )
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
-        _, said = process.communicate(timeout=60.0)
+        _, printed = process.communicate(timeout=60.0)
     finally:
         process.kill()
 
     assert process.returncode == 130
-    assert said.strip().splitlines()[-1] == "interrupted"
-    assert "Traceback" not in said
+    assert printed.strip().splitlines()[-1] == "interrupted"
+    assert "Traceback" not in printed
     wait_until(lambda: not marked(mark), "the end of all processes")
     assert early or checkpoint_path(output).exists()
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from actuated_characters.recorder.loss_count import LossCount
 
 
-def lost(numbers: Iterable[int | None], publishers: int = 1) -> int:
+def count_lost(numbers: Iterable[int | None], publishers: int = 1) -> int:
     count = LossCount(lambda: publishers)
     for number in numbers:
         count.take(number)
@@ -27,7 +27,7 @@ def test_of_one_publisher_every_gap_between_what_came_is_counted(
 ) -> None:
     numbers = [first, *(first + i for i, here in enumerate(came, start=1) if here)]
 
-    assert lost(numbers) == numbers[-1] - first + 1 - len(numbers)
+    assert count_lost(numbers) == numbers[-1] - first + 1 - len(numbers)
 
 
 @settings(deadline=None)
@@ -40,20 +40,20 @@ def test_several_publishers_lose_nothing_however_theirs_are_mixed(
     while any(left):
         mixed.append(data.draw(st.sampled_from([numbers for numbers in left if numbers])).pop(0))
 
-    assert lost(mixed, publishers=len(sizes)) == 0
+    assert count_lost(mixed, publishers=len(sizes)) == 0
 
 
 def test_a_gap_is_found_beside_another_publisher_too() -> None:
-    assert lost([1, 1, 2, 2, 3, 7, 3, 8, 4], publishers=2) == 3
+    assert count_lost([1, 1, 2, 2, 3, 7, 3, 8, 4], publishers=2) == 3
 
 
 def test_what_was_published_before_the_first_is_not_missed() -> None:
-    assert lost([500, 501]) == 0
+    assert count_lost([500, 501]) == 0
 
 
 def test_a_publisher_that_begins_anew_has_lost_nothing() -> None:
-    assert lost([1, 2, 3, 1, 2, 4]) == 1
+    assert count_lost([1, 2, 3, 1, 2, 4]) == 1
 
 
 def test_a_middleware_without_numbers_counts_nothing() -> None:
-    assert lost([None, None]) == 0
+    assert count_lost([None, None]) == 0

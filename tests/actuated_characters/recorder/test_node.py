@@ -128,9 +128,9 @@ def test_what_was_flushed_is_on_the_disk_before_the_recorder_says_so(
 ) -> None:
     recorder = processes.node(topics.RECORDER_NODE, directory="run", progress_period=0.1)
     processes.simulator("pendulum", wait_for_subscribers=2)
-    state = client.answer(client.first_state(), {})
+    state = client.advance(client.first_state(), {})
     while tick_of(state) < 30:
-        state = client.answer(state, {})
+        state = client.advance(state, {})
 
     def flushed() -> int:
         return max(map(int, re.findall(r"^flushed (\d+)$", recorder.stdout, re.M)), default=0)
@@ -237,7 +237,7 @@ def test_messages_that_were_lost_are_counted_by_topic_and_said(
     client.spin_sending(
         lambda: send(END), lambda: END.encode() in file.read_bytes(), "the flood's end in the bag"
     )
-    client.answer(state, {})
+    client.advance(state, {})
     recorder.send(signal.SIGINT)
 
     # Assert

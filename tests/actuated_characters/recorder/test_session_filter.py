@@ -40,12 +40,14 @@ def heard(topic: Topic, session: str, number: int = 1) -> Heard:
     return Heard(recorded, bytes(raw), number)
 
 
-def kept(given_session: str, messages: list[Heard]) -> tuple[SessionFilter, list[Heard], list[str]]:
+def filtered(
+    given_session: str, messages: list[Heard]
+) -> tuple[SessionFilter, list[Heard], list[str]]:
     """What a filter lets through of messages, in its order, and what it says."""
-    said: list[str] = []
-    session_filter = SessionFilter(given_session, said.append)
+    lines: list[str] = []
+    session_filter = SessionFilter(given_session, lines.append)
     passed = [each for message in messages for each in session_filter.take(message)]
-    return session_filter, passed + session_filter.finish(), said
+    return session_filter, passed + session_filter.finish(), lines
 
 
 def content(message: Heard) -> tuple[str, bytes, int]:
@@ -69,7 +71,7 @@ _any_messages = st.lists(
 def test_of_any_interleaving_all_of_one_simulator_is_kept_and_nothing_of_others(
     messages: list[Heard],
 ) -> None:
-    session_filter, passed, said = kept("", messages)
+    session_filter, passed, lines = filtered("", messages)
 
     states = [m for m in messages if m.recorded.topic is topics.JOINT_STATES]
     if states:
@@ -79,7 +81,7 @@ def test_of_any_interleaving_all_of_one_simulator_is_kept_and_nothing_of_others(
         assert sorted(map(content, passed)) == sorted(map(content, own))
         dropped = sum(session_filter.dropped(f"/{topic.name}") for topic in NAMED)
         assert dropped == len(messages) - len(own)
-        assert bool(said) == bool(dropped)
+        assert bool(lines) == bool(dropped)
     assert len({find_session(message) for message in passed} - {None}) <= 1
 
 
@@ -88,7 +90,7 @@ def test_of_any_interleaving_all_of_one_simulator_is_kept_and_nothing_of_others(
 def test_a_session_that_is_given_is_the_only_one_from_the_first_message_on(
     messages: list[Heard],
 ) -> None:
-    _, passed, _ = kept(OTHER, messages)
+    _, passed, _ = filtered(OTHER, messages)
 
     assert passed == [message for message in messages if find_session(message) in (OTHER, None)]
 
@@ -98,22 +100,22 @@ def test_what_came_before_the_first_state_is_kept_in_front_of_it() -> None:
     strange = [heard(CONFIGURATION, OTHER), heard(topics.EPISODE, OTHER)]
     state = heard(topics.JOINT_STATES, ONE)
 
-    _, passed, said = kept("", [strange[0], *first, strange[1], state])
+    _, passed, lines = filtered("", [strange[0], *first, strange[1], state])
 
     assert passed == [*first, state]
-    assert len(said) == 1 and ONE in said[0] and OTHER in said[0]
+    assert len(lines) == 1 and ONE in lines[0] and OTHER in lines[0]
 
 
 def test_of_a_simulator_that_has_had_no_state_yet_the_configuration_is_kept_at_the_end() -> None:
     message = heard(CONFIGURATION, ONE)
 
-    assert kept("", [message])[1] == [message]
+    assert filtered("", [message])[1] == [message]
 
 
 def test_bytes_that_are_no_message_are_of_no_simulator_that_names_itself() -> None:
     garbage = heard(topics.JOINT_STATES, ONE)._replace(raw=b"\x00\x01\x00\x00\xff")
 
-    assert kept(ONE, [garbage, heard(topics.JOINT_STATES, ONE)])[1] == [
+    assert filtered(ONE, [garbage, heard(topics.JOINT_STATES, ONE)])[1] == [
         heard(topics.JOINT_STATES, ONE)
     ]
 

@@ -321,7 +321,7 @@ def test_one_recorder_records_several_characters_with_figures_of_each(
     for message in read_messages(tmp_path / "run" / "bag"):
         if message.type_name == "sensor_msgs/msg/JointState":
             ticks.setdefault(message.topic, []).append(tick_of(message.decode()))
-    figures = {
+    metrics = {
         name: json.loads((tmp_path / "run" / name / "summary.json").read_text()) for name in names
     }
     for name in names:
@@ -329,11 +329,11 @@ def test_one_recorder_records_several_characters_with_figures_of_each(
         assert states == list(range(1, TICKS + 2))
         answered = list(dict.fromkeys(ticks[f"/{name}/controller_node/reference"]))
         assert answered[:TICKS] == states[:TICKS]
-        assert figures[name]["ticks"] == TICKS
-        assert figures[name]["rejected_commands"] == 0
-        assert figures[name]["lost_messages"] == {}
+        assert metrics[name]["ticks"] == TICKS
+        assert metrics[name]["rejected_commands"] == 0
+        assert metrics[name]["lost_messages"] == {}
         assert (tmp_path / "run" / name / "measurements.csv").exists()
-    assert figures["left"]["state_hash"] != figures["right"]["state_hash"]
+    assert metrics["left"]["state_hash"] != metrics["right"]["state_hash"]
 
 
 def test_a_topic_gives_no_more_at_a_time_than_is_asked_for(client: SimulatorClient) -> None:

@@ -283,11 +283,11 @@ def test_links_that_touch_something_are_marked() -> None:
     touched = replace(recording, contacts=(*[None] * 8, *[touch] * 8))
     settings = replace(HERE, ghost=GhostPlace.NONE, contacts=True)
 
-    plain = drawn(touched, replace(settings, contacts=False))
+    without_contacts = drawn(touched, replace(settings, contacts=False))
     marked = drawn(touched, settings)
 
-    np.testing.assert_array_equal(marked[1], plain[1])  # of state 8, before the touch
-    changed = np.argwhere((marked[2] != plain[2]).any(axis=2))
+    np.testing.assert_array_equal(marked[1], without_contacts[1])  # of state 8, before the touch
+    changed = np.argwhere((marked[2] != without_contacts[2]).any(axis=2))
     assert len(changed) > 3 and changed[:, 0].min() > 0.6 * SIZE[1]
     with pytest.raises(RecordingError, match="no contacts"):
         Movie([recording], settings)

@@ -17,7 +17,7 @@ from actuated_characters.render.movie import Movie, MovieSettings
 from actuated_characters.render.stills import pose_strip, save_png, strip
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.wrenches import WrenchArrays
-from tests.support.bags import Made, make_run, said_configuration, said_states, write_bag
+from tests.support.bags import Made, make_run, raw_configuration, raw_states, write_bag
 from tests.support.physics import character
 from tests.support.pictures import followed, is_green, take_picture, view_of
 from tests.support.ros import Processes, wait_until
@@ -204,7 +204,7 @@ def test_captions_that_do_not_fit_are_refused() -> None:
 
 
 def test_a_ghost_of_nothing_is_refused(walk: Made, tmp_path: Path) -> None:
-    messages = [said_configuration(walk.plan), *said_states(walk.plan, walk.states)]
+    messages = [raw_configuration(walk.plan), *raw_states(walk.plan, walk.states)]
     recording = read_recording(write_bag(tmp_path / "bag", messages))
 
     with pytest.raises(RecordingError, match="no reference"):

@@ -39,12 +39,12 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """A recording of five ticks with a reset, in which three balls are thrown."""
     runner = InProcessRunner(tmp_path_factory.mktemp("runner"))
     case = RunSpec("one", "humanoid", 5.0 / 240.0, {"reference": "hold"}, {}, {})
-    plain = runner.run(case).recording
-    effort = plain.effort.copy()
+    without_balls = runner.run(case).recording
+    effort = without_balls.effort.copy()
     effort[2] = np.nan  # that tick is a reset
-    stamps = plain.stamps_ns.tolist()
+    stamps = without_balls.stamps_ns.tolist()
     return replace(
-        plain,
+        without_balls,
         effort=effort,
         throws=((), (ONE,), (), (OTHER,), (ONE,)),
         balls=(

@@ -82,12 +82,12 @@ def test_a_recording_that_cannot_be_sent_says_why(walk: Recording) -> None:
     pushed = replace(walk, pushes_sent=2, applied_wrench=())
     effort = walk.effort.copy()
     effort[3, 10] = np.nan
-    lost = replace(walk, effort=effort, commands=((),) * (TICKS + 1))
+    silent = replace(walk, effort=effort, commands=((),) * (TICKS + 1))
 
     for recording, reason in (
         (pushed, "2 messages on 'external_wrench'"),
         (with_parameters(walk, commanded_joints=[]), "without --through-topics"),
-        (lost, "tick 4 of the recording has neither"),
+        (silent, "tick 4 of the recording has neither"),
     ):
         with pytest.raises(RecordingError, match=reason):
             make_inputs([recording])
@@ -102,14 +102,14 @@ def settings_of(**values: float | None) -> dict[str, Any]:
 
 def test_a_controllers_parameters_are_those_before_its_first_answer(walk: Recording) -> None:
     stamps = walk.stamps_ns.tolist()
-    said = (
+    configuration = (
         ControllerSettings(settings_of(), None),
         ControllerSettings(settings_of(**{"gains.a.p": 2.0}), None),
         ControllerSettings(settings_of(**{"gains.a.p": 3.0}), stamps[5]),
         ControllerSettings(settings_of(**{"gains.a.p": 4.0, "effort_limit.a": 9.0}), stamps[5]),
         ControllerSettings(settings_of(**{"gains.a.p": 4.0, "effort_limit.a": None}), stamps[9]),
     )
-    changing = replace(walk, controller=said)
+    changing = replace(walk, controller=configuration)
 
     assert first_parameters(changing) == {"gains.a.p": 2.0, "effort_limit.a": np.inf}
     assert parameter_changes(changing) == {

@@ -31,8 +31,8 @@ from tests.support.bags import (
     Made,
     add_to,
     make_run,
-    said_configuration,
-    said_states,
+    raw_configuration,
+    raw_states,
     write_bag,
 )
 from tests.support.recordings import changed, commanding, recording_of, with_parameters
@@ -101,11 +101,11 @@ def test_one_bit_of_a_state_is_found(walk: Recording, quantity: str, row: int) -
 
 
 @pytest.mark.parametrize(
-    ("entry", "change", "said"),
+    ("entry", "change", "reason"),
     [("right_knee", 1.0, ""), ("chest_x", np.inf, "the replay diverged at tick 22")],
 )
 def test_an_effort_that_was_another_one_changes_the_states(
-    walk: Recording, entry: str, change: float, said: str
+    walk: Recording, entry: str, change: float, reason: str
 ) -> None:
     effort = walk.effort.copy()
     effort[20, walk.layout.dof_names.index(entry)] += change
@@ -113,7 +113,7 @@ def test_an_effort_that_was_another_one_changes_the_states(
     result = replay([replace(walk, effort=effort, commands=((),) * (TICKS + 1))])
 
     assert result.difference is not None and result.difference.tick == 22
-    assert said in str(result.difference)
+    assert reason in str(result.difference)
     assert any("no commands" in note for note in result.remarks)
 
 
@@ -237,20 +237,20 @@ def test_in_real_time_a_command_is_held_until_it_is_too_old(
     effort[3:8] = 1.5
     command = CommandArrays(("hinge",), np.array([1.5]), int(pendulum.published_ns[3]))
     commands = tuple((command,) if row == 3 and stamped else () for row in range(len(effort) + 1))
-    held = replace(
+    holding = replace(
         pendulum,
         effort=effort,
         commands=commands,
         unstamped_commands=() if stamped else (command,),
     )
-    held = with_parameters(held, mode="realtime", command_timeout=5.5 / 240.0)
+    holding = with_parameters(holding, mode="realtime", command_timeout=5.5 / 240.0)
 
-    assert difference_of(held) is None
-    before = replace(held, effort=effort.copy())
+    assert difference_of(holding) is None
+    before = replace(holding, effort=effort.copy())
     before.effort[0] = 1.5
     difference = difference_of(before)
     assert difference is not None and difference.tick == 2
-    other = difference_of(replace(held, effort=changed(effort, 5, 0)))
+    other = difference_of(replace(holding, effort=changed(effort, 5, 0)))
     assert other is not None and (other.tick, other.name) == (7, "hinge")
 
 
@@ -282,8 +282,8 @@ def test_simulators_in_two_namespaces_are_two_worlds(tmp_path: Path) -> None:
 
 def test_a_world_that_was_not_recorded_whole_cannot_be_built(tmp_path: Path) -> None:
     made = make_run("pendulum", 0.05)
-    said = [said_configuration(made.plan, "a", ("a", "b")), *made.messages()[1:]]
-    bag = write_bag(tmp_path / "bag", said, namespace="lab/a")
+    messages = [raw_configuration(made.plan, "a", ("a", "b")), *made.messages()[1:]]
+    bag = write_bag(tmp_path / "bag", messages, namespace="lab/a")
     (recording,) = read_recordings(bag)
 
     assert recording.world == RecordedWorld("lab", "a", ("a", "b"))
@@ -296,16 +296,16 @@ def two_of_one_world(path: Path, left: slice, right: slice) -> Path:
     with BagWriter(path) as bag:
         for name, rows in (("left", left), ("right", right)):
             made = make_run("pendulum", 0.1)
-            said = said_configuration(made.plan, name, ("left", "right"))
-            add_to(bag, [said, *said_states(made.plan, made.states[rows])], name)
+            first = raw_configuration(made.plan, name, ("left", "right"))
+            add_to(bag, [first, *raw_states(made.plan, made.states[rows])], name)
     return path
 
 
 def test_a_state_more_of_one_character_is_left_out(tmp_path: Path) -> None:
     bag = two_of_one_world(tmp_path / "bag", slice(0, 24), slice(0, 25))
 
-    together, notes = read_world(bag)
-    assert [len(each.stamps_ns) for each in together] == [24, 24] and notes == []
+    together, remarks = read_world(bag)
+    assert [len(each.stamps_ns) for each in together] == [24, 24] and remarks == []
 
 
 def test_a_character_that_ends_before_the_others_is_an_error(tmp_path: Path) -> None:
@@ -348,8 +348,8 @@ def test_terrain_lies_in_the_recording(tmp_path: Path) -> None:
 
     terrain = make_settings(made.plan.simulator).world.terrain
     text = configuration.describe(made.plan.character, made.plan.simulator, terrain=terrain)
-    said = (CONFIGURATION, serialize_message(String(data=text)))
-    bag = write_bag(tmp_path / "bag", [said, *made.messages()[1:]])
+    message = (CONFIGURATION, serialize_message(String(data=text)))
+    bag = write_bag(tmp_path / "bag", [message, *made.messages()[1:]])
     file.unlink()
 
     recordings = read_recordings(bag)

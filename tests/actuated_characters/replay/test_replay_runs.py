@@ -131,7 +131,7 @@ def drive_hard(
     sizes = np.array([150.0 if "hip" in name else 5.0 for name in motors])
     for _ in range(ticks):
         torques = (sizes * rng.uniform(-1.0, 1.0, len(motors))).tolist()
-        state = client.answer(state, dict(zip(motors, torques, strict=True)))
+        state = client.advance(state, dict(zip(motors, torques, strict=True)))
     return state
 
 

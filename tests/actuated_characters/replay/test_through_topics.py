@@ -237,9 +237,9 @@ def test_a_walk_comes_again_when_the_bag_commands_a_simulator(
     assert main(["replay", str(walk), "--through-topics"]) == 0
 
     summary, _ = read_metrics(walk)
-    said = capsys.readouterr().out
-    assert "identical: 121 states of humanoid, 1 episode" in said
-    assert f"state hash {summary['state_hash']};" in said
+    output = capsys.readouterr().out
+    assert "identical: 121 states of humanoid, 1 episode" in output
+    assert f"state hash {summary['state_hash']};" in output
 
 
 def test_delays_clipped_torques_pushes_pauses_and_a_reset_come_again(eventful: Path) -> None:
@@ -352,8 +352,8 @@ def test_the_bags_own_controller_answers_as_it_did(
     assert main(["replay", str(walk), "--through-topics", "simulator"]) == 0
 
     # the last state may have been answered then, or not
-    said = capsys.readouterr().out
-    assert re.fullmatch(r"identical: the commands that answer 12[01] states of humanoid\n", said)
+    output = capsys.readouterr().out
+    assert re.fullmatch(r"identical: the commands that answer 12[01] states of humanoid\n", output)
 
 
 def test_changed_gains_laws_and_trajectories_come_again(eventful: Path) -> None:
@@ -462,9 +462,9 @@ def test_the_command_shows_what_another_gain_changes(
 
     assert main(["replay", str(walk), *options]) == 0
 
-    said = capsys.readouterr().out
-    assert "first difference: tick 1 " in said
-    assert "largest difference: tick" in said and "right_shoulder" in said
+    output = capsys.readouterr().out
+    assert "first difference: tick 1 " in output
+    assert "largest difference: tick" in output and "right_shoulder" in output
 
 
 WRONG_OPTIONS: dict[str, tuple[list[str], str]] = {

@@ -70,8 +70,8 @@ def test_a_run_without_a_tick_has_a_plot_too() -> None:
     ("of_root", "told"), [(6, "34, 6 of them the root's assistance"), (0, "34")]
 )
 def test_actuators_of_the_root_are_told_apart(of_root: int, told: str) -> None:
-    figures = describe_metrics(
+    metrics = describe_metrics(
         {"actuators": 34, "root_actuators": of_root, "fell": None, "lost_messages": {}}
     )
 
-    assert figures == [("actuators", told), ("lost_messages", "none")]
+    assert metrics == [("actuators", told), ("lost_messages", "none")]

@@ -31,9 +31,9 @@ from tests.support.bags import (
     Made,
     add_to,
     make_run,
-    said_configuration,
-    said_references,
-    said_states,
+    raw_configuration,
+    raw_references,
+    raw_states,
     write_bag,
 )
 from tests.support.eventful import Eventful, add_timed, eventful_run
@@ -140,9 +140,9 @@ def test_a_fall_is_in_the_verdict(tmp_path: Path) -> None:
     fallen[2] = 0.4
     states = [replace(s, position=fallen) if n == 12 else s for n, s in enumerate(made.states)]
     references = [tick.reference for tick in made.ticks if tick.reference is not None]
-    messages = [*said_states(made.plan, states), *said_references(made.plan, references)]
+    messages = [*raw_states(made.plan, states), *raw_references(made.plan, references)]
 
-    page = write_report(write_bag(tmp_path / "bag", [said_configuration(made.plan), *messages]))
+    page = write_report(write_bag(tmp_path / "bag", [raw_configuration(made.plan), *messages]))
 
     assert "It fell at 0.05 s of 0.1 s." in page.read_text(encoding="utf-8")
 
@@ -215,7 +215,7 @@ def test_the_figures_are_those_of_the_run(tmp_path: Path) -> None:
 
 def test_what_a_recording_lacks_is_said(tmp_path: Path) -> None:
     made = make_run("franka_panda", 0.05)
-    messages = [said_configuration(made.plan), *said_states(made.plan, made.states)]
+    messages = [raw_configuration(made.plan), *raw_states(made.plan, made.states)]
     bag = write_bag(tmp_path / "bag", messages)
 
     page = Page(write_report(bag, stills=0).read_text(encoding="utf-8"))
@@ -232,7 +232,7 @@ def test_what_a_recording_lacks_is_said(tmp_path: Path) -> None:
 
 def test_one_state_is_enough(tmp_path: Path) -> None:
     made = make_run("pendulum", 0.05)
-    messages = [said_configuration(made.plan), *said_states(made.plan, made.states[:1])]
+    messages = [raw_configuration(made.plan), *raw_states(made.plan, made.states[:1])]
     bag = write_bag(tmp_path / "bag", messages)
 
     page = Page(write_report(bag, stills=0).read_text(encoding="utf-8"))
@@ -271,8 +271,8 @@ def test_a_report_is_replaced_and_nothing_else_is(
 
     (directory / "mine.txt").touch()
     assert main(["report", str(bag)]) == 1
-    said = capsys.readouterr().err
-    assert "holds other files than a report's: mine.txt" in said and said.count("\n") == 1
+    output = capsys.readouterr().err
+    assert "holds other files than a report's: mine.txt" in output and output.count("\n") == 1
     (directory / "mine.txt").unlink()
     (directory / "index.html").write_text("<!DOCTYPE html><p>mine</p>")
     with pytest.raises(RecordingError, match=r"than a report's: index\.html"):

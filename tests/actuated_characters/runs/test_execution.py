@@ -83,22 +83,22 @@ def unassisted(together: Processes, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def test_the_summary_has_every_figure_and_they_are_sane(walk: Path) -> None:
-    figures = summary_of(walk)
+    metrics = summary_of(walk)
 
-    assert set(figures) >= FIGURES
-    assert figures["ticks"] == TICKS
-    assert figures["sim_time_s"] == pytest.approx(2.0, abs=1e-8)
-    assert figures["real_time_factor"] == pytest.approx(2.0 / figures["wall_time_s"])
-    assert figures["fell"] is False
-    assert 0.0 < figures["joint_error_mean_rad"] <= 0.08
-    assert 0.0 < figures["root_error_mean_m"] <= 0.055
-    assert figures["root_error_mean_m"] < figures["root_error_max_m"] < 0.2
-    assert figures["body_weight_n"] == pytest.approx(45.0 * 9.81, rel=0.001)
-    assert 0.0 < figures["assist_force_mean_n"] <= 0.56 * figures["body_weight_n"]
-    assert 0.0 <= figures["saturated_fraction"] < 0.05
-    assert figures["rejected_commands"] == figures["duplicate_commands"] == 0
-    assert len(bytes.fromhex(figures["state_hash"])) == 32
-    assert all(math.isfinite(value) for value in figures.values() if isinstance(value, float))
+    assert set(metrics) >= FIGURES
+    assert metrics["ticks"] == TICKS
+    assert metrics["sim_time_s"] == pytest.approx(2.0, abs=1e-8)
+    assert metrics["real_time_factor"] == pytest.approx(2.0 / metrics["wall_time_s"])
+    assert metrics["fell"] is False
+    assert 0.0 < metrics["joint_error_mean_rad"] <= 0.08
+    assert 0.0 < metrics["root_error_mean_m"] <= 0.055
+    assert metrics["root_error_mean_m"] < metrics["root_error_max_m"] < 0.2
+    assert metrics["body_weight_n"] == pytest.approx(45.0 * 9.81, rel=0.001)
+    assert 0.0 < metrics["assist_force_mean_n"] <= 0.56 * metrics["body_weight_n"]
+    assert 0.0 <= metrics["saturated_fraction"] < 0.05
+    assert metrics["rejected_commands"] == metrics["duplicate_commands"] == 0
+    assert len(bytes.fromhex(metrics["state_hash"])) == 32
+    assert all(math.isfinite(value) for value in metrics.values() if isinstance(value, float))
     assert parameters_of(walk, "sim_node")["lockstep_timeout"] > 0.0
 
 
@@ -177,11 +177,11 @@ def test_the_parameters_left_behind_start_the_nodes_alone_into_the_same_states(
 def test_without_assistance_the_walk_falls_and_without_a_bag_all_figures_are_there(
     unassisted: Path, walk: Path
 ) -> None:
-    figures = summary_of(unassisted)
+    metrics = summary_of(unassisted)
 
-    assert figures["ticks"] == TICKS
-    assert figures["fell"] is True
-    assert figures["assist_force_mean_n"] == 0.0
+    assert metrics["ticks"] == TICKS
+    assert metrics["fell"] is True
+    assert metrics["assist_force_mean_n"] == 0.0
     assert "root" not in parameters_of(unassisted, "sim_node")["commanded_joints"]
     assert parameters_of(unassisted, "controller_node")["root_assistance"] is False
     assert not (unassisted / "bag").exists()

@@ -111,13 +111,13 @@ def pushed(tmp_path_factory: pytest.TempPathFactory) -> Made:
 def test_each_push_acts_from_exactly_its_tick_for_the_duration(pushed: Made) -> None:
     applied = pushed.recording.applied_wrench
 
-    said = {}
+    found = {}
     for tick, wrenches in enumerate(applied, start=1):
         assert wrenches is not None
         rows = zip(
             wrenches.links, wrenches.wrenches.tolist(), wrenches.points.tolist(), strict=True
         )
-        said[tick] = sorted((link, tuple(wrench), tuple(point)) for link, wrench, point in rows)
+        found[tick] = sorted((link, tuple(wrench), tuple(point)) for link, wrench, point in rows)
 
     expected = {
         tick: sorted(
@@ -127,8 +127,8 @@ def test_each_push_acts_from_exactly_its_tick_for_the_duration(pushed: Made) -> 
         )
         for tick in range(1, TICKS + 1)
     }
-    assert said == expected
-    assert [tick for tick in said if said[tick]] == [1, 2, 3, 40, 41, 42, 43, 60]
+    assert found == expected
+    assert [tick for tick in found if found[tick]] == [1, 2, 3, 40, 41, 42, 43, 60]
 
 
 @pytest.mark.slow
@@ -231,10 +231,10 @@ def test_what_is_written_is_read_to_the_bit(tmp_path: Path) -> None:
 def assert_same(pushes: Sequence[PlannedPush], others: Sequence[PlannedPush]) -> None:
     in_order = sorted(others, key=lambda push: push.stamp_ns)
     for one, other in zip(pushes, in_order, strict=True):
-        said, expected = one.arrays(), other.arrays()
-        assert (said.stamp_ns, said.links) == (expected.stamp_ns, expected.links)
-        assert said.wrenches.tobytes() == expected.wrenches.tobytes()
-        assert said.points.tobytes() == expected.points.tobytes()
+        found, expected = one.arrays(), other.arrays()
+        assert (found.stamp_ns, found.links) == (expected.stamp_ns, expected.links)
+        assert found.wrenches.tobytes() == expected.wrenches.tobytes()
+        assert found.points.tobytes() == expected.points.tobytes()
 
 
 WRONG_FILES: list[tuple[Callable[[Path], object], str, bytes]] = [

@@ -128,14 +128,14 @@ def test_a_small_ball_from_far_away_is_aimed_at_the_surface(radius: float, dista
 
 def test_a_side_turns_with_the_character() -> None:
     turned = plan_of(placement=[1.0, 2.0, 0.0, np.pi / 2.0])
-    aim = ThrowRequest(1.0, 6.1, 0.8, "neck", "front", radius=0.06)
+    request = ThrowRequest(1.0, 6.1, 0.8, "neck", "front", radius=0.06)
 
-    throw, _ = plan_throw(turned, aim)
-    plain, _ = plan_throw(plan_of(), aim)
+    throw, _ = plan_throw(turned, request)
+    planned, _ = plan_throw(plan_of(), request)
 
-    x, y, z = plain.throw.position
+    x, y, z = planned.throw.position
     assert throw.throw.position == pytest.approx((1.0 - y, 2.0 + x, z), abs=1e-5)
-    vx, vy, vz = plain.throw.velocity
+    vx, vy, vz = planned.throw.velocity
     assert throw.throw.velocity == pytest.approx((-vy, vx, vz), abs=1e-5)
 
 
@@ -162,10 +162,12 @@ def test_a_ball_flies_at_its_speed_and_upwards_as_gravity_takes_away(
 
 
 def test_what_is_in_the_way_is_said() -> None:
-    throws, notes = plan_throws(plan_of(), ["mass=2 speed=8 at=0.8 from=right target=left_wrist"])
+    throws, warnings = plan_throws(
+        plan_of(), ["mass=2 speed=8 at=0.8 from=right target=left_wrist"]
+    )
 
     assert len(throws) == 1
-    (note,) = notes
+    (note,) = warnings
     assert "right_" in note and "in its way" in note
 
 
@@ -336,7 +338,7 @@ def test_the_bag_says_what_the_controller_did_about_it(thrown: Made) -> None:
 def test_a_replay_through_topics_sends_the_balls_as_well(thrown: Made) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("ROS_DOMAIN_ID", raising=False)
-        result = replay_commands(thrown.directory, tell=lambda _: None)
+        result = replay_commands(thrown.directory, progress=lambda _: None, tell=lambda _: None)
 
     assert result.identical and result.states == 181
 

@@ -108,12 +108,12 @@ def test_a_domain_with_a_node_in_it_is_avoided(
 
 
 def test_there_is_an_end_to_the_domains_and_it_is_an_error_that_says_so() -> None:
-    with ExitStack() as held:
+    with ExitStack() as stack:
         domains: list[int] = []
 
         def take_all() -> None:
             while True:
-                domains.append(held.enter_context(own_domain()))
+                domains.append(stack.enter_context(own_domain()))
 
         with pytest.raises(ConfigurationError, match="ROS_DOMAIN_ID"):
             take_all()

@@ -58,8 +58,8 @@ def energy(motion: RigidBodyMotion) -> FloatArray:
 def test_a_free_spin_keeps_angular_momentum_and_energy() -> None:
     motion = move(BODY, start(0.1, 5.0, 0.2), (), TIMES)
 
-    kept = angular_momentum(motion)
-    np.testing.assert_allclose(kept, np.broadcast_to(kept[0], kept.shape), atol=1e-8)
+    momentum = angular_momentum(motion)
+    np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), atol=1e-8)
     np.testing.assert_allclose(energy(motion), energy(motion)[0], rtol=1e-9)
     np.testing.assert_allclose(motion.centre[:, 0], 0.5 * TIMES, atol=1e-12)
 
@@ -230,8 +230,10 @@ def test_a_box_spun_about_its_middle_axis_turns_over(rigid: StudyResult) -> None
     about_middle = curve["angular_velocity_y_rad_s"]
 
     assert about_middle.min() < -0.9 * about_middle[0]
-    kept = np.column_stack([curve[f"angular_momentum_{axis}_kg_m2_s"] for axis in "xyz"])
-    assert np.linalg.norm(kept - kept[0], axis=1).max() < 0.005 * np.linalg.norm(kept[0])
+    momentum = np.column_stack([curve[f"angular_momentum_{axis}_kg_m2_s"] for axis in "xyz"])
+    assert np.linalg.norm(momentum - momentum[0], axis=1).max() < 0.005 * np.linalg.norm(
+        momentum[0]
+    )
 
 
 def test_forces_between_two_bodies_do_what_the_joint_torque_does(

@@ -168,15 +168,15 @@ def test_growth_is_that_of_the_controllers_own_law_stepped_with_delay(
             return np.zeros(3)
 
     for tick in range(len(sizes)):
-        position, velocity, *waiting = state
+        position, velocity, *queued = state
         gains = stiffness, damping
         effort = stable_pd_effort(Model(), *gains, -position, velocity, np.zeros(3), PERIOD)
-        acting, *waiting = *waiting, effort
+        acting, *queued = *queued, effort
         for _ in range(substeps):
             velocity = velocity + np.linalg.solve(mass, acting) * PERIOD / substeps
             position = position + velocity * PERIOD / substeps
         size = np.linalg.norm([position, velocity])
-        state = np.array([position, velocity, *waiting]) / size
+        state = np.array([position, velocity, *queued]) / size
         sizes[tick] = np.log(size)
 
     radius = delayed_spectral_radius(

@@ -13,6 +13,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
+from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.physics import LoneSimulation, run_together
 from tests.support.struck import HUMANOID, LINKS, RATE_HZ, ProjectileThrow, driver, run
 
@@ -55,8 +56,8 @@ def clip_run(clip: str) -> LoneSimulation:
             "initial_velocity": start.velocity.tolist(),
         },
     )
-    setup = for_simulator.make_character_setup(HUMANOID, values)
-    simulation = LoneSimulation(setup, for_simulator.make_settings(values))
+    setup = make_character_setup(HUMANOID, values)
+    simulation = LoneSimulation(setup, make_settings(values))
     simulation.watches_contacts = True
     return simulation
 
@@ -94,8 +95,8 @@ def test_a_ball_is_detected_with_the_momentum_that_it_loses(direction: float) ->
         watch.impulse(wrenches, position)
         for wrenches, position in zip(struck.contacts, struck.positions, strict=False)
     ]
-    lost = mass * (struck.ball_velocities[40] - struck.ball_velocities[-1])[:2]
-    assert max(impulses) == pytest.approx(np.linalg.norm(lost), rel=0.05)
+    momentum = mass * (struck.ball_velocities[40] - struck.ball_velocities[-1])[:2]
+    assert max(impulses) == pytest.approx(np.linalg.norm(momentum), rel=0.05)
     assert max(impulses) > THRESHOLD
     assert max(impulses[:40]) == 0.0
 

@@ -69,8 +69,8 @@ def distance(one: Window, other: Window) -> tuple[float, float]:
 
     width, best = math.pi, 0.0
     while width > 1e-9:
-        tried = best + np.linspace(-width, width, 41)
-        best = float(min(tried, key=places))
+        candidates = best + np.linspace(-width, width, 41)
+        best = float(min(candidates, key=places))
         width /= 10.0
     total = places(best)
     for sample in range(SAMPLES):

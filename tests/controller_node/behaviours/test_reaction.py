@@ -90,12 +90,12 @@ def reports(whole: Run, mode: Mode) -> list[ModeReport]:
 
 
 def test_an_active_ragdoll_is_plain_tracking_to_the_bit_until_its_torque_is_bounded() -> None:
-    plain, active = unhit(), unhit("active_ragdoll")
-    torques = np.linalg.norm(plain.efforts[:, 3:6], axis=1)
+    nominal, active = unhit(), unhit("active_ragdoll")
+    torques = np.linalg.norm(nominal.efforts[:, 3:6], axis=1)
     bounded = int(np.argmax(torques > 150.0))
 
     assert bounded > 0 and torques[bounded] > 150.0
-    assert active.efforts[:bounded].tobytes() == plain.efforts[:bounded].tobytes()
+    assert active.efforts[:bounded].tobytes() == nominal.efforts[:bounded].tobytes()
     assert np.linalg.norm(active.efforts[bounded, 3:6]) == pytest.approx(150.0)
     assert active.mode_names() == ["TRACK"]
 
@@ -119,12 +119,12 @@ def test_what_falls_without_a_hit_goes_limp_and_lies_in_no_other_mode() -> None:
 
 
 def test_until_the_hit_it_is_plain_tracking_to_the_bit_and_then_it_is_not() -> None:
-    plain, reactive = walk(20.0, "tracking", 2.5), walk(20.0)
+    nominal, reactive = walk(20.0, "tracking", 2.5), walk(20.0)
     react = tick_of(reactive, Mode.REACT)
 
     assert HIT < react < HIT + 15
-    assert reactive.efforts[:react].tobytes() == plain.efforts[:react].tobytes()
-    assert (reactive.efforts[react] != plain.efforts[react]).any()
+    assert reactive.efforts[:react].tobytes() == nominal.efforts[:react].tobytes()
+    assert (reactive.efforts[react] != nominal.efforts[react]).any()
 
 
 def test_the_loop_in_one_process_hands_the_contacts_on() -> None:
@@ -132,9 +132,9 @@ def test_the_loop_in_one_process_hands_the_contacts_on() -> None:
     given = {"reference": "clip", "clip": "walk"}
     plans = [make_plan("humanoid", 0.2, given, {}, own) for own in (settings, {})]
 
-    reactive, plain = (list(ticks_in_process(plan)) for plan in plans)
+    reactive, nominal = (list(ticks_in_process(plan)) for plan in plans)
 
-    for one, other in zip(reactive, plain, strict=True):
+    for one, other in zip(reactive, nominal, strict=True):
         assert one.following.position.tobytes() == other.following.position.tobytes()
 
 
@@ -202,10 +202,10 @@ def test_one_hit_has_one_reaction_however_short(duration: float, impulse: float)
 
 
 def test_the_response_grows_with_the_impulse() -> None:
-    plain = unhit().positions
+    nominal = unhit().positions
     peaks = []
     for impulse in (5.0, 10.0, 20.0, 40.0):
-        apart = walk(impulse).positions[:, :3] - plain[:, :3]
+        apart = walk(impulse).positions[:, :3] - nominal[:, :3]
         peaks.append(float(np.linalg.norm(apart[: HIT + 300], axis=1).max()))
 
     assert peaks[0] > 0.005

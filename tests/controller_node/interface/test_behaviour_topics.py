@@ -80,9 +80,9 @@ class Ticks:
             if not state_first:
                 self._client.states.publish(current)
 
-        return self._client.spin_sending(send, lambda: self._answer(current), "an answer")
+        return self._client.spin_sending(send, lambda: self._reply(current), "an answer")
 
-    def _answer(self, current: JointState) -> JointState | None:
+    def _reply(self, current: JointState) -> JointState | None:
         torques = self._client.torques.messages
         return next((m for m in torques if stamp_ns(m) == stamp_ns(current)), None)
 
@@ -162,8 +162,8 @@ def test_a_contact_without_end_is_refused_in_a_line_and_ends_nothing(
     ticks.next(force=1200.0)
 
     ticks.wait_told([("TRACK", 1), ("REACT", 3)])
-    (said,) = [line for line in node.stderr.splitlines() if "contacts ignored" in line]
-    assert "1e+09 N" in said
+    (line,) = [line for line in node.stderr.splitlines() if "contacts ignored" in line]
+    assert "1e+09 N" in line
     assert node.exit_code is None
 
 
@@ -193,12 +193,12 @@ def test_without_a_behaviour_no_contacts_are_waited_for(
     processes: Processes, simulator: ControllerClient
 ) -> None:
     processes.controller("humanoid")
-    plain = Ticks(simulator, with_contacts=False)
+    without_contacts = Ticks(simulator, with_contacts=False)
 
     for _ in range(3):
-        plain.next()
+        without_contacts.next()
 
-    plain.wait_told([("TRACK", 1)])
+    without_contacts.wait_told([("TRACK", 1)])
     count = simulator.node.count_subscribers(topics.CONTACTS.name)
     assert count == 0
 
@@ -274,8 +274,8 @@ def test_strengths_begin_at_their_stamp_are_echoed_and_refused_in_a_line(
     assert bent and all(before.effort[entry] == whole.effort[entry] for entry in bent)
     assert at.effort[elbow] == at.effort[knee] == 0.0
     assert np.abs(at.effort).max() > 0.0
-    said = [line for line in node.stderr.splitlines() if "refused strength" in line]
-    assert [word in line for word, line in zip(("tail", "2", "over"), said, strict=True)] == [
+    lines = [line for line in node.stderr.splitlines() if "refused strength" in line]
+    assert [word in line for word, line in zip(("tail", "2", "over"), lines, strict=True)] == [
         True,
         True,
         True,

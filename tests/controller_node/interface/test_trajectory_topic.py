@@ -14,7 +14,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import split_stamp
 from tests.support.physics import character
-from tests.support.ros import ControllerClient, Inbox, Processes, joint_state, stamp_ns
+from tests.support.ros import ControllerClient, Processes, ReceivedMessages, joint_state, stamp_ns
 
 CLOCK = TickClock(240)
 REST = 0.5  # rad, of the pendulum
@@ -40,7 +40,7 @@ class Pendulum:
     def __init__(self, client: ControllerClient) -> None:
         controller = topics.CONTROLLER_NODE
         self._client = client
-        self.active: Inbox = client.listen(topics.ACTIVE_TRAJECTORY.of(controller))
+        self.active: ReceivedMessages = client.listen(topics.ACTIVE_TRAJECTORY.of(controller))
         self._trajectories = client.speak(topics.JOINT_TRAJECTORY.of(controller))
         self.tick = 0
 
@@ -163,7 +163,7 @@ def test_what_cannot_be_followed_is_refused_in_a_line_and_what_ran_goes_on(
     # Assert
     assert len(pendulum.active) == 1
     assert start_ns > 1
-    said = [line for line in node.stderr.splitlines() if "refused trajectory" in line]
-    assert len(said) == len(REFUSED)
-    for line, (_, word) in zip(said, REFUSED.values(), strict=True):
+    lines = [line for line in node.stderr.splitlines() if "refused trajectory" in line]
+    assert len(lines) == len(REFUSED)
+    for line, (_, word) in zip(lines, REFUSED.values(), strict=True):
         assert word in line

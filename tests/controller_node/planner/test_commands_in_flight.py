@@ -120,10 +120,10 @@ def test_a_command_acts_within_the_limits_and_until_the_next_one() -> None:
             late.send(tick, each)
         return late.state_then(10, position, still)[1].tobytes()
 
-    held = foreseen((7, effort), (8, effort), (9, effort))
-    assert foreseen((7, effort)) == held
-    assert foreseen((5, 0.0 * effort), (6, effort)) == held
-    assert foreseen((8, effort)) != held
+    foreseen_efforts = foreseen((7, effort), (8, effort), (9, effort))
+    assert foreseen((7, effort)) == foreseen_efforts
+    assert foreseen((5, 0.0 * effort), (6, effort)) == foreseen_efforts
+    assert foreseen((8, effort)) != foreseen_efforts
     most = LAYOUT.clipped(1e6 * effort, HUMANOID.effort_limits())
     assert foreseen((7, 1e6 * effort)) == foreseen((7, most))
 

@@ -436,7 +436,7 @@ REFUSED: dict[str, tuple[str, Mapping[str, object], str]] = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_it_cannot_do_is_one_clear_line(case: str) -> None:
-    name, given, said = REFUSED[case]
+    name, given, reason = REFUSED[case]
     whole = character(name)
     named: dict[str, Any] = {**QUICK, **given}
 
@@ -444,7 +444,7 @@ def test_what_it_cannot_do_is_one_clear_line(case: str) -> None:
         values = resolve(PARAMETERS + character_parameters(whole, named), named)
         make_controller(whole, make_motion(whole, values).reference, values)
 
-    assert said in str(caught.value)
+    assert reason in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

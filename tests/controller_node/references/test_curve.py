@@ -204,9 +204,9 @@ def test_what_a_sample_holds_is_the_callers_own() -> None:
     whole, layout = loaded("humanoid")
     curve = Curve(layout, random_knots(whole, TIMES))
     first = curve.sample(1.0)
-    kept = first.configuration.position.copy()
+    copied = first.configuration.position.copy()
 
     curve.sample(1.2)
     curve.sample(5.0)
 
-    np.testing.assert_array_equal(first.configuration.position, kept)
+    np.testing.assert_array_equal(first.configuration.position, copied)

@@ -319,9 +319,9 @@ def test_a_run_of_a_clip_begins_in_its_first_frame_and_moves() -> None:
 def assert_begins(plan: RunPlan, position: FloatArray, velocity: FloatArray) -> None:
     """The plan says so, and so do the engine's first state and the reference beside it."""
     layout = plan.character.layout
-    said = plan.simulator.numbers("initial_position"), plan.simulator.numbers("initial_velocity")
-    np.testing.assert_allclose(said[0], position, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(said[1], velocity, rtol=0.0, atol=1e-12)
+    initial = plan.simulator.numbers("initial_position"), plan.simulator.numbers("initial_velocity")
+    np.testing.assert_allclose(initial[0], position, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(initial[1], velocity, rtol=0.0, atol=1e-12)
     tick = next(iter(ticks_in_process(plan)))
     begun, wanted = layout.configuration(tick.state.position), layout.configuration(position)
     np.testing.assert_allclose(layout.difference(wanted, begun), 0.0, rtol=0.0, atol=1e-9)
@@ -333,5 +333,5 @@ def assert_begins(plan: RunPlan, position: FloatArray, velocity: FloatArray) -> 
 def test_a_run_says_what_its_user_should_know_of_its_motion() -> None:
     plan = make_plan("humanoid", 0.1, {"reference": "clip", "clip": "spinkick"}, {}, {})
 
-    notes = motion_of(HUMANOID, reference="clip", clip="spinkick").warnings
-    assert notes and set(notes) <= set(plan.warnings)
+    warnings = motion_of(HUMANOID, reference="clip", clip="spinkick").warnings
+    assert warnings and set(warnings) <= set(plan.warnings)

@@ -143,11 +143,11 @@ def test_ros_reads_what_the_encoder_writes_which_is_what_the_specification_says(
 def test_an_encoder_keeps_nothing_of_the_message_before() -> None:
     encoder = JointStateEncoder(["knee", "hip"])
     first = encoder.encode(1, np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array([5.0, 6.0]))
-    kept = bytes(first)
+    first_bytes = bytes(first)
 
     second = deserialize_message(encoder.encode(2, effort=np.array([7.0, 8.0])), JointState)
 
-    assert first == kept
+    assert first == first_bytes
     assert len(second.position) == len(second.velocity) == 0
     assert list(second.effort) == [7.0, 8.0]
 
@@ -228,12 +228,12 @@ def test_names_that_begin_alike_are_told_apart(first: list[str], second: list[st
 def test_what_was_decoded_stays_when_the_next_message_comes() -> None:
     encoder, decoder = JointStateEncoder(["knee"]), JointStateDecoder()
     decoder.decode(encoder.encode(1, effort=np.array([1.0])))
-    kept = decoder.decode(encoder.encode(2, effort=np.array([2.0])))
+    decoded = decoder.decode(encoder.encode(2, effort=np.array([2.0])))
 
     decoder.decode(encoder.encode(3, effort=np.array([3.0])))
-    kept.effort[0] += 10.0
+    decoded.effort[0] += 10.0
 
-    assert (kept.stamp_ns, kept.effort.tolist()) == (2, [12.0])
+    assert (decoded.stamp_ns, decoded.effort.tolist()) == (2, [12.0])
 
 
 @pytest.mark.parametrize("warm", [False, True])

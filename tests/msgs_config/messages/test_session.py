@@ -235,9 +235,9 @@ def test_any_number_of_foreign_sessions_is_counted_but_few_are_named() -> None:
 
     lines = [foreign.reject("episode", make_session("/x"), ONE) for _ in range(1000)]
 
-    said = [line for line in lines if line is not None]
-    assert len(said) == 9
-    assert "no more are named" in said[-1]
+    logged = [line for line in lines if line is not None]
+    assert len(logged) == 9
+    assert "no more are named" in logged[-1]
     assert foreign.counts["episode"] == 1000
 
 

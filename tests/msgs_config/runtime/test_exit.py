@@ -182,7 +182,7 @@ def hear_states(client: SimulatorClient) -> None:
     client.spin_until(lambda: len(client.states) >= A_FEW_STATES, "states")
 
 
-def waiting(processes: Processes, client: SimulatorClient) -> Process:
+def publishing(processes: Processes, client: SimulatorClient) -> Process:
     simulator = processes.simulator(fresh=True)
     client.first_state()
     return simulator
@@ -244,7 +244,7 @@ def recording(processes: Processes, client: SimulatorClient) -> Process:
 
 Situation = Callable[[Processes, SimulatorClient], Process]
 SITUATIONS: list[Situation] = [
-    waiting,
+    publishing,
     waiting_for_subscribers,
     running,
     paused,
@@ -325,8 +325,8 @@ def test_a_signal_ends_a_recorder_to_whom_more_comes_than_it_can_take(
         client.spin_until(lambda: flushes(recorder) > before + 2, "flushes")
 
         end(recorder, signal.SIGTERM).assert_took_less_than(BEHINDHAND)
-    kept = sum(1 for _ in read_messages(tmp_path / "recording" / "bag", ["/flood"]))
-    assert kept > A_FEW_STATES
+    recorded = sum(1 for _ in read_messages(tmp_path / "recording" / "bag", ["/flood"]))
+    assert recorded > A_FEW_STATES
 
 
 # On its way there

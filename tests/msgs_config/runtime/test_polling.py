@@ -14,15 +14,15 @@ from tests.support.ros import wait_until
 DEPTH = 5
 
 
-@pytest.mark.parametrize(("depth", "said"), [(DEPTH, True), (1, False)])
+@pytest.mark.parametrize(("depth", "is_logged"), [(DEPTH, True), (1, False)])
 def test_of_more_than_it_keeps_the_oldest_go_and_that_is_said_once(
-    context: Context, capfd: pytest.CaptureFixture[str], depth: int, said: bool
+    context: Context, capfd: pytest.CaptureFixture[str], depth: int, is_logged: bool
 ) -> None:
     # Arrange
     topic = Topic("flood", String, QoSProfile(depth=depth))
-    speaker, listener = (Node(name, context=context) for name in ("speaker", "listener"))
-    publisher = speaker.create_publisher(String, "flood", QoSProfile(depth=100))
-    subscription, spinner = DirectSubscription(listener, topic), PollingExecutor(listener)
+    sender, receiver = (Node(name, context=context) for name in ("speaker", "listener"))
+    publisher = sender.create_publisher(String, "flood", QoSProfile(depth=100))
+    subscription, spinner = DirectSubscription(receiver, topic), PollingExecutor(receiver)
     try:
         wait_until(publisher.get_subscription_count, "a listener", step=spinner.serve_pending)
 
@@ -36,17 +36,17 @@ def test_of_more_than_it_keeps_the_oldest_go_and_that_is_said_once(
             )
 
         # Assert
-        kept = [int(decode(raw, String).data) for raw in iter(subscription.take, None)]
+        texts = [int(decode(raw, String).data) for raw in iter(subscription.take, None)]
     finally:
         spinner.close()
-        for node in (speaker, listener):
+        for node in (sender, receiver):
             node.destroy_node()
-    assert kept == list(range(4 * DEPTH))[-depth:]
-    assert subscription.dropped == (3 * DEPTH if said else 0)
-    assert capfd.readouterr().err.count("the oldest are dropped") == said
+    assert texts == list(range(4 * DEPTH))[-depth:]
+    assert subscription.dropped == (3 * DEPTH if is_logged else 0)
+    assert capfd.readouterr().err.count("the oldest are dropped") == is_logged
 
 
 def newest(subscription: DirectSubscription) -> int | None:
     """The number in the newest message that waits; None if none does."""
-    waiting = subscription._pending
-    return int(decode(waiting[-1].raw, String).data) if waiting else None
+    pending = subscription._pending
+    return int(decode(pending[-1].raw, String).data) if pending else None

@@ -49,8 +49,8 @@ def test_a_segment_whose_lock_is_held_stays(tmp_path: Path) -> None:
     write(tmp_path)
     lock = write(tmp_path, f"{NAME}_el", size=0)
 
-    with lock.open("rb") as held:
-        fcntl.flock(held, fcntl.LOCK_EX)
+    with lock.open("rb") as locked:
+        fcntl.flock(locked, fcntl.LOCK_EX)
         assert remove_orphans(tmp_path) == []
         assert names(tmp_path) == {NAME, f"{NAME}_el"}
 
@@ -101,8 +101,8 @@ def test_what_a_process_tries_shared_memory_with_goes_and_a_segment_without_a_lo
 def test_other_users_files_links_and_directories_stay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = write(tmp_path / "..", "kept", size=1)
-    (tmp_path / NAME).symlink_to(kept)
+    foreign = write(tmp_path / "..", "kept", size=1)
+    (tmp_path / NAME).symlink_to(foreign)
     make_older(tmp_path / NAME, OLD)
     (tmp_path / "fastrtps_fedcba9876543210").mkdir()
     assert remove_orphans(tmp_path) == []
@@ -112,7 +112,7 @@ def test_other_users_files_links_and_directories_stay(
     monkeypatch.setattr(shared_memory.os, "geteuid", lambda: os.getuid() + 1)
 
     assert remove_orphans(tmp_path) == []
-    assert kept.exists() and len(names(tmp_path)) == 3
+    assert foreign.exists() and len(names(tmp_path)) == 3
 
 
 def test_no_shared_memory_is_no_error(tmp_path: Path) -> None:
@@ -141,17 +141,17 @@ def test_the_next_node_frees_what_a_killed_one_has_left_and_living_ones_work_on(
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
         killed, other = processes.simulator(), processes.simulator()
         wait_until(lambda: segments(killed) and segments(other), "their segments")
-        left, kept = segments(killed), segments(living) | segments(other)
+        left, needed = segments(killed), segments(living) | segments(other)
         killed.send(signal.SIGKILL)
         killed.wait()
-        for file in left | kept:  # it is not their age that saves them
+        for file in left | needed:  # it is not their age that saves them
             make_older(file, OLD)
 
         processes.simulator()
 
         wait_until(lambda: not any(file.exists() for file in left), "their end")
-        assert all(file.exists() for file in kept)
-        assert list(client.answer(state, {"hinge": 0.5}).effort) == [0.5]
+        assert all(file.exists() for file in needed)
+        assert list(client.advance(state, {"hinge": 0.5}).effort) == [0.5]
         assert other.exit_code is None
 
 

@@ -154,7 +154,7 @@ def test_a_simulator_says_when_it_only_counts_further_warnings(
     assert "unknown_99'" in simulator.stderr and "unknown_100'" not in simulator.stderr
     assert simulator.stderr.count("further ones are not logged, but counted") == 1
     assert "the stamp must be that of the state" in simulator.stderr
-    assert list(client.answer(state, {"hinge": 0.5}).effort) == [0.5]
+    assert list(client.advance(state, {"hinge": 0.5}).effort) == [0.5]
 
 
 def test_a_controller_says_when_it_only_counts_further_warnings(

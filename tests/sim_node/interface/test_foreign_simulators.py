@@ -21,8 +21,8 @@ from tests.controller_node.test_node import CLOCK, expected_answer
 from tests.support.physics import character
 from tests.support.ros import (
     ControllerClient,
-    Inbox,
     Processes,
+    ReceivedMessages,
     SimulatorClient,
     joint_state,
     stamp_ns,
@@ -81,7 +81,7 @@ def other(context: Context) -> Iterator[ControllerClient]:
     client.close()
 
 
-def reported(client: ControllerClient, inbox: Inbox, **least: int) -> None:
+def reported(client: ControllerClient, inbox: ReceivedMessages, **least: int) -> None:
     """Wait until the controller has counted so many."""
 
     def found() -> bool:
@@ -112,8 +112,8 @@ def test_no_stray_episode_moves_the_reference_or_stops_the_answers(
         simulator.episodes.publish(stray)
         reported(simulator, reports, rejected_episodes=min(tick - 5, 7))
 
-        answer = simulator.ask(state(tick))
-        assert list(answer.effort) == expected(state(tick), 5), name
+        reply = simulator.ask(state(tick))
+        assert list(reply.effort) == expected(state(tick), 5), name
 
     assert node.exit_code is None
     lines = [line for line in node.stderr.splitlines() if "'episode'" in line]
@@ -127,10 +127,10 @@ def test_a_late_joiner_takes_the_episode_of_the_simulator_whose_state_it_answers
     other.episodes.publish(episode(CLOCK.stamp_ns(2450), f"9 {OTHER}"))
     processes.controller("pendulum", **SINE)
 
-    answer = simulator.ask(state(2500))
+    reply = simulator.ask(state(2500))
 
-    assert list(answer.effort) == expected(state(2500), 2400)
-    assert answer.header.frame_id == OWN
+    assert list(reply.effort) == expected(state(2500), 2400)
+    assert reply.header.frame_id == OWN
 
 
 def test_a_late_joiner_says_what_it_waits_for_while_no_episode_fits(
@@ -161,8 +161,8 @@ def test_two_simulators_that_alternate_are_not_mixed_and_both_are_named_once(
 
     for tick in range(2, 60):
         other.states.publish(state(3 * tick, OTHER, first=tick % 7 == 0))
-        answer = simulator.ask(state(tick))
-        assert list(answer.effort) == expected(state(tick), 1)
+        reply = simulator.ask(state(tick))
+        assert list(reply.effort) == expected(state(tick), 1)
 
     reported(simulator, reports, foreign_states=58)
     assert {torques.header.frame_id for torques in simulator.torques.messages} == {OWN}
@@ -288,10 +288,10 @@ def test_a_simulator_that_was_started_again_is_taken_up_from_its_first_state_on(
     simulator.torques.messages.clear()
     began = time.monotonic()
 
-    answer = simulator.ask(state(1, OTHER, first=True))
+    reply = simulator.ask(state(1, OTHER, first=True))
 
-    assert list(answer.effort) == expected(state(1, OTHER), 1)
-    assert answer.header.frame_id == OTHER
+    assert list(reply.effort) == expected(state(1, OTHER), 1)
+    assert reply.header.frame_id == OTHER
     assert time.monotonic() - began > 0.9  # s: it might just have been slow
     later = simulator.ask(state(2, OTHER))
     assert list(later.effort) == expected(state(2, OTHER), 1)
@@ -306,9 +306,9 @@ def test_a_session_that_is_given_is_the_only_one(
     configurations.publish(in_session(description(name, measure(), **given), OWN))
 
     simulator.send(state(1, first=True), lambda: OWN in node.stderr)
-    answer = simulator.ask(state(3, OTHER, first=True))
+    reply = simulator.ask(state(3, OTHER, first=True))
 
-    assert list(answer.effort) == expected(state(3, OTHER), 3)
+    assert list(reply.effort) == expected(state(3, OTHER), 3)
     assert {stamp_ns(torques) for torques in simulator.torques.messages} == {CLOCK.stamp_ns(3)}
 
 
@@ -321,12 +321,12 @@ def test_in_a_session_that_is_given_a_state_that_comes_again_changes_nothing(
 
     def answers() -> list[bytes]:
         pairs = zip(simulator.torques.messages, simulator.torques.raw, strict=True)
-        return [raw for answer, raw in pairs if stamp_ns(answer) == CLOCK.stamp_ns(2)]
+        return [raw for reply, raw in pairs if stamp_ns(reply) == CLOCK.stamp_ns(2)]
 
     simulator.send(state(2, OTHER), lambda: len(answers()) >= 4)
 
     assert len(set(answers())) == 1
-    assert {answer.header.frame_id for answer in simulator.torques.messages} == {OTHER}
+    assert {reply.header.frame_id for reply in simulator.torques.messages} == {OTHER}
 
 
 def test_a_session_that_is_none_is_refused_in_one_line(processes: Processes) -> None:

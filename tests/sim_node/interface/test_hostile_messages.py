@@ -198,9 +198,9 @@ def test_no_bytes_on_the_topic_of_pushes_push_anything_but_pushes(
             sent.update(["rejected_pushes" if push is None else "accepted_pushes"])
             if push is not None:
                 allowed.add(tuple(_numbers(push)[: 6 * len(push.wrench)]))
-        state = client.answer(state, {})
+        state = client.advance(state, {})
     for _ in range(30):
-        state = client.answer(state, {})
+        state = client.advance(state, {})
 
     assert sent["accepted_pushes"] and sent["rejected_pushes"] > MESSAGES / 2
     client.diagnostics.messages.clear()
@@ -359,7 +359,7 @@ def test_lengths_that_are_wrong_are_not_told_at_every_message(
 
     for _ in range(LOG_LINES):
         client.torques.publish(bytes(raw))
-    client.answer(state, {})
+    client.advance(state, {})
 
     client.reported(rejected=LOG_LINES)
     assert len(simulator.stderr.splitlines()) < LOG_LINES / 2
@@ -386,7 +386,7 @@ def test_counts_that_promise_gigabytes_are_refused_without_taking_them(
     simulator = processes.simulator()
     state = client.first_state()
     for _ in range(10):
-        state = client.answer(state, {})
+        state = client.advance(state, {})
     before = simulator.peak_memory
 
     for publisher, message in (
@@ -400,9 +400,9 @@ def test_counts_that_promise_gigabytes_are_refused_without_taking_them(
                 struct.pack_into("<I", raw, place, count)
                 if publisher is client.wrenches or place < len(valid) - 12:
                     publisher.publish(bytes(raw))
-        state = client.answer(state, {"hinge": 1.0}) if publisher is client.torques else state
+        state = client.advance(state, {"hinge": 1.0}) if publisher is client.torques else state
     for _ in range(20):
-        state = client.answer(state, {})
+        state = client.advance(state, {})
 
     assert simulator.exit_code is None
     assert simulator.peak_memory < before + 100.0

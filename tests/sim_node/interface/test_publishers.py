@@ -15,7 +15,14 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from tests.sim_node.conftest import Join
 from tests.support.physics import FLOATING_TURNED_FRAMES, character, simulation
-from tests.support.ros import Inbox, Processes, SimulatorClient, stamp_ns, tick_of, wrench_message
+from tests.support.ros import (
+    Processes,
+    ReceivedMessages,
+    SimulatorClient,
+    stamp_ns,
+    tick_of,
+    wrench_message,
+)
 
 CLOCK = TickClock(240)
 SOON = 0.05  # s, a republish period for tests that wait for repeated states
@@ -253,7 +260,7 @@ def test_markers_are_the_shapes_of_the_links_where_the_other_engine_has_them(
             assert vector(shown[first + 1].scale) == pytest.approx([2 * radius] * 3)
 
 
-def _of_stamp(markers: Inbox, state: JointState) -> list[Marker] | None:
+def _of_stamp(markers: ReceivedMessages, state: JointState) -> list[Marker] | None:
     stamp = stamp_ns(state)
     found = [m.markers for m in markers.messages if stamp_ns(m.markers[0]) == stamp]
     return found[-1] if found else None
@@ -281,7 +288,7 @@ def test_the_diagnostics_say_how_it_goes(processes: Processes, client: Simulator
     state = client.first_state()
     client.wrenches.publish(wrench_message(CLOCK.stamp_ns(20), [("chest", [1.0] * 6)]))
     for _ in range(30):
-        state = client.answer(state, {"right_knee": -1000.0, "chest_x": 150.0, "chest_y": 150.0})
+        state = client.advance(state, {"right_knee": -1000.0, "chest_x": 150.0, "chest_y": 150.0})
 
     status = client.reported(tick=31, accepted=30, accepted_pushes=1, rejected_pushes=0)
 

@@ -60,7 +60,7 @@ def test_a_step_is_refused_unless_paused(processes: Processes, client: Simulator
 
     assert not done
     assert "not paused" in reason
-    client.answer(state, {})
+    client.advance(state, {})
 
 
 def test_steps_are_answered_when_they_are_done_however_long_their_commands_take(
@@ -76,7 +76,7 @@ def test_steps_are_answered_when_they_are_done_however_long_their_commands_take(
         assert tick_of(state) == tick
         wait_for_repeats(client)  # a slow controller
         assert not call.done()
-        state = client.answer(state, {"hinge": 0.5 * tick})
+        state = client.advance(state, {"hinge": 0.5 * tick})
 
     assert response_of(client, call) == (True, "3 ticks done")
     assert list(state.effort) == [1.5]
@@ -143,10 +143,10 @@ def test_a_pause_and_a_reset_end_steps_that_are_not_done(
     client.pause(True)
 
     paused = begin_steps(client)
-    state = client.answer(state, {})
+    state = client.advance(state, {})
     client.pause(True)
     reset = begin_steps(client)
-    client.answer(state, {})
+    client.advance(state, {})
     client.reset()
 
     assert response_of(client, paused) == (False, "paused before")
@@ -162,7 +162,7 @@ def test_steps_are_answered_when_the_simulation_ends(
     state = client.first_state()
     client.pause(True)
     call = begin_steps(client)
-    client.answer(state, {})
+    client.advance(state, {})
 
     simulator.send(signal.SIGTERM)
 
@@ -180,7 +180,7 @@ def test_the_last_of_steps_is_answered_where_the_run_ends_with_it(
     client.pause(True)
     call = begin_steps(client)
 
-    client.answer(client.answer(state, {}), {})
+    client.advance(client.advance(state, {}), {})
 
     assert response_of(client, call) == (True, "2 ticks done")
     assert simulator.wait() == 0
@@ -284,7 +284,7 @@ def test_a_reset_helps_after_a_divergence(processes: Processes, client: Simulato
     assert client.pause(False).success
     first = client.state(2)  # no stamp is left out, or a recording would miss it
     assert list(first.position) == [0.5]
-    assert list(client.answer(first, {"hinge": 0.5}).effort) == [0.5]
+    assert list(client.advance(first, {"hinge": 0.5}).effort) == [0.5]
 
 
 def test_a_reset_before_the_beginning_makes_the_second_episode_the_first_to_be_seen(
@@ -299,17 +299,17 @@ def test_a_reset_before_the_beginning_makes_the_second_episode_the_first_to_be_s
     client.spin_until(lambda: client.episodes.messages, "the episode")
     assert tick_of(client.episodes.last) == 2
     assert client.episodes.last.frame_id == f"2 {state.header.frame_id}"
-    assert list(client.answer(state, {"hinge": 0.5}).effort) == [0.5]
+    assert list(client.advance(state, {"hinge": 0.5}).effort) == [0.5]
 
 
 def test_the_last_tick_of_a_run_counts_from_its_first_not_from_a_reset(
     processes: Processes, client: SimulatorClient
 ) -> None:
     simulator = processes.simulator(max_ticks=4)
-    client.answer(client.first_state(), {})
+    client.advance(client.first_state(), {})
 
     client.reset()
-    client.answer(client.answer(client.state(3), {}), {})
+    client.advance(client.advance(client.state(3), {}), {})
 
     assert simulator.wait() == 0
     assert max(client.states.ticks()) == 5

@@ -18,8 +18,8 @@ from tests.sim_node.conftest import Join
 from tests.support.physics import character, joint_simulation, simulation
 from tests.support.ros import (
     PATIENCE,
-    Inbox,
     Processes,
+    ReceivedMessages,
     SimulatorClient,
     joint_state,
     stamp_ns,
@@ -42,7 +42,7 @@ def numbers_message(stamp: int, other: Mapping[str, float]) -> JointState:
     return joint_state(stamp, list(numbers), list(numbers.values()))
 
 
-def told(inbox: Inbox) -> dict[int, list[tuple[float, ...]]]:
+def told(inbox: ReceivedMessages) -> dict[int, list[tuple[float, ...]]]:
     """The numbers of what was thrown, by the tick of the state after it."""
     found: dict[int, list[tuple[float, ...]]] = {}
     for message in inbox.messages:
@@ -51,14 +51,14 @@ def told(inbox: Inbox) -> dict[int, list[tuple[float, ...]]]:
     return found
 
 
-def motions(inbox: Inbox) -> dict[int, FloatArray]:
+def motions(inbox: ReceivedMessages) -> dict[int, FloatArray]:
     """Where the balls are, and how they move, by tick."""
     return {
         tick: decode_balls(raw).motion for tick, raw in zip(inbox.ticks(), inbox.raw, strict=True)
     }
 
 
-def hear(client: SimulatorClient) -> tuple[Inbox, Inbox]:
+def hear(client: SimulatorClient) -> tuple[ReceivedMessages, ReceivedMessages]:
     """What was thrown, and where the balls are."""
     return client.listen(topics.APPLIED_THROW), client.listen(topics.THROWN)
 
@@ -87,7 +87,7 @@ def test_a_throw_begins_at_its_tick_and_does_what_it_does_without_ros(
     )
     state = client.first_state()
     while tick_of(state) < 61:
-        state = client.answer(state, {})
+        state = client.advance(state, {})
     client.spin_until(lambda: 61 in thrown.ticks(), "the last place of the balls")
 
     assert told(applied) == {
@@ -138,7 +138,7 @@ def test_balls_are_shown_where_they_are_until_a_reset(
     assert [(m.id, m.action) for m in again[len(body) :]] == [(ball.id, Marker.DELETE)]
 
 
-def markers_at(shown: Inbox, tick: int) -> list[Marker]:
+def markers_at(shown: ReceivedMessages, tick: int) -> list[Marker]:
     """The markers of a tick; none if they are not there."""
     found = [m.markers for m in shown.messages if tick_of(m.markers[0]) == tick]
     return list(found[-1]) if found else []
@@ -166,15 +166,15 @@ def test_a_wrong_throw_is_refused_whole_and_the_reason_said_once_and_counted(
     simulator = processes.simulator(max_ticks=30, wait_for_subscribers=1)
     state = client.first_state()
     for _ in range(4):
-        state = client.answer(state, {})
+        state = client.advance(state, {})
 
     for _ in range(3):
         send(client, throws, *(message for message, _ in REFUSED.values()))
-        state = client.answer(state, {})
+        state = client.advance(state, {})
     later = [numbers_message(CLOCK.stamp_ns(1000 + tick), {}) for tick in range(MOST_BALLS + 5)]
     send(client, throws, *later)  # more than a tick takes
     while tick_of(state) < 31:
-        state = client.answer(state, {})
+        state = client.advance(state, {})
 
     client.reported(rejected_throws=3 * len(REFUSED) + 5, accepted_throws=MOST_BALLS)
     assert applied.messages == [] and thrown.messages == []
@@ -217,13 +217,13 @@ def test_who_joins_late_gets_the_contacts_with_the_state(
     processes.simulator("humanoid", republish_period=0.05, wait_for_subscribers=1)
     state = client.first_state()
     for _ in range(3):
-        state = client.answer(state, {})
+        state = client.advance(state, {})
     tick = tick_of(state)
 
     contacts = client.listen(topics.CONTACTS)  # nobody has watched what touched until then
     client.spin_until(lambda: tick in contacts.ticks(), "the contacts of a state that waits")
     again = sum(tick_of(message) == tick for message in client.states.messages)
-    state = client.answer(state, {})
+    state = client.advance(state, {})
     client.spin_until(lambda: tick + 1 in contacts.ticks(), "those of the next one")
     before = len(contacts.messages)
     client.spin_until(lambda: len(contacts.messages) > before + 1, "the same once more")

@@ -11,7 +11,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import character, simulation
-from tests.support.ros import Inbox, Processes, SimulatorClient, tick_of, wrench_message
+from tests.support.ros import Processes, ReceivedMessages, SimulatorClient, tick_of, wrench_message
 
 SESSION = "/sim_node#000000000001"  # of two runs that are compared byte by byte
 CLOCK = TickClock(240)
@@ -57,11 +57,13 @@ def assert_as_without_ros(
             assert list(messages[tick + 1].velocity) == state.velocity.tolist()
 
 
-def answer_until(client: SimulatorClient, applied: Inbox, last_tick: int) -> dict[int, Told]:
+def answer_until(
+    client: SimulatorClient, applied: ReceivedMessages, last_tick: int
+) -> dict[int, Told]:
     """Command zero until a state, and give what was applied before each."""
     state = client.states.last
     while tick_of(state) < last_tick:
-        state = client.answer(state, {})
+        state = client.advance(state, {})
     client.spin_until(lambda: last_tick in applied.ticks(), "the last push")
     return {tick: told(message) for tick, message in applied.by_tick().items()}
 
@@ -204,12 +206,12 @@ def test_a_wrong_push_is_refused_whole_and_the_reason_said_once_and_counted(
     applied = client.listen(topics.APPLIED_WRENCH)
     state = client.first_state()
     for _ in range(4):
-        state = client.answer(state, {})
+        state = client.advance(state, {})
 
     for _ in range(3):
         for message, _ in REFUSED.values():
             client.wrenches.publish(message)
-        state = client.answer(state, {})
+        state = client.advance(state, {})
     pushed = answer_until(client, applied, 61)
 
     assert {len(content) for content in pushed.values()} == {0}
@@ -225,13 +227,13 @@ def test_a_push_that_is_always_too_late_is_told_once(
     processes: Processes, client: SimulatorClient
 ) -> None:
     simulator = processes.simulator(max_ticks=30)
-    state = client.answer(client.first_state(), {})
+    state = client.advance(client.first_state(), {})
     (_, *_, link) = [link.name for link in character("pendulum").links]
 
     for _ in range(29):
         late = wrench_message(CLOCK.stamp_ns(tick_of(state) - 1), [(link, [1.0] * 6)])
         client.wrenches.publish(late)
-        state = client.answer(state, {})
+        state = client.advance(state, {})
 
     assert simulator.wait() == 0
     assert simulator.stderr.count("is over") == 1

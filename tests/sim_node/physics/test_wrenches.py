@@ -173,14 +173,12 @@ def test_so_many_pushes_may_wait_and_not_one_more(schedule: WrenchQueue) -> None
     assert len(schedule.take(5)) == MOST_WAITING
 
 
-@pytest.mark.parametrize(
-    "forget", [lambda s: s.take(6), lambda s: s.clear()], ids=["over", "clear"]
-)
-def test_what_is_forgotten_makes_room(schedule: WrenchQueue, forget: object) -> None:
+@pytest.mark.parametrize("clear", [lambda s: s.take(6), lambda s: s.clear()], ids=["over", "clear"])
+def test_what_is_forgotten_makes_room(schedule: WrenchQueue, clear: object) -> None:
     push(schedule, ["hand"] * MOST_WAITING)
 
-    assert callable(forget)
-    forget(schedule)
+    assert callable(clear)
+    clear(schedule)
     push(schedule, ["hand"] * MOST_WAITING, first_tick=8)
 
     assert len(schedule.take(8)) == MOST_WAITING
@@ -195,6 +193,6 @@ def test_a_sender_cannot_change_its_push_afterwards(schedule: WrenchQueue) -> No
 
     wrenches[:], points[:] = 99.0, 99.0
 
-    (waiting,) = schedule.take(5)
-    np.testing.assert_array_equal(waiting.wrench, np.ones(6))
-    np.testing.assert_array_equal(waiting.point, np.ones(3))
+    (queued,) = schedule.take(5)
+    np.testing.assert_array_equal(queued.wrench, np.ones(6))
+    np.testing.assert_array_equal(queued.point, np.ones(3))

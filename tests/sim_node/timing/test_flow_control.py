@@ -26,9 +26,9 @@ def test_subscribers_that_follow_are_asked_only_now_and_then() -> None:
     subscribers = Subscribers()
     pressure = pressure_of(subscribers)
 
-    held = [pressure.holds(tick, now=0.0) for tick in range(1, 301)]
+    delays = [pressure.holds(tick, now=0.0) for tick in range(1, 301)]
 
-    assert not any(held)
+    assert not any(delays)
     assert len(subscribers.waits) == 3
 
 
@@ -37,9 +37,9 @@ def test_it_holds_until_they_have_all() -> None:
     pressure = pressure_of(subscribers)
     subscribers.have_all = False
 
-    held = [pressure.holds(tick, now=5.0) for tick in range(1, 101)]
+    delays = [pressure.holds(tick, now=5.0) for tick in range(1, 101)]
 
-    assert held == [False] * 99 + [True]
+    assert delays == [False] * 99 + [True]
     assert pressure.holds(100, now=5.9)
     subscribers.have_all = True
     assert not pressure.holds(100, now=5.95)

@@ -210,14 +210,14 @@ def test_neither_the_sender_nor_a_later_tick_changes_a_commands_effort(
 ) -> None:
     indices, effort = as_arrays({4: 4.0, 5: 5.0})
     collector.submit(STAMP_NS, indices, effort)
-    kept = collector.effort
+    accepted = collector.effort
 
     effort[:] = 99.0
     indices[:] = 1
     collector.begin_tick(STAMP_NS + 1)
     submit(collector, {4: -4.0}, STAMP_NS + 1)
 
-    np.testing.assert_array_equal(kept, [0.0, 0.0, 0.0, 0.0, 4.0, 5.0])
+    np.testing.assert_array_equal(accepted, [0.0, 0.0, 0.0, 0.0, 4.0, 5.0])
 
 
 # Everything at once, against the rules in plain Python

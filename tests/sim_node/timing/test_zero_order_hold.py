@@ -199,9 +199,9 @@ class AnyTraffic(RuleBasedStateMachine):
 
     @invariant()
     def what_is_held_is_as_the_rules_say(self) -> None:
-        held = {i: e for i, (t, e, _) in self.given.items() if self.tick - t < 3}
+        in_force = {i: e for i, (t, e, _) in self.given.items() if self.tick - t < 3}
         ages = [self.tick - t for t, _, _ in self.given.values() if self.tick - t < 3]
-        assert self.hold.effort.tolist() == [held.get(index, 0.0) for index in range(6)]
+        assert self.hold.effort.tolist() == [in_force.get(index, 0.0) for index in range(6)]
         assert self.hold.age_ns == (max(ages) if ages else None)
 
     @invariant()

@@ -18,7 +18,13 @@ from actuated_characters.bags.format import limits
 from actuated_characters.bags.format.limits import MIB
 from actuated_characters.bags.reader import read_messages
 from msgs_config.errors import RecordingError
-from tests.support.foreign_bags import Said, texts, write_jazzy_db3, write_mcap, write_metadata
+from tests.support.foreign_bags import (
+    TextMessage,
+    texts,
+    write_jazzy_db3,
+    write_mcap,
+    write_metadata,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -26,7 +32,7 @@ GIB = 1024 * MIB
 TOPIC = "/sim_node/configuration"  # what every command reads first
 BLOCK = 128 * 1024  # bytes that a block of zstd may stand for
 MOST_MEBIBYTES = 600
-SOUND = [Said(TOPIC, number, f"text {number}") for number in range(1, 6)]
+SOUND = [TextMessage(TOPIC, number, f"text {number}") for number in range(1, 6)]
 
 
 class Stored(NamedTuple):
@@ -93,10 +99,12 @@ def chunks(
 def overlapping(bag: Path) -> None:
     """Chunks whose messages are the first and the last in time: all would be open at once."""
     large = "0" * (60 * MIB)
-    said = [
-        Said(TOPIC, time, text) for _ in range(12) for time, text in ((100, "last"), (1, large))
+    messages = [
+        TextMessage(TOPIC, time, text)
+        for _ in range(12)
+        for time, text in ((100, "last"), (1, large))
     ]
-    write_mcap(bag / "bag_0.mcap", said, chunk_size=MIB)
+    write_mcap(bag / "bag_0.mcap", messages, chunk_size=MIB)
     write_metadata(bag, 9, "mcap", ["bag_0.mcap"], [TOPIC])
 
 
@@ -200,11 +208,11 @@ def run(*arguments: object) -> Ended:
     command = [sys.executable, "-c", WITH_PEAK, *map(str, arguments)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     assert process.stdout is not None
-    said = process.stdout.read()
+    output = process.stdout.read()
     code = process.wait()
     process.stdout.close()
-    said, _, peak = said.rpartition(PEAK)
-    return Ended(code, said, int(peak.split()[0]) / 1024)
+    output, _, peak = output.rpartition(PEAK)
+    return Ended(code, output, int(peak.split()[0]) / 1024)
 
 
 COMMANDS = {

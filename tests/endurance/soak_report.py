@@ -10,14 +10,14 @@ MEMORY_PERIOD = 5_000  # ticks between looks at the memory
 
 
 @dataclass
-class Findings:
+class SoakReport:
     """What a soak has found; it has passed if there are no problems."""
 
     ticks: int = 0
     wall_time: float = 0.0  # s
     repeated_states: int = 0
     disturbances: Counter[str] = field(default_factory=Counter)
-    memory: dict[str, list[float]] = field(default_factory=dict)  # MB, a process's samples
+    megabytes: dict[str, list[float]] = field(default_factory=dict)  # MB, a process's samples
     report: dict[str, str] = field(default_factory=dict)  # the simulator's last one
     problems: list[str] = field(default_factory=list)
 
@@ -27,7 +27,7 @@ class Findings:
         settled = SETTLED // MEMORY_PERIOD
         return {
             name: max(samples[settled:], default=0.0) - samples[settled]
-            for name, samples in self.memory.items()
+            for name, samples in self.megabytes.items()
             if len(samples) > settled
         }
 
@@ -39,7 +39,7 @@ class Findings:
         table.add_row("states that came twice", str(self.repeated_states))
         for name, count in sorted(self.disturbances.items()):
             table.add_row(name, str(count))
-        for name, samples in self.memory.items():
+        for name, samples in self.megabytes.items():
             growth = self.growth.get(name)
             grown = "" if growth is None else f", grown by {growth:.2f} MB since it had settled"
             table.add_row(f"memory of {name}", f"{samples[-1]:.1f} MB{grown}")
