@@ -435,7 +435,7 @@ class SimulatorClient(Client):
             if answering is None:
                 self._executor.spin_once(0.02)
             else:
-                answering = self.answer(answering, {})
+                answering = self.advance(answering, {})
 
         return wait_until(found, f"a report of {expected}", PATIENCE, step)
 
