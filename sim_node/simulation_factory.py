@@ -11,7 +11,7 @@ from msgs_config.errors import CharacterError
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
 from sim_node.initial_state import POSITION, VELOCITY
-from sim_node.parameters import SimulatorParameters
+from sim_node.parameters import CONTACT_BREAKING_THRESHOLD, SimulatorParameters
 from sim_node.physics.probe import measure_inverse_mass
 from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
@@ -73,6 +73,7 @@ def make_settings(values: Values) -> SimulationSettings:
             friction=values.number("friction"),
             link_friction=values.number("link_friction"),
             solver_iterations=values.integer("solver_iterations"),
+            contact_breaking_threshold=values.number(CONTACT_BREAKING_THRESHOLD),
             ground=terrain == PLANE,
             terrain=None if terrain in (PLANE, NO_GROUND) else _read_terrain(terrain),
         ),

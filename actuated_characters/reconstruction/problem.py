@@ -10,6 +10,7 @@ from controller_node.planner.settings import PREDICTIVE, RECORDED
 from controller_node.references.files.clip import read_clip
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ConfigurationError
+from sim_node.parameters import STEADY_CONTACTS
 
 _PLANNING = {
     "planner": PREDICTIVE,
@@ -29,6 +30,10 @@ class Problem:
     simulator: Mapping[str, object] = field(default_factory=dict)
     controller: Mapping[str, object] = field(default_factory=dict)
     pushes: tuple[str, ...] = ()  # LINK:FX,FY,FZ@S, which come in the search, too
+
+    def __post_init__(self) -> None:
+        """Have the world of planned runs in the file as well, for whatever plays it."""
+        object.__setattr__(self, "simulator", {**STEADY_CONTACTS, **self.simulator})
 
     def planned_pushes(self, plan: RunPlan) -> tuple[PlannedPush, ...]:
         """The pushes of its plan. Raises ConfigurationError if one is wrong."""

@@ -7,6 +7,7 @@ from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import choose_behaviour
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
+from controller_node.planner.settings import PREDICTIVE
 from controller_node.references.base import Motion, Reference
 from controller_node.references.factory import make_motion
 from msgs_config.character.dynamics import DynamicsModel
@@ -83,6 +84,8 @@ def make_plan(
     controller, motion = _controller_values(character, controller_given)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
+    if controller.text("planner") == PREDICTIVE:
+        defaults |= simulator_parameters.STEADY_CONTACTS
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)
     _check_engines(character, simulator.number("gravity"))

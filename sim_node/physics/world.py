@@ -5,6 +5,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.model import Character, UrdfOptions
@@ -24,6 +25,7 @@ class WorldSettings:
     friction: float = 0.9  # of the ground; a contact's is the product of both surfaces'
     link_friction: float = 0.5  # of every link
     solver_iterations: int = 10
+    contact_breaking_threshold: float = 0.02  # the engine's own; see `sim_node`'s parameter
     ground: bool = True  # the plane z = 0
     terrain: UrdfOptions | None = None  # a fixed body beside the plane
 
@@ -36,6 +38,8 @@ class World:
     Restore right after a step: the engine keeps an effort that was applied but not stepped yet.
     """
 
+    _breaking_threshold: ClassVar = 0.02  # in force; the engine has one for all worlds of a process
+
     def __init__(self, settings: WorldSettings) -> None:
         """Start the engine.
 
@@ -44,6 +48,7 @@ class World:
         """
         self._client = connect()
         self._link_friction = settings.link_friction
+        self._own_breaking_threshold = settings.contact_breaking_threshold
         self.set_gravity(settings.gravity)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=settings.step_s,
@@ -83,6 +88,12 @@ class World:
 
     def step(self) -> None:
         """Advance by one engine step; efforts last one step and are to be applied again."""
+        if World._breaking_threshold != self._own_breaking_threshold:
+            World._breaking_threshold = self._own_breaking_threshold
+            pybullet.setPhysicsEngineParameter(
+                contactBreakingThreshold=self._own_breaking_threshold,
+                physicsClientId=self._client,
+            )
         pybullet.stepSimulation(physicsClientId=self._client)
 
     def touched_links(self) -> TouchedLinks:

@@ -9,6 +9,7 @@ import pytest
 from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
+from sim_node.parameters import STEADY_CONTACTS
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_settings
 
@@ -21,6 +22,7 @@ CASES: dict[str, tuple[str, dict[str, object], dict[str, object]]] = {
         {"reference": "clip", "clip": "roll"},
         {"rate": 480, "command_delay_ticks": 1},
     ),
+    "steady": ("humanoid", {"reference": "clip", "clip": "run"}, STEADY_CONTACTS),
     "damped": ("tests/data/damped.yaml", {"reference": "hold"}, {"substeps": 2}),
     "laikago": ("laikago", {"reference": "hold"}, {}),
 }

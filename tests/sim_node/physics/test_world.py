@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
+from sim_node.parameters import STEADY_CONTACTS
 from sim_node.physics.world import WorldSettings
 from tests.support.physics import (
     LoneWorld,
@@ -82,10 +85,12 @@ def test_a_restored_state_remembers_nothing_of_what_was_done_in_between() -> Non
     assert second == first
 
 
-def test_two_worlds_at_once_do_not_disturb_each_other() -> None:
+@pytest.mark.parametrize("threshold", [0.02, 0.3])
+def test_two_worlds_at_once_do_not_disturb_each_other(threshold: float) -> None:
     with fallen_humanoid() as alone:
         expected = trajectory(alone, wriggling(1), 60)
-    with fallen_humanoid() as one, fallen_humanoid() as other:
+    others = WorldSettings(contact_breaking_threshold=threshold)
+    with fallen_humanoid() as one, fallen_humanoid(others) as other:
         effort, disturbance = wriggling(1), wriggling(2)
 
         steps = []
@@ -97,6 +102,25 @@ def test_two_worlds_at_once_do_not_disturb_each_other() -> None:
 
 
 # --- physics -------------------------------------------------------------------------------------
+
+
+def test_a_loaded_foot_trembles_only_where_contacts_lose_their_points() -> None:
+    """A sole that keeps its corners does not tip to and fro from one tick to the next."""
+
+    def trembling(**settings: object) -> float:
+        motion = {"reference": "clip", "clip": "walk"}
+        plan = make_plan("humanoid", 2.0, motion, settings, {})
+        ankles = [joint.entries for joint in plan.character.layout.joints if "ankle" in joint.name]
+        speeds = [
+            np.concatenate([tick.following.velocity[entries] for entries in ankles])
+            for tick in ticks_in_process(plan)
+        ]
+        return float(np.mean(np.abs(np.diff(speeds, axis=0)).max(axis=1) > 30.0))  # rad/s
+
+    engines_own, steady = trembling(), trembling(**STEADY_CONTACTS)
+
+    assert engines_own > 0.04
+    assert steady < engines_own / 3.0
 
 
 @pytest.mark.parametrize("step_s", [1.0 / 240.0, 1.0 / 1000.0])
