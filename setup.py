@@ -87,6 +87,7 @@ setup(
             "sim_node = sim_node.main:main",
             "controller_node = controller_node.main:main",
             "recorder = actuated_characters.recorder.main:main",
+            "composed = actuated_characters.composed.main:main",
             "actuated_characters = actuated_characters.cli:main",
         ],
     },

@@ -4,9 +4,9 @@ import time
 from collections import Counter
 from contextlib import suppress
 from functools import partial
+from typing import Any
 
 import numpy as np
-from rclpy.node import Node
 
 from controller_node.actuation import describe_actuation
 from controller_node.interface.contact_subscription import ContactSubscription
@@ -29,6 +29,7 @@ from msgs_config.messages import configuration, topics
 from msgs_config.messages.session import ANONYMOUS, given_session
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
+from msgs_config.runtime.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns
 from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
 from msgs_config.runtime.durations import Durations
 from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
@@ -40,16 +41,18 @@ from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
 _FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge the last messages
 
 
-class ControllerNode(Node):
+class ControllerNode(ComposableNode):
     """Subscribes to `joint_states`; publishes `joint_torques` and `~/reference`."""
 
-    def __init__(self) -> None:
+    def __init__(self, **options: Any) -> None:
         """Read the parameters, build the controller, and offer the topics.
+
+        `options` are rclpy's own of every node.
 
         Raises:
             ActuatedCharactersError: a parameter, the character or the clip cannot be used.
         """
-        super().__init__(topics.CONTROLLER_NODE)
+        super().__init__(topics.CONTROLLER_NODE, **options)
         given = given_parameters(self)
         loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)))
         self._character = placed(loaded, given)
@@ -108,32 +111,34 @@ class ControllerNode(Node):
             )
         )
 
-    def run(self, stop: StopSignal) -> None:
+    def turns(self, stop: StopSignal, executor: PollingExecutor) -> Turns:
         """Answer states until `stop`.
 
         Raises:
             ActuatedCharactersError: the simulator simulates something else than this controller
                 was made for.
         """
-        executor = PollingExecutor(self)
         self._controller.while_planning(executor.serve)
         try:
             while not stop:
-                self._report()
-                self._simulators.look(time.monotonic())
-                raw = self._next_state()
-                if raw is not None:
-                    executor.received()
-                    executor.serve()  # a flood of states must not keep services waiting
-                    self._take_state(raw)
-                    continue
-                if self._pending_state is not None:
-                    self._take_state(self._pending_state)
-                executor.rest()
+                yield self._spin_once(executor)
         finally:
             self._report(at_once=True)
             self._outputs.flush(_FLUSH_TIME)
-            executor.close()
+
+    def _spin_once(self, executor: PollingExecutor) -> float:
+        """Answer a state if there is one; the turn's result."""
+        self._report()
+        self._simulators.look(time.monotonic())
+        raw = self._next_state()
+        if raw is not None:
+            executor.received()
+            executor.serve()  # a flood of states must not keep services waiting
+            self._take_state(raw)
+            return AT_ONCE
+        if self._pending_state is not None:
+            self._take_state(self._pending_state)
+        return UNTIL_A_MESSAGE
 
     def _next_state(self) -> bytes | None:
         """The next state; in real time the newest, for the others have been overtaken."""

@@ -2,13 +2,12 @@
 
 import time
 
-from rclpy.node import Node
-
 from msgs_config.errors import SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import OwnSession, make_session
 from msgs_config.parameters import Values
+from msgs_config.runtime.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns
 from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
 from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
@@ -42,7 +41,7 @@ _STOP_FLUSH_TIME = 0.5  # s, after a signal or an error
 _MOST_COMMANDS = 1000  # that are taken in a row in real time; a flood must not stop the world
 
 
-class SimNode(Node):
+class SimNode(ComposableNode):
     """Publishes the states of each tick; advances when they are answered, or when it is time."""
 
     def __init__(self) -> None:
@@ -105,7 +104,7 @@ class SimNode(Node):
             self, [each.states for each in self._characters], self._session, self._once_logger
         )
 
-    def run(self, stop: StopSignal) -> None:
+    def turns(self, stop: StopSignal, executor: PollingExecutor) -> Turns:
         """Simulate until `max_ticks`, or until `stop`.
 
         Raises:
@@ -113,18 +112,16 @@ class SimNode(Node):
                 published where a reference begins.
             CharacterError: a mesh cannot be read.
         """
-        executor = PollingExecutor(self)
         try:
-            self._begin(stop, executor)
+            yield from self._begin(stop)
             while not stop and not self._finished:
-                self._spin_once(executor)
+                yield self._spin_once(executor)
         finally:
             self._run_services.end(executor)
             self._publish_diagnostics()
             seconds = _FLUSH_TIME if self._finished else _STOP_FLUSH_TIME
             if not (self._publisher.is_acknowledged(seconds) and self._diagnostics.flush(seconds)):
                 self.get_logger().warning("a subscriber has not acknowledged the last messages")
-            executor.close()
             self._simulation.close()
 
     @property
@@ -136,9 +133,9 @@ class SimNode(Node):
     def _complete(self) -> bool:
         return all(each.commands.complete for each in self._characters)
 
-    def _begin(self, stop: StopSignal, executor: PollingExecutor) -> None:
+    def _begin(self, stop: StopSignal) -> Turns:
         """Begin the first episode when initial states and subscribers are there."""
-        states = self._initial_states.wait(stop, executor)
+        states = yield from self._initial_states.wait(stop)
         parameters = self._loaded.with_values({n: as_values(s) for n, s in states.items()})
         if stop:
             return
@@ -147,25 +144,26 @@ class SimNode(Node):
             declare(self, self._loaded.open, parameters.values)
         self._publisher.publish_configurations(parameters, self._samples)
         count = self._settings.wait_for_subscribers
-        wait_for_subscribers(self, self._publisher.of_characters, count, stop, executor)
+        yield from wait_for_subscribers(self, self._publisher.of_characters, count, stop)
         self._begin_episode()
 
-    def _spin_once(self, executor: PollingExecutor) -> None:
-        """Take commands, and advance if the tick is complete and due; or rest."""
-        received = self._receive()
+    def _spin_once(self, executor: PollingExecutor) -> float:
+        """Take commands, and advance if the tick is complete and due; the turn's result."""
+        received, idle_seconds = self._receive(), AT_ONCE
         if received:
             executor.received()
             executor.serve()  # a flood of commands must not keep services waiting
         if not (self._control.runs and self._complete):
             if not received:
-                executor.rest()
+                idle_seconds = UNTIL_A_MESSAGE
         elif wait := self._rate_limiter.wait(time.monotonic()):
-            executor.rest_for(wait)
+            idle_seconds = wait
         elif self._flow_control.holds(self._simulation.tick, time.monotonic()):
             executor.serve()
         else:
             self._advance()  # before the clock: a command that came in time is no timeout
         self._run_watchdog()
+        return idle_seconds
 
     def _receive(self) -> bool:
         """Take one command a character, or all in real time; whether there was one."""

@@ -75,7 +75,13 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         "a ball that hits a link, where the reference has it, at a time in s; from=front, left, "
         "right, back, above or degrees (front), distance=M (2), radius=M",
     )
-    run.add_argument(
+    loop = run.add_mutually_exclusive_group()
+    loop.add_argument(
+        "--composed",
+        action="store_true",
+        help="simulator and controller as two nodes of one process: the same states, sooner",
+    )
+    loop.add_argument(
         "--in-process", action="store_true", help="one process without ROS: the same states, no bag"
     )
 
@@ -247,6 +253,7 @@ def _run_plan(
             recording={name: value for name, value in given.items() if value is not None},
             pushes=pushes,
             throws=throws,
+            composed=options.composed,
         )
         if throws:
             states = None if options.no_record else read_states(directory)

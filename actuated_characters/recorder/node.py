@@ -111,7 +111,7 @@ class RecorderNode(Node):
         Raises:
             RecordingError: ticks were missing, or the bag could not be written.
         """
-        executor = PollingExecutor(self, _SERVICE_PERIOD)
+        executor = PollingExecutor(self, service_period=_SERVICE_PERIOD)
         due = {self._search: 0.0, self._flush: 0.0, self._tell_progress: 0.0}
         try:
             while not stop:

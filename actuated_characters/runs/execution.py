@@ -51,11 +51,13 @@ def run_over_topics(
     recording: Mapping[str, object] = _NOTHING_GIVEN,
     pushes: Sequence[PlannedPush] = (),
     throws: Sequence[PlannedThrow] = (),
+    composed: bool = False,
 ) -> None:
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
-    `recording` has parameters of the recorder: how the bag is stored, topics more or fewer. Pushes
-    and throws are sent by one more process; in lockstep all are there before the first tick.
+    With `composed`, controller and simulator are nodes of one process. `recording` has parameters
+    of the recorder: how the bag is stored, topics more or fewer. Pushes and throws are sent by one
+    more process; in lockstep all are there before the first tick.
 
     Raises:
         RunError: one of the processes failed, with its own message, or the simulator rejected a
@@ -64,16 +66,14 @@ def run_over_topics(
     recording = {**recording, "directory": str(directory), "write_bag": write_bag}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
-    # subscribers that must be there before the first answer, or a tick would go unrecorded
-    both, all_three = (f"wait_for_subscribers:={count}" for count in (2, 3))
     sent = _write_planned(directory, pushes, throws, recording) if pushes or throws else None
     with _environment(directory) as environment, Children(directory, environment) as children:
         recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
         sender = [children.start_node("pusher", sent, *session)] if sent else []
-        waits = (*session, "-p", all_three if sent else both)
-        controller = children.start_node("controller_node", plan.controller, *waits)
-        simulator = children.start_node("sim_node", plan.simulator, *session, "-p", both)
-        _wait_for_end(simulator, [controller, *sender, recorder], progress)
+        # of the torques, before the first answer, or a tick would go unrecorded
+        subscribers = 2 + len(sender)
+        loop = _start_loop(children, plan, session, subscribers, composed=composed)
+        _wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
     recorded, _ = read_metrics(directory)
@@ -82,6 +82,28 @@ def run_over_topics(
     for what, planned in (("pushes", pushes), ("throws", throws)):
         if planned and (rejected := recorded[f"rejected_{what}"]):
             raise RunError(f"sim_node rejected {rejected} of {len(planned)} {what}")
+
+
+def _start_loop(
+    children: Children,
+    plan: RunPlan,
+    session: Sequence[str],
+    torque_subscribers: int,
+    *,
+    composed: bool,
+) -> list[Child]:
+    """Start simulator and controller; the process of the simulator, and the other if there is one.
+
+    They begin when so many subscribe to the torques, and two to the states.
+    """
+    arguments = [*session]
+    for node, count in (("sim_node", 2), ("controller_node", torque_subscribers)):
+        arguments += ["-p", f"{node}:wait_for_subscribers:={count}"]
+    if composed:
+        both = {"sim_node": plan.simulator, "controller_node": plan.controller}
+        return [children.start_composed("composed", both, *arguments)]
+    controller = children.start_node("controller_node", plan.controller, *arguments)
+    return [children.start_node("sim_node", plan.simulator, *arguments), controller]
 
 
 def _write_planned(
@@ -143,11 +165,12 @@ def _wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> 
         progress(ticks)
         if ticks < 2 and time.monotonic() > start_deadline:
             raise RunError(
-                f"no answer within {_START_TIMEOUT:g} s; sim_node says: {simulator.last_words()}"
+                f"no answer within {_START_TIMEOUT:g} s; {simulator.name} says: "
+                f"{simulator.last_words()}"
             )
         time.sleep(_POLL_PERIOD)
     if simulator.exit_code:
-        raise RunError(f"sim_node failed: {simulator.last_words()}")
+        raise RunError(f"{simulator.name} failed: {simulator.last_words()}")
 
 
 def run_in_process(

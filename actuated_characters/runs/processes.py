@@ -17,11 +17,12 @@ from actuated_characters.runs.run_directory import LOGS, PARAMETERS, write_param
 MODULES = {
     "sim_node": "sim_node.main",
     "controller_node": "controller_node.main",
+    "composed": "actuated_characters.composed.main",
     "recorder": "actuated_characters.recorder.main",
     "pusher": "actuated_characters.runs.perturbation_main",
     "player": "actuated_characters.replay.players.main",
 }
-"""The modules that are run by `python -m`, by the names of the nodes."""
+"""The modules that are run by `python -m`, by the names of the nodes, or of several in one."""
 
 _END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
 _PR_SET_PDEATHSIG = 1  # prctl(2)
@@ -152,9 +153,28 @@ class Children:
         The parameters are for the node of that name in the root namespace, or for `any_node`.
         """
         file = write_parameters(self.directory, name, parameters, "/**" if any_node else name)
+        return self._start(name, [file], ros_arguments, arguments)
+
+    def start_composed(
+        self, name: str, parameters: Mapping[str, Mapping[str, object]], *ros_arguments: str
+    ) -> Child:
+        """Start one process of several nodes, with the parameters of each by its name."""
+        given = parameters.items()
+        files = [write_parameters(self.directory, node, values) for node, values in given]
+        return self._start(name, files, ros_arguments)
+
+    def _start(
+        self,
+        name: str,
+        files: Sequence[Path],
+        ros_arguments: Sequence[str],
+        arguments: Sequence[str] = (),
+    ) -> Child:
         # -P: no module of the same name from the directory where the user stands
-        command = ["-P", "-m", MODULES[name], *arguments]
-        command += ["--ros-args", "--params-file", str(file), *ros_arguments]
+        command = ["-P", "-m", MODULES[name], *arguments, "--ros-args"]
+        for file in files:
+            command += ["--params-file", str(file)]
+        command += ros_arguments
         log = self.directory / LOGS / f"{name}.log"
         with _signals_held():
             child = Child(command, log, environment=self._environment)

@@ -98,12 +98,13 @@ def _received(raw: bytes, info: dict[str, int]) -> Received:
 
 
 class PollingExecutor:
-    """Gives a loop's idle moments to other processes and to the node's executor."""
+    """Gives a loop's idle moments to other processes and to the executor of the loop's nodes."""
 
-    def __init__(self, node: Node, service_period: float = _SERVICE_PERIOD) -> None:
+    def __init__(self, *nodes: Node, service_period: float = _SERVICE_PERIOD) -> None:
         """`service_period` is the time in s between turns of the executor in a busy loop."""
-        self._executor = SingleThreadedExecutor(context=node.context)
-        self._executor.add_node(node)
+        self._executor = SingleThreadedExecutor(context=nodes[0].context)
+        for node in nodes:
+            self._executor.add_node(node)
         self._service_period = service_period
         self._busy_until = 0.0
         self._next_service = 0.0

@@ -27,7 +27,7 @@ _PARAMETERS_ARE_SET = (
     "parameters are set by --ros-args -p NAME:=VALUE or --params-file FILE, and listed by "
     "'actuated_characters parameters'"
 )
-_USAGE = "usage: {name} [--ros-args ...]\n\n" + _PARAMETERS_ARE_SET
+_USAGE = "usage: {name} [--ros-args ...]\n\n{about}" + _PARAMETERS_ARE_SET
 
 
 def limit_threads() -> None:
@@ -90,7 +90,7 @@ class RunnableNode(Protocol):
         """Leave the graph."""
 
 
-def run_node(load: Callable[[], Callable[[], RunnableNode]]) -> NoReturn:
+def run_node(load: Callable[[], Callable[[], RunnableNode]], about: str = "") -> NoReturn:
     """Run a node between rclpy's start and end, and end the process.
 
     rclpy's own signal handlers would end the context under a loop that still publishes or writes,
@@ -99,12 +99,13 @@ def run_node(load: Callable[[], Callable[[], RunnableNode]]) -> NoReturn:
 
     Args:
         load: Imports the node's modules, and returns its constructor.
+        about: What `--help` says before it says how parameters are set.
     """
     stop = StopSignal()
     node, code = None, EXIT_ERROR
     try:
         with stop.ending_at_once():
-            _start_ros()
+            _start_ros(about)
             make_node = load()
         node = make_node()
         node.run(stop)
@@ -143,7 +144,7 @@ def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
     return {} if given is not None else {_PROFILES: str(_ANYWHERE)}
 
 
-def _start_ros() -> None:
+def _start_ros(about: str) -> None:
     os.environ.update(middleware_settings(os.environ))
     remove_orphans()
     import rclpy
@@ -153,7 +154,7 @@ def _start_ros() -> None:
     try:
         others = remove_ros_args(sys.argv)[1:]
         if {"-h", "--help"} & set(others):
-            print(_USAGE.format(name=os.path.basename(sys.argv[0])))
+            print(_USAGE.format(name=os.path.basename(sys.argv[0]), about=about))
             raise SystemExit(0)
         if others:
             raise ConfigurationError(f"unknown argument {others[0]!r}; {_PARAMETERS_ARE_SET}")

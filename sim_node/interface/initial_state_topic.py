@@ -1,7 +1,7 @@
 """Asks controllers for the states in which their references begin, before the first state."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 
 from rclpy.node import Node
 
@@ -9,8 +9,9 @@ from msgs_config.errors import LayoutError, MessageError, SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.state import StampedState
+from msgs_config.runtime.composition import UNTIL_A_MESSAGE
 from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
+from msgs_config.runtime.polling import DirectSubscription
 from msgs_config.runtime.process import StopSignal
 from sim_node.initial_state import GIVEN, INITIAL_STATE, begins_with_reference, check_state
 from sim_node.interface.publisher_diagnosis import describe_publishers, publisher_names
@@ -40,8 +41,8 @@ class InitialStates:
             if begins_with_reference(own.values)
         ]
 
-    def wait(self, stop: StopSignal, executor: PollingExecutor) -> dict[str, StampedState]:
-        """Wait for the states, by the characters' names; none if `stop` comes first.
+    def wait(self, stop: StopSignal) -> Generator[float, None, dict[str, StampedState]]:
+        """Wait, in turns, for the states, by the characters' names; none if `stop` comes first.
 
         Raises:
             SimulationError: a controller has published none within `initial_state_timeout`.
@@ -51,7 +52,7 @@ class InitialStates:
         while missing := [each for each in self._subscriptions if each.look() is None]:
             if stop:
                 return {}
-            executor.rest()
+            yield UNTIL_A_MESSAGE
             for event in watchdog.due(time.monotonic()):
                 sentence = "; ".join(each.describe() for each in missing)
                 if event is WatchdogEvent.TIMEOUT:

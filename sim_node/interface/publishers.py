@@ -26,7 +26,7 @@ from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Outgoing, Topic
 from msgs_config.messages.wrenches import WORLD, WrenchArrays, encode_wrenches, select
 from msgs_config.parameters import Values
-from msgs_config.runtime.polling import PollingExecutor
+from msgs_config.runtime.composition import UNTIL_A_MESSAGE, Turns
 from msgs_config.runtime.process import StopSignal
 from sim_node.interface.markers import MarkerEncoder
 from sim_node.physics.simulated_character import SimulatedCharacter
@@ -242,13 +242,12 @@ def wait_for_subscribers(
     publishers: Sequence[Publishers],
     wanted: int,
     stop: StopSignal,
-    executor: PollingExecutor,
-) -> None:
-    """Wait until the states of every character have as many subscribers, or until `stop`."""
+) -> Turns:
+    """Wait, in turns, until each character's states have as many subscribers, or until `stop`."""
     watchdog = Watchdog()
     watchdog.restart(time.monotonic())
     while not stop and (found := min(each.state_subscribers for each in publishers)) < wanted:
-        executor.rest()
+        yield UNTIL_A_MESSAGE
         if WatchdogEvent.EXPLAIN in watchdog.due(time.monotonic()):
             node.get_logger().warning(
                 f"waiting for {wanted} subscribers of joint_states; there are {found}; has one "

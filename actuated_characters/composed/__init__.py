@@ -1,0 +1,1 @@
+"""Simulator and controllers as the nodes of one process."""

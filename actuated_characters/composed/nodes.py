@@ -1,0 +1,62 @@
+"""The nodes of the executable `composed`: a simulator, and a controller for each character."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from controller_node.node import ControllerNode
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError
+from msgs_config.messages import topics
+from msgs_config.runtime.composition import ComposableNode, Composition, destroy_nodes
+from sim_node.node import SimNode
+from sim_node.parameters import CHARACTERS
+
+
+def compose() -> Composition:
+    """Make the simulator, and a controller in the namespace of each of its characters.
+
+    Raises:
+        ActuatedCharactersError: a node cannot be made with its parameters; names the node. Or two
+            nodes have been given one name.
+    """
+    nodes: list[ComposableNode] = []
+    try:
+        with _naming(topics.SIM_NODE):
+            simulator = SimNode()
+        nodes.append(simulator)
+        for character in simulator.get_parameter(CHARACTERS.name).value or [""]:
+            with _naming(f"{character}/{topics.CONTROLLER_NODE}".lstrip("/")):
+                nodes.append(_make_controller(simulator, character))
+        _check_names(nodes)
+    except ActuatedCharactersError:
+        destroy_nodes(nodes)
+        raise
+    return Composition(nodes)
+
+
+def _make_controller(simulator: SimNode, character: str) -> ControllerNode:
+    """A controller in a character's namespace, below that of the simulator."""
+    if not character:
+        return ControllerNode()
+    # a node's own rule precedes a `__ns` for the whole process, which precedes `namespace`
+    namespace = f"{simulator.get_namespace().rstrip('/')}/{character}"
+    return ControllerNode(cli_args=["--ros-args", "-r", f"__ns:={namespace}"])
+
+
+@contextmanager
+def _naming(node: str) -> Iterator[None]:
+    """Put the name of a node that is made before the error that keeps it from being made."""
+    try:
+        yield
+    except ActuatedCharactersError as error:
+        raise type(error)(f"{node}: {error}") from error
+
+
+def _check_names(nodes: list[ComposableNode]) -> None:
+    """Raise ConfigurationError if a rule for the whole process has given nodes one name."""
+    names = [node.get_fully_qualified_name() for node in nodes]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigurationError(
+                f"two nodes of this process are called '{name}'; rename one of them alone, as in "
+                f"-r {topics.SIM_NODE}:__node:=NAME"
+            )

@@ -1,0 +1,88 @@
+"""Composition, as ROS 2 means it: several nodes in one process, here in one thread as well.
+
+Each node works in turns, which it yields between. One loop gives the turns, to one node as to
+several, so a node cannot tell whether it has its process to itself.
+"""
+
+import math
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import ExitStack
+
+from rclpy.node import Node
+
+from msgs_config.runtime.polling import PollingExecutor
+from msgs_config.runtime.process import StopSignal
+
+AT_ONCE = 0.0
+"""Yielded by a node that has done something, and may have more to do."""
+UNTIL_A_MESSAGE = math.inf
+"""Yielded by a node that has nothing to do before something comes."""
+
+Turns = Generator[float, None, None]
+
+
+class ComposableNode(Node):
+    """A node that can share its thread with others."""
+
+    def turns(self, stop: StopSignal, executor: PollingExecutor) -> Turns:
+        """Work until the end or until `stop`; each turn yields for how many s it needs no other.
+
+        A node that is closed before its end leaves in good order, too. It gives the executor turns
+        where it must, but leaves resting to the loop, which knows whether others have work.
+        """
+        raise NotImplementedError
+
+    def run(self, stop: StopSignal) -> None:
+        """Work until the end or until `stop`, alone in this thread; raises what `turns` raises."""
+        run_nodes([self], stop)
+
+
+class Composition:
+    """Nodes that run as one: what ends one of them ends all."""
+
+    def __init__(self, nodes: Sequence[ComposableNode]) -> None:
+        self._nodes = nodes
+
+    def run(self, stop: StopSignal) -> None:
+        """Let the nodes work until one ends or until `stop`; raises what one of them raises."""
+        run_nodes(self._nodes, stop)
+
+    def destroy_node(self) -> None:
+        """Leave the graph."""
+        destroy_nodes(self._nodes)
+
+
+def destroy_nodes(nodes: Sequence[Node]) -> None:
+    """Let nodes leave the graph, the last one first."""
+    for node in reversed(nodes):
+        node.destroy_node()
+
+
+def run_nodes(nodes: Sequence[ComposableNode], stop: StopSignal) -> None:
+    """Give each node its turn, one after the other, until one ends; then close the others.
+
+    The thread rests only when no node has done anything in its last turn, and no longer than the
+    most impatient one allows.
+    """
+    executor = PollingExecutor(*nodes)
+    with ExitStack() as at_end:
+        at_end.callback(executor.close)
+        turns = [node.turns(stop, executor) for node in nodes]
+        for each in turns:
+            at_end.callback(each.close)
+        while (seconds := _take_turns(turns)) is not None:
+            if seconds == UNTIL_A_MESSAGE:
+                executor.rest()
+            elif seconds > AT_ONCE:
+                executor.rest_for(seconds)
+
+
+def _take_turns(turns: Iterable[Turns]) -> float | None:
+    """One turn of each; for how long none needs another, None when one has ended."""
+    least = UNTIL_A_MESSAGE
+    for each in turns:
+        seconds = next(each, None)
+        if seconds is None:
+            return None
+        least = min(least, seconds)
+    return least
