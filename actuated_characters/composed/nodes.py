@@ -1,12 +1,9 @@
 """The nodes of the executable `composed`: a simulator, and a controller for each character."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 from controller_node.node import ControllerNode
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.messages import topics
-from msgs_config.runtime.composition import ComposableNode, Composition, destroy_nodes
+from msgs_config.runtime.composition import ComposableNode, Composition, destroy_nodes, errors_of
 from sim_node.node import SimNode
 from sim_node.parameters import CHARACTERS
 
@@ -20,11 +17,11 @@ def compose() -> Composition:
     """
     nodes: list[ComposableNode] = []
     try:
-        with _naming(topics.SIM_NODE):
+        with errors_of(topics.SIM_NODE):
             simulator = SimNode()
         nodes.append(simulator)
         for character in simulator.get_parameter(CHARACTERS.name).value or [""]:
-            with _naming(f"{character}/{topics.CONTROLLER_NODE}".lstrip("/")):
+            with errors_of(f"{character}/{topics.CONTROLLER_NODE}".lstrip("/")):
                 nodes.append(_make_controller(simulator, character))
         _check_names(nodes)
     except ActuatedCharactersError:
@@ -40,15 +37,6 @@ def _make_controller(simulator: SimNode, character: str) -> ControllerNode:
     # a node's own rule precedes a `__ns` for the whole process, which precedes `namespace`
     namespace = f"{simulator.get_namespace().rstrip('/')}/{character}"
     return ControllerNode(cli_args=["--ros-args", "-r", f"__ns:={namespace}"])
-
-
-@contextmanager
-def _naming(node: str) -> Iterator[None]:
-    """Put the name of a node that is made before the error that keeps it from being made."""
-    try:
-        yield
-    except ActuatedCharactersError as error:
-        raise type(error)(f"{node}: {error}") from error
 
 
 def _check_names(nodes: list[ComposableNode]) -> None:

@@ -5,11 +5,12 @@ several, so a node cannot tell whether it has its process to itself.
 """
 
 import math
-from collections.abc import Generator, Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 
 from rclpy.node import Node
 
+from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 
@@ -38,7 +39,7 @@ class ComposableNode(Node):
 
 
 class Composition:
-    """Nodes that run as one: what ends one of them ends all."""
+    """Nodes that run as one: what ends one of them ends all, and an error names its node."""
 
     def __init__(self, nodes: Sequence[ComposableNode]) -> None:
         self._nodes = nodes
@@ -68,6 +69,8 @@ def run_nodes(nodes: Sequence[ComposableNode], stop: StopSignal) -> None:
     with ExitStack() as at_end:
         at_end.callback(executor.close)
         turns = [node.turns(stop, executor) for node in nodes]
+        if len(nodes) > 1:
+            turns = [_named(node, each) for node, each in zip(nodes, turns, strict=True)]
         for each in turns:
             at_end.callback(each.close)
         while (seconds := _take_turns(turns)) is not None:
@@ -75,6 +78,20 @@ def run_nodes(nodes: Sequence[ComposableNode], stop: StopSignal) -> None:
                 executor.rest()
             elif seconds > AT_ONCE:
                 executor.rest_for(seconds)
+
+
+@contextmanager
+def errors_of(name: str) -> Iterator[None]:
+    """Put a node's name before its errors, which may be those of any node of the process."""
+    try:
+        yield
+    except ActuatedCharactersError as error:
+        raise type(error)(f"{name}: {error}") from error
+
+
+def _named(node: Node, turns: Turns) -> Turns:
+    with errors_of(node.get_fully_qualified_name().lstrip("/")):
+        yield from turns
 
 
 def _take_turns(turns: Iterable[Turns]) -> float | None:

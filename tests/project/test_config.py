@@ -305,6 +305,26 @@ def test_the_nodes_of_a_file_have_the_states_of_a_run(
     assert again.state_hashes == found
 
 
+def test_nodes_of_one_process_take_a_file_and_have_the_same_states(
+    processes: Processes, tmp_path: Path
+) -> None:
+    file = "two_humanoids.yaml"
+    listening = {"directory": str(tmp_path / "run"), "characters": list(SIDES)}
+    recorder = processes.node(topics.RECORDER_NODE, **listening)
+
+    ends = ("-p", "wait_for_subscribers:=2", "-p", f"sim_node:max_ticks:={TICKS}")
+    arguments = ("--ros-args", "--params-file", str(CONFIG / file), *ends)
+    composed = processes.python("-m", MODULES["composed"], *arguments)
+
+    assert composed.wait(LONG) == 0
+    recorder.send(signal.SIGINT)
+    assert recorder.wait(LONG) == 0
+    assert complaints([composed]) == []
+    found = {name: hash_in(tmp_path / "run" / name) for name in SIDES}
+    assert found == {name: ending.state_hash for name, ending in ends_of_two().items()}
+    assert replay(read_recordings(tmp_path / "run")).state_hashes == found
+
+
 @pytest.mark.parametrize("turns", range(3))
 def test_the_states_of_two_humanoids_do_not_depend_on_who_starts_first(
     processes: Processes, tmp_path: Path, turns: int

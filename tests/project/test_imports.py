@@ -13,6 +13,7 @@ PACKAGES = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
 ROS_NAMES = re.compile(
     r"rclpy|rpyutils|rosidl_\w+|ament_\w+|builtin_interfaces|rcl_interfaces|\w+_(msgs|srvs)"
 )
+COMPOSED = "actuated_characters/composed"
 ENGINES = {  # who imports them; how far they are known beyond that is in pyproject.toml
     "pybullet": {"msgs_config/character/bullet.py"},
     "mujoco": {
@@ -92,7 +93,7 @@ def test_each_engine_is_imported_by_the_one_file_named_for_it() -> None:
 
 
 def test_a_process_can_limit_its_threads_before_numpy_loads() -> None:
-    mains = ["sim_node/main.py", "controller_node/main.py"]
+    mains = [f"{folder}/main.py" for folder in ("sim_node", "controller_node", COMPOSED)]
 
     assert_nothing_wrong(mains, lambda main: _roots_at_import(main) & {"numpy", "rclpy"})
 

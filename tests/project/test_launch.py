@@ -22,6 +22,8 @@ from sim_node import parameters as for_simulator
 
 PROJECT = Path(__file__).parents[2]
 PACKAGE = "actuated_characters"
+SEVERAL_NODES = "composed"
+"""The executable that has several nodes."""
 FILES = sorted(path.name for path in (PROJECT / "launch").glob("*.py"))
 
 
@@ -109,6 +111,8 @@ def launch_file(name: str) -> LaunchFile:
 
 @cache
 def parameters_of(executable: str) -> set[str]:
+    if executable == SEVERAL_NODES:  # what is set for the process is set for all its nodes
+        return parameters_of("sim_node") & parameters_of("controller_node")
     humanoid = load_character("humanoid")
     parameters = {
         "sim_node": for_simulator.PARAMETERS + for_simulator.character_parameters(humanoid),
@@ -135,6 +139,7 @@ def test_there_is_a_launch_file_for_each_set_of_nodes() -> None:
     }
 
     assert started == {  # beside what they include
+        "composed.launch.py": ["composed"],
         "everything.launch.py": ["recorder"],
         "simulator.launch.py": ["sim_node"],
         "simulator_controller.launch.py": ["controller_node"],
@@ -162,7 +167,10 @@ def test_every_node_is_an_executable_of_this_package_under_its_own_name(name: st
     for node in file.nodes:
         assert ast.unparse(node["package"]) == "PACKAGE"
         assert text(node["executable"]) in executables()
-        assert text(node["name"]) == text(node["executable"])
+        if text(node["executable"]) == SEVERAL_NODES:
+            assert "name" not in node  # all nodes of the process would have it
+        else:
+            assert text(node["name"]) == text(node["executable"])
 
 
 @pytest.mark.parametrize("name", FILES)

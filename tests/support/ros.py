@@ -47,6 +47,7 @@ DDS_PROFILES, RANGE = "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY
 """What sets the middleware of the test's own process; the processes under test set it themselves,
 by the range LOCALHOST, as a user's do."""
 
+_NOTHING: Mapping[str, object] = {}
 _MIDDLEWARE_SAYS = "sequence size exceeds remaining buffer"
 
 
@@ -159,9 +160,38 @@ class Processes:
         self, name: str, namespace: str = "", *, fresh: bool = False, **parameters: object
     ) -> Process:
         """Start one of the package's nodes; a name's dots are written as double underscores."""
-        given = {name.replace("__", "."): value for name, value in parameters.items()}
+        return self._start_module(name, {name: parameters}, namespace, fresh=fresh)
+
+    def composed(
+        self,
+        simulator: Mapping[str, object] = _NOTHING,
+        controller: Mapping[str, object] = _NOTHING,
+        namespace: str = "",
+        *,
+        fresh: bool = False,
+        **both: object,
+    ) -> Process:
+        """Start `sim_node` and `controller_node` in one process, with parameters as for `node`."""
+        given = {topics.SIM_NODE: simulator, topics.CONTROLLER_NODE: controller}
+        parameters = {name: {"character": "pendulum", **both, **given[name]} for name in given}
+        return self._start_module("composed", parameters, namespace, fresh=fresh)
+
+    def _start_module(
+        self,
+        name: str,
+        parameters: Mapping[str, Mapping[str, object]],
+        namespace: str,
+        *,
+        fresh: bool,
+    ) -> Process:
+        content = {
+            f"/**/{node}": {
+                "ros__parameters": {key.replace("__", "."): each for key, each in given.items()}
+            }
+            for node, given in parameters.items()
+        }
         file = self._folder / f"{len(self._started)}_{name}.yaml"
-        file.write_text(yaml.safe_dump({f"/**/{name}": {"ros__parameters": given}}))
+        file.write_text(yaml.safe_dump(content))
         arguments = ["--ros-args", "--params-file", str(file)]
         arguments += ["-r", f"__ns:=/{namespace}"] if namespace else []
         if self._fresh or fresh:

@@ -174,6 +174,20 @@ def test_the_parameters_left_behind_start_the_nodes_alone_into_the_same_states(
         context.try_shutdown()
 
 
+def test_composed_the_run_has_the_same_figures_and_leaves_the_same_files(
+    walk: Path, together: Processes, tmp_path: Path
+) -> None:
+    Run(together, *WALK, "--composed", "--output", str(tmp_path / "run")).finish()
+
+    apart, composed = summary_of(walk), summary_of(tmp_path / "run")
+    for figure in set(apart) - {"wall_time_s", "real_time_factor"}:
+        assert composed[figure] == apart[figure]
+    files = {path.relative_to(tmp_path / "run").as_posix() for path in tmp_path.rglob("*.*")}
+    assert "logs/composed.log" in files and "logs/sim_node.log" not in files
+    for node in ("sim_node", "controller_node"):
+        assert parameters_of(tmp_path / "run", node) == parameters_of(walk, node)
+
+
 def test_without_assistance_the_walk_falls_and_without_a_bag_all_figures_are_there(
     unassisted: Path, walk: Path
 ) -> None:
@@ -365,13 +379,16 @@ def test_every_error_says_what_was_wrong_and_what_would_have_been_right(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(
+    ("way", "process", "node"), [((), "sim_node", ""), (("--composed",), "composed", "sim_node: ")]
+)
 def test_a_divergence_ends_the_run_with_the_simulators_own_message(
-    processes: Processes, tmp_path: Path
+    processes: Processes, tmp_path: Path, way: tuple[str, ...], process: str, node: str
 ) -> None:
-    run = Run(processes, *ENDLESS, "--output", "run", "--set", "sim_node.speed_limit:=0.01")
+    run = Run(processes, *ENDLESS, *way, "--output", "run", "--set", "sim_node.speed_limit:=0.01")
 
     assert run.process.wait() == 1
-    assert "sim_node failed: diverged at tick 2: 'hinge'" in run.error
+    assert f"{process} failed: {node}diverged at tick 2: 'hinge'" in run.error
     assert run.family == {}
     list(read_messages(tmp_path / "run" / "bag"))
 
@@ -405,11 +422,12 @@ def test_no_process_outlives_a_run_that_is_killed(processes: Processes, tmp_path
     wait_until(lambda: run.family == {}, "the end of all its processes", SECONDS)
 
 
-@pytest.mark.parametrize("node", ["sim_node", "controller_node", "recorder"])
+@pytest.mark.parametrize("node", ["sim_node", "controller_node", "composed", "recorder"])
 def test_a_node_that_is_killed_ends_the_run_and_is_named(
     processes: Processes, tmp_path: Path, node: str
 ) -> None:
-    run = Run(processes, *LONG_WALK, "--output", "run").wait_for_ticks(tmp_path / "run")
+    way = ("--composed",) if node == "composed" else ()
+    run = Run(processes, *LONG_WALK, *way, "--output", "run").wait_for_ticks(tmp_path / "run")
 
     os.kill(run.pid_of(MODULES[node]), signal.SIGKILL)
 

@@ -6,6 +6,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -234,6 +235,12 @@ def answering(processes: Processes, client: SimulatorClient) -> Process:
     return controller
 
 
+def composed(processes: Processes, client: SimulatorClient) -> Process:
+    both = processes.composed(fresh=True)
+    hear_states(client)
+    return both
+
+
 def recording(processes: Processes, client: SimulatorClient) -> Process:
     told = {"directory": f"recording_{time.monotonic_ns()}", "progress_period": 0.05}
     recorder = processes.node("recorder", fresh=True, **told)
@@ -252,6 +259,7 @@ SITUATIONS: list[Situation] = [
     slowed_down,
     idle,
     answering,
+    composed,
     recording,
 ]
 
@@ -284,7 +292,7 @@ def test_a_signal_ends_a_node_within_a_second_and_leaves_nothing_behind(
     assert_ends_well(forked, own_graph, situation, number)
 
 
-@pytest.mark.parametrize("situation", [running, recording])
+@pytest.mark.parametrize("situation", [running, composed, recording])
 def test_more_signals_disturb_nothing(
     forked: Processes, own_graph: int, situation: Situation
 ) -> None:
@@ -335,6 +343,7 @@ COMMON_STAGES = ["", "_rclpy_pybind11", "/yaml/_yaml.", "_multiarray_umath"]
 STAGES = {  # what each loads, one after the other, once it handles signals
     "sim_node": [*COMMON_STAGES, "/pybullet.", "/dev/shm/fastrtps_"],
     "controller_node": [*COMMON_STAGES, "/libmujoco.", "/dev/shm/fastrtps_"],
+    "composed": [*COMMON_STAGES, "/pybullet.", "/libmujoco.", "/dev/shm/fastrtps_"],
     "recorder": COMMON_STAGES,  # once it is there, having heard nobody is an error
 }
 
@@ -356,7 +365,8 @@ def test_each_signal_ends_a_node_that_is_still_starting(
 ) -> None:
     del own_graph
     before = set(SHARED_MEMORY.iterdir())
-    nodes = {number: processes.node(name) for number in SIGNALS}
+    start = processes.composed if name == "composed" else partial(processes.node, name)
+    nodes = {number: start() for number in SIGNALS}
     endings: dict[signal.Signals, Ending] = {}
 
     def are_over() -> bool:
