@@ -1,4 +1,4 @@
-"""The closed loop of simulator and controller: in one process, and over topics."""
+"""The closed loop of simulator and controller: in one process, over topics, and composed."""
 
 import time
 
@@ -19,9 +19,16 @@ def in_process(plan: RunPlan) -> FloatArray:
     return np.diff(times)[1:]  # the first one builds the world, too
 
 
-def over_topics(plan: RunPlan) -> list[dict[str, str]]:
-    """What the simulator reports in a run of two processes without a recorder, to the end."""
+def over_topics(plan: RunPlan, *, composed: bool = False) -> list[dict[str, str]]:
+    """What the simulator reports in a run without a recorder, to the end.
+
+    Its nodes have two processes, or one if they are `composed`.
+    """
     with Nodes() as nodes:
+        if composed:
+            nodes.start_composed(plan.simulator, plan.controller)
+            nodes.wait_until(lambda: nodes.reports and int(nodes.reports[-1]["tick"]) > plan.ticks)
+            return nodes.reports
         nodes.start(topics.SIM_NODE, plan.simulator)
         if not plan.simulator.integer("wait_for_subscribers"):
             nodes.wait_until(lambda: nodes.reports)  # they are heard from now on

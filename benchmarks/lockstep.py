@@ -35,20 +35,23 @@ def _measure(plan: RunPlan, table: Table) -> Ratio:
     """Add the rows of one character; the ratio of a tick over topics to what it is made of."""
     name, rate = plan.character.name, plan.simulator.integer("rate")
     layout = plan.character.layout
-    last = over_topics(plan)[-1]
     rows = {
         "(a) bare round trip, taken directly": _row(round_trips(layout, _COUNT, direct=True)),
         "(a') bare round trip, by executors": _row(round_trips(layout, _COUNT, direct=False)),
         "(b) in one process": _row(in_process(plan)),
-        "(c) over topics": tuple(
-            float(last[key]) for key in ("tick_us_p50", "tick_us_p99", "ticks_per_s")
-        ),
+        "(c) over topics": _reported(over_topics(plan)),
+        "(d) over topics, composed": _reported(over_topics(plan, composed=True)),
     }
     for label, (p50, p99, per_second) in rows.items():
         factor = "" if "bare" in label else f"{per_second / rate:.1f}"
         table.add_row(f"{name} {label}", f"{p50:.0f}", f"{p99:.0f}", f"{per_second:.0f}", factor)
-    direct, _, joined, apart = (values[0] for values in rows.values())
+    direct, _, joined, apart, _ = (values[0] for values in rows.values())
     return Ratio(f"lockstep, {name}", apart / (joined + direct), "(c) / ((b) + (a))")
+
+
+def _reported(reports: list[dict[str, str]]) -> tuple[float, ...]:
+    """The same of the simulator's own reports."""
+    return tuple(float(reports[-1][key]) for key in ("tick_us_p50", "tick_us_p99", "ticks_per_s"))
 
 
 def _row(durations: FloatArray) -> tuple[float, ...]:

@@ -46,6 +46,14 @@ class Nodes:
             self._simulator = child
         return child
 
+    def start_composed(
+        self, simulator: Mapping[str, object], controller: Mapping[str, object]
+    ) -> Child:
+        """Start the simulator and a controller in one process."""
+        parameters = {topics.SIM_NODE: simulator, topics.CONTROLLER_NODE: controller}
+        self._simulator = self._children.start_composed("composed", parameters)
+        return self._simulator
+
     def wait_until(
         self,
         done: Callable[[], object],
