@@ -176,7 +176,6 @@ def test_another_controller_on_the_topics_is_a_conflict(
 def test_a_push_from_another_process_acts(processes: Processes, client: SimulatorClient) -> None:
     processes.composed(SLOWLY, SINE)
     applied = client.listen(topics.APPLIED_WRENCH)
-    client.first_state()
     message = wrench_message(0, [("rod", [5.0, 0.0, 0.0, 0.0, 0.0, 0.0])])
     client.spin_sending(
         lambda: client.wrenches.publish(message),

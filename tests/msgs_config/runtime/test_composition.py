@@ -73,7 +73,7 @@ def rests(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return found
 
 
-def yielding(*seconds: float) -> Callable[[PollingExecutor], Iterator[float]]:
+def with_rests(*seconds: float) -> Callable[[PollingExecutor], Iterator[float]]:
     return lambda executor: iter(seconds)
 
 
@@ -87,7 +87,7 @@ def raising(error: Exception) -> Callable[[PollingExecutor], Iterator[float]]:
 
 def test_when_one_has_ended_the_others_are_closed(workers: list[Worker], log: list[str]) -> None:
     one, other = workers
-    one.steps, other.steps = yielding(*[AT_ONCE] * 2), yielding(*[AT_ONCE] * 9)
+    one.steps, other.steps = with_rests(*[AT_ONCE] * 2), with_rests(*[AT_ONCE] * 9)
 
     run_nodes(workers, False)
 
@@ -109,7 +109,7 @@ def test_they_rest_when_none_has_done_anything_and_no_longer_than_one_of_them_wo
     other: Sequence[float],
     expected: Sequence[float],
 ) -> None:
-    workers[0].steps, workers[1].steps = yielding(*one), yielding(*other)
+    workers[0].steps, workers[1].steps = with_rests(*one), with_rests(*other)
 
     run_nodes(workers, False)
 
@@ -118,7 +118,7 @@ def test_they_rest_when_none_has_done_anything_and_no_longer_than_one_of_them_wo
 
 def test_a_node_alone_rests_as_long_as_it_says(workers: list[Worker], rests: list[float]) -> None:
     alone = workers[0]
-    alone.steps = yielding(AT_ONCE, 0.5, UNTIL_A_MESSAGE, AT_ONCE)
+    alone.steps = with_rests(AT_ONCE, 0.5, UNTIL_A_MESSAGE, AT_ONCE)
 
     alone.run(False)
 
@@ -128,7 +128,7 @@ def test_a_node_alone_rests_as_long_as_it_says(workers: list[Worker], rests: lis
 def test_an_error_of_one_of_several_names_it_and_the_others_end_well(
     workers: list[Worker], log: list[str]
 ) -> None:
-    workers[0].steps = yielding(*[AT_ONCE] * 9)
+    workers[0].steps = with_rests(*[AT_ONCE] * 9)
     workers[1].steps = raising(SimulationError("it fell"))
 
     with pytest.raises(SimulationError, match=r"^other: it fell$"):
@@ -145,9 +145,9 @@ def test_an_error_of_a_node_alone_is_as_it_was(workers: list[Worker]) -> None:
 
 
 def test_what_one_publishes_the_other_takes_in_its_next_turn(workers: list[Worker]) -> None:
-    speaker, listener = workers
-    publisher = speaker.create_publisher(String, TOPIC.name, TOPIC.qos)
-    subscription, found = DirectSubscription(listener, TOPIC), []
+    sender, receiver = workers
+    publisher = sender.create_publisher(String, TOPIC.name, TOPIC.qos)
+    subscription, found = DirectSubscription(receiver, TOPIC), []
 
     def speaking(executor: PollingExecutor) -> Iterator[float]:
         while not publisher.get_subscription_count():
@@ -161,7 +161,7 @@ def test_what_one_publishes_the_other_takes_in_its_next_turn(workers: list[Worke
             found.append(subscription.take() is not None)
             yield UNTIL_A_MESSAGE
 
-    speaker.steps, listener.steps = speaking, listening
+    sender.steps, receiver.steps = speaking, listening
     run_nodes(workers, False)
 
     assert found[-5:] == [True] * 5
@@ -179,7 +179,7 @@ def test_while_one_works_long_the_services_of_the_others_are_answered(
         timer.cancel()
         yield AT_ONCE
 
-    worker.steps, served.steps = working, yielding(AT_ONCE)
+    worker.steps, served.steps = working, with_rests(AT_ONCE)
     run_nodes(workers, False)
 
     assert log[0] == "served"
