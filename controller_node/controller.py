@@ -233,13 +233,12 @@ class Controller:
         """The behaviour's view of a state, for the answer to a stamp."""
         if contacts is None and self.needs_contacts:
             raise ConfigurationError("the behaviour needs the contacts of each state's tick")
-        next_stamp = self.clock.stamp_ns(self.clock.tick(state.stamp_ns) + 1)
-        time, next_time = self._tracked.time(state.stamp_ns), self._tracked.time(next_stamp)
-        now, upcoming = self._tracked.own(time, next_time)
+        tick = self._tracked.tick(state.stamp_ns)
+        now, upcoming = self._tracked.own(tick)
         effective = self._effective_gains(stamp_ns)
         return Observation(
-            time=time,
-            next_time=next_time,
+            time=self._tracked.time(tick),
+            next_time=self._tracked.time(tick + 1),
             position=state.position,
             velocity=state.velocity,
             contacts=self._no_contacts if contacts is None else contacts,

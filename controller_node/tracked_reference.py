@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from controller_node.behaviours.targets import Target
-from controller_node.references.base import Reference, ReferenceState
+from controller_node.references.base import Reference, ReferenceState, SampledTogether
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.character.model import Character
 from msgs_config.messages.clock import TickClock
+
+_TOGETHER = 16  # ticks; sampling more of them would be felt in the tick in which it is done
 
 
 class TrackedReference:
@@ -23,18 +25,18 @@ class TrackedReference:
         self.target: Target | None = None  # of a behaviour, instead of the reference itself
         self._character, self._reference, self._clock = character, reference, clock
         self._first_tick = clock.first_tick_from(episode_ns)
-        self._next: tuple[float, ReferenceState] | None = None
+        self._known_from, self._known = 0, list[ReferenceState]()  # a tick, states from there on
 
     def tick(self, stamp_ns: int) -> int:
         """Ticks from the episode's first state to the first tick from a stamp on."""
         return self._clock.first_tick_from(stamp_ns) - self._first_tick
 
-    def time(self, stamp_ns: int) -> float:
-        """Time of a stamp's tick.
+    def time(self, tick: int) -> float:
+        """Time of a tick, counted from the episode's first state.
 
         Not the stamps' difference: rounded to whole ns, it is another one in another episode.
         """
-        return self._clock.time_after(self.tick(stamp_ns))
+        return self._clock.time_after(tick)
 
     def replace(
         self, points: TrajectoryPoints, start_ns: int, now_ns: int, carry: PlanarTransform
@@ -50,16 +52,26 @@ class TrackedReference:
             before = TransformedReference(self._character.layout, before, carry)
         if not isinstance(before, TrajectoryReference):
             before = TrajectoryReference(self._character, before)
-        self._reference = before.replaced(points, self.time(start_ns), self.time(now_ns))
-        self._next = None
+        start, now = self.time(self.tick(start_ns)), self.time(self.tick(now_ns))
+        self._reference = before.replaced(points, start, now)
+        self._known = []
 
-    def own(self, time: float, next_time: float) -> tuple[ReferenceState, ReferenceState]:
-        """The reference's states in a tick and in the next one, without the behaviour's target."""
-        # the state of the next tick is this tick's when the tick has come
-        is_known = self._next is not None and self._next[0] == time
-        now = self._next[1] if self._next and is_known else self._reference.sample(time)
-        self._next = next_time, self._reference.sample(next_time)
-        return now, self._next[1]
+    def own(self, tick: int) -> tuple[ReferenceState, ReferenceState]:
+        """The reference's states at a tick and at the next one, without the behaviour's target."""
+        return self._at(tick), self._at(tick + 1)
+
+    def _at(self, tick: int) -> ReferenceState:
+        """The reference's state at a tick; what is sampled together is known for some ticks."""
+        if not 0 <= tick - self._known_from < len(self._known):
+            self._known_from, self._known = tick, self._samples(tick)
+        return self._known[tick - self._known_from]
+
+    def _samples(self, tick: int) -> list[ReferenceState]:
+        """The reference's states from a tick on, at least its own."""
+        if not isinstance(self._reference, SampledTogether):
+            return [self._reference.sample(self._clock.time_after(tick))]
+        ticks = range(tick, tick + _TOGETHER)
+        return self._reference.samples([self._clock.time_after(each) for each in ticks])
 
     def desired(self, time: float, own: ReferenceState) -> ReferenceState:
         """The state to track, where the reference's own at that time is known."""

@@ -1,8 +1,8 @@
 """The interface of a reference, and the references by name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Protocol, TypeAlias, runtime_checkable
 
 from controller_node.registry import Registry
 from msgs_config.arrays import FloatArray
@@ -26,6 +26,15 @@ class Reference(Protocol):
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the episode's first state."""
+        ...
+
+
+@runtime_checkable
+class SampledTogether(Reference, Protocol):
+    """A desired motion of which several states together take less time than one by one."""
+
+    def samples(self, times: Sequence[float]) -> list[ReferenceState]:
+        """The states that `sample` has at rising times in s, to the bit."""
         ...
 
 

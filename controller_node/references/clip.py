@@ -2,6 +2,7 @@
 
 import cmath
 from bisect import bisect_right
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -44,31 +45,60 @@ class ClipReference:
         self._positions, self._orientations = positions, orientations
         self._velocities = self._segment_velocities()
         self._no_acceleration = np.zeros(layout.size)
-        self._cycle_motion = lru_cache(maxsize=2)(self._motion_of)  # this tick's and the next's
+        self._last = self._held()
+        self._cycle_motion = lru_cache(maxsize=2)(self._motion_of)  # this cycle's and the next's
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the clip's first frame."""
-        if not self._wraps and time >= self._period:
-            still = np.zeros(self._layout.size)
-            return self._state(self._positions[-1].copy(), self._orientations[-1], still)
-        cycle = int(time // self._period) if self._wraps else 0
-        time_in_cycle = time - cycle * self._period
-        frame = min(bisect_right(self._frame_times, time_in_cycle), len(self._frame_times) - 1) - 1
-        since_frame = time_in_cycle - self._frame_times[frame]
-        velocity = self._velocities[frame].copy()
-        position = self._positions[frame] + since_frame * velocity
-        turned = since_frame * velocity[self._layout.rotation_entries]
-        orientations = rotations.multiply(self._orientations[frame], rotations.exp(turned))
-        if cycle and self._moves:
-            self._continue_root(cycle, position, orientations, velocity)
-        return self._state(position, orientations, velocity)
+        return self.samples((time,))[0]
 
-    def _state(
-        self, position: FloatArray, orientations_xyzw: FloatArray, velocity: FloatArray
-    ) -> ReferenceState:
-        position[self._layout.rotation_entries] = rotations.log(orientations_xyzw)
-        configuration = GeneralizedPosition(position, orientations_xyzw)
-        return ReferenceState(configuration, velocity, self._no_acceleration)
+    def samples(self, times: Sequence[float]) -> list[ReferenceState]:
+        """The desired states at rising times in s."""
+        moving = times if self._wraps else [time for time in times if time < self._period]
+        states = self._moving(moving) if moving else []
+        return states + [self._last] * (len(times) - len(states))
+
+    def _moving(self, times: Sequence[float]) -> list[ReferenceState]:
+        """The states at rising times, before the end of a clip that does not wrap."""
+        cycles = [int(time // self._period) if self._wraps else 0 for time in times]
+        frames, since_frames = self._frames_at(times, cycles)
+        velocities = self._velocities[frames]
+        positions = self._positions[frames] + since_frames * velocities
+        turned = (since_frames * velocities)[:, self._layout.rotation_entries]
+        orientations = rotations.multiply(self._orientations[frames], rotations.exp(turned))
+        if self._moves:
+            first = bisect_right(cycles, 0)
+            while first < len(cycles):
+                rows = slice(first, bisect_right(cycles, cycles[first]))
+                self._continue_root(
+                    cycles[first], positions[rows], orientations[rows], velocities[rows]
+                )
+                first = rows.stop
+        positions[:, self._layout.rotation_entries] = rotations.log(orientations)
+        return [
+            ReferenceState(GeneralizedPosition(position, turns), velocity, self._no_acceleration)
+            for position, turns, velocity in zip(positions, orientations, velocities, strict=True)
+        ]
+
+    def _frames_at(
+        self, times: Sequence[float], cycles: Sequence[int]
+    ) -> tuple[list[int], FloatArray]:
+        """The last frame (m) before each time, and the time since then (m, 1) in s."""
+        frames, since_frames = [], []
+        last = len(self._frame_times) - 1
+        for time, cycle in zip(times, cycles, strict=True):
+            time_in_cycle = time - cycle * self._period
+            frame = min(bisect_right(self._frame_times, time_in_cycle), last) - 1
+            frames.append(frame)
+            since_frames.append(time_in_cycle - self._frame_times[frame])
+        return frames, np.array(since_frames)[:, np.newaxis]
+
+    def _held(self) -> ReferenceState:
+        """The last frame, at rest."""
+        position = self._positions[-1].copy()
+        position[self._layout.rotation_entries] = rotations.log(self._orientations[-1])
+        configuration = GeneralizedPosition(position, self._orientations[-1])
+        return ReferenceState(configuration, self._no_acceleration, self._no_acceleration)
 
     def _closed(self, frames: ClipFrames) -> tuple[FloatArray, FloatArray]:
         """The frames with the last ones led towards the first one of the next cycle."""
@@ -100,19 +130,24 @@ class ClipReference:
         return velocities
 
     def _continue_root(
-        self, cycle: int, position: FloatArray, orientations: FloatArray, velocity: FloatArray
+        self, cycle: int, positions: FloatArray, orientations: FloatArray, velocities: FloatArray
     ) -> None:
-        """Carry the root on from the end of the cycle before: displacement and yaw composed.
+        """Carry roots on from the end of the cycle before: displacement and yaw composed.
 
-        On the ground plane, as complex numbers, one cycle maps `x` to `start + d + z (x - start)`
-        with `z = exp(i turn)`; n of them shift by `d (1 + z + ... + z^(n-1))`.
+        Of positions (m, n), orientations (m, k, 4) and velocities (m, n), in place. On the ground
+        plane, as complex numbers, one cycle maps `x` to `start + d + z (x - start)` with
+        `z = exp(i turn)`; n of them shift by `d (1 + z + ... + z^(n-1))`. The products are written
+        out: numpy's own of complex numbers depend on the processor.
         """
         start, shift, turn, turn_xyzw = self._cycle_motion(cycle)
-        place = start + shift + turn * (complex(*position[:2]) - start)
-        speed = turn * complex(*velocity[:2])
-        position[:2] = place.real, place.imag
-        velocity[:2] = speed.real, speed.imag
-        orientations[0] = rotations.multiply(turn_xyzw, orientations[0])
+        x, y = positions[:, 0] - start.real, positions[:, 1] - start.imag
+        begin = start + shift
+        positions[:, 0] = begin.real + (turn.real * x - turn.imag * y)
+        positions[:, 1] = begin.imag + (turn.real * y + turn.imag * x)
+        x, y = velocities[:, 0].copy(), velocities[:, 1].copy()
+        velocities[:, 0] = turn.real * x - turn.imag * y
+        velocities[:, 1] = turn.real * y + turn.imag * x
+        orientations[:, 0] = rotations.multiply(turn_xyzw, orientations[:, 0])
 
     def _motion_of(self, cycle: int) -> tuple[complex, complex, complex, FloatArray]:
         """Start, shift, turn, and the turn's quaternion, that `cycle` cycles add up to."""
