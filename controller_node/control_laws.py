@@ -9,7 +9,7 @@ integral gain is the one with those gains at zero. A new law is a function of `L
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -146,8 +146,7 @@ class LawContext:
     series: EffortSeries | None = None  # of the law `feedforward`
 
 
-@dataclass(frozen=True)
-class TrackingInput:
+class TrackingInput(NamedTuple):
     """State and reference in one tick."""
 
     time: float  # s since the episode's first state
@@ -159,7 +158,14 @@ class TrackingInput:
 
     def error(self, model: DynamicsModel, desired: ReferenceState) -> FloatArray:
         """The error (n,) of the configuration against a desired state, with the offset."""
-        error = model.compute_error(self.position, desired.configuration.position)
+        return self._moved(model.compute_error(self.position, desired.configuration.position))
+
+    def next_error(self, model: DynamicsModel) -> FloatArray:
+        """The error (n,) against the reference of the next tick, of a model in this state."""
+        return self._moved(model.error_of_state(self.upcoming.configuration.position))
+
+    def _moved(self, error: FloatArray) -> FloatArray:
+        """An error (n,) with the offset."""
         return error if self.offset is None else error + self.offset
 
 
@@ -240,7 +246,7 @@ def _implicit(
         context.model,
         gains.stiffness,
         gains.damping,
-        tracking.error(context.model, tracking.upcoming),
+        tracking.next_error(context.model),
         tracking.velocity,
         tracking.upcoming.velocity,
         context.period,

@@ -35,6 +35,7 @@ from controller_node.strength import Strengths, StrengthSchedule
 from controller_node.tracked_reference import TrackedReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.effort_limits import EffortLimits
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.messages.clock import TickClock
@@ -80,6 +81,7 @@ class Controller:
         self._balance = BalanceController(character, character.feet) if character.feet else None
         self.check(settings)
         self._settings = settings
+        self._limits = EffortLimits(self.layout, settings.gains.effort_limits)  # those met last
         choice = behaviour or BehaviourChoice()
         self._make_behaviour = choice.make
         self.needs_contacts = choice.needs_contacts  # of the tick before, to answer a state
@@ -234,11 +236,11 @@ class Controller:
         if contacts is None and self.needs_contacts:
             raise ConfigurationError("the behaviour needs the contacts of each state's tick")
         tick = self._tracked.tick(state.stamp_ns)
-        now, upcoming = self._tracked.own(tick)
+        (time, now), (next_time, upcoming) = self._tracked.own(tick)
         effective = self._effective_gains(stamp_ns)
         return Observation(
-            time=self._tracked.time(tick),
-            next_time=self._tracked.time(tick + 1),
+            time=time,
+            next_time=next_time,
             position=state.position,
             velocity=state.velocity,
             contacts=self._no_contacts if contacts is None else contacts,
@@ -278,7 +280,9 @@ class Controller:
             effort = effort + self._balance.effort(
                 self._model, self._settings.balance, with_bias=bias
             )
-        return self.layout.clipped(effort, gains.effort_limits)
+        if self._limits.values is not gains.effort_limits:
+            self._limits = EffortLimits(self.layout, gains.effort_limits)
+        return self._limits.clipped(effort)
 
     def _offset(self, state: StampedState, gains: GainArrays) -> FloatArray | None:
         """The offset of a planner to the tracking errors (n,); None without."""

@@ -1,6 +1,7 @@
 """The reference of an episode, as trajectories and behaviours alter it."""
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from msgs_config.messages.clock import TickClock
 
 _TOGETHER = 16  # ticks; sampling more of them would be felt in the tick in which it is done
 
+TimedState: TypeAlias = tuple[float, ReferenceState]
+"""A reference's state, and its time in s since the episode's first state."""
+
 
 class TrackedReference:
     """The state to track at each tick of an episode; times in s since the episode's first state."""
@@ -24,8 +28,9 @@ class TrackedReference:
         self.follows_velocity = True  # the reference's; else the velocity to track is zero
         self.target: Target | None = None  # of a behaviour, instead of the reference itself
         self._character, self._reference, self._clock = character, reference, clock
+        self._together = _sampled_together(reference)  # the same one, if it can do that
         self._first_tick = clock.first_tick_from(episode_ns)
-        self._known_from, self._known = 0, list[ReferenceState]()  # a tick, states from there on
+        self._known_from, self._known = 0, list[TimedState]()  # a tick, states from there on
 
     def tick(self, stamp_ns: int) -> int:
         """Ticks from the episode's first state to the first tick from a stamp on."""
@@ -54,24 +59,26 @@ class TrackedReference:
             before = TrajectoryReference(self._character, before)
         start, now = self.time(self.tick(start_ns)), self.time(self.tick(now_ns))
         self._reference = before.replaced(points, start, now)
+        self._together = _sampled_together(self._reference)
         self._known = []
 
-    def own(self, tick: int) -> tuple[ReferenceState, ReferenceState]:
+    def own(self, tick: int) -> tuple[TimedState, TimedState]:
         """The reference's states at a tick and at the next one, without the behaviour's target."""
         return self._at(tick), self._at(tick + 1)
 
-    def _at(self, tick: int) -> ReferenceState:
+    def _at(self, tick: int) -> TimedState:
         """The reference's state at a tick; what is sampled together is known for some ticks."""
         if not 0 <= tick - self._known_from < len(self._known):
             self._known_from, self._known = tick, self._samples(tick)
         return self._known[tick - self._known_from]
 
-    def _samples(self, tick: int) -> list[ReferenceState]:
+    def _samples(self, tick: int) -> list[TimedState]:
         """The reference's states from a tick on, at least its own."""
-        if not isinstance(self._reference, SampledTogether):
-            return [self._reference.sample(self._clock.time_after(tick))]
-        ticks = range(tick, tick + _TOGETHER)
-        return self._reference.samples([self._clock.time_after(each) for each in ticks])
+        if self._together is None:
+            time = self.time(tick)
+            return [(time, self._reference.sample(time))]
+        times = [self.time(each) for each in range(tick, tick + _TOGETHER)]
+        return list(zip(times, self._together.samples(times), strict=True))
 
     def desired(self, time: float, own: ReferenceState) -> ReferenceState:
         """The state to track, where the reference's own at that time is known."""
@@ -84,3 +91,8 @@ class TrackedReference:
         """The state to track at a tick, counted from the episode's first state."""
         time = self._clock.time_after(tick)
         return self.desired(time, self._reference.sample(time))
+
+
+def _sampled_together(reference: Reference) -> SampledTogether | None:
+    """A reference whose states can be sampled together; else None. To ask takes microseconds."""
+    return reference if isinstance(reference, SampledTogether) else None

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from controller_node.behaviours.targets import Target
 from controller_node.control_laws import GainArrays
@@ -26,8 +26,7 @@ class Mode(Enum):
     LIMP = "LIMP"  # nothing drives it
 
 
-@dataclass(frozen=True)
-class Observation:
+class Observation(NamedTuple):
     """A tick as a behaviour sees it; times in s since the episode's first state."""
 
     time: float

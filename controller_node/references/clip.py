@@ -45,7 +45,7 @@ class ClipReference:
         self._positions, self._orientations = positions, orientations
         self._velocities = self._segment_velocities()
         self._no_acceleration = np.zeros(layout.size)
-        self._last = self._held()
+        self._last = self._at_end()
         self._cycle_motion = lru_cache(maxsize=2)(self._motion_of)  # this cycle's and the next's
 
     def sample(self, time: float) -> ReferenceState:
@@ -93,8 +93,8 @@ class ClipReference:
             since_frames.append(time_in_cycle - self._frame_times[frame])
         return frames, np.array(since_frames)[:, np.newaxis]
 
-    def _held(self) -> ReferenceState:
-        """The last frame, at rest."""
+    def _at_end(self) -> ReferenceState:
+        """The last frame, at zero velocity."""
         position = self._positions[-1].copy()
         position[self._layout.rotation_entries] = rotations.log(self._orientations[-1])
         configuration = GeneralizedPosition(position, self._orientations[-1])

@@ -30,8 +30,10 @@ class DynamicsModel:
         self._layout = character.layout
         self._model = _compile(character, gravity)
         self._data = mujoco.MjData(self._model)
+        self._qpos, self._qvel, self._mass = self._data.qpos, self._data.qvel, self._data.M  # views
         self._mass_matrix = np.zeros((self._layout.size, self._layout.size))
         self._damping = character.passive_damping()
+        self._is_damped = bool(self._damping.any())
         # M is stored by rows of its lower triangle, the diagonal last
         self._diagonal = self._model.M_rowadr + self._model.M_rownnz - 1
         # no position at all: no distance, no angle, and as quaternions (wxyz) no turn
@@ -42,8 +44,8 @@ class DynamicsModel:
     def update(self, position: FloatArray, velocity: FloatArray) -> None:
         """Take over a state: position (n,), message form, and velocity (n,)."""
         data = self._data
-        self._convert(position, data.qpos)
-        data.qvel[:] = velocity
+        self._convert(position, self._qpos)
+        self._qvel[:] = velocity
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_comPos(self._model, data)
         mujoco.mj_crb(self._model, data)
@@ -54,11 +56,19 @@ class DynamicsModel:
 
         It is the velocity, and so a rotation's part is in the child frame, that leads there in 1 s.
         """
-        error: FloatArray = np.empty(self._layout.size)
         self._convert(position, self._start)
+        return self._difference(self._start, desired)
+
+    def error_of_state(self, desired: FloatArray) -> FloatArray:
+        """The error (n,) from the position taken over to a desired one (n,)."""
+        return self._difference(self._qpos, desired)
+
+    def _difference(self, start: FloatArray, desired: FloatArray) -> FloatArray:
+        """The difference (n,) from a position as MuJoCo has it to one (n,) in message form."""
+        difference: FloatArray = np.empty(self._layout.size)
         self._convert(desired, self._desired)
-        mujoco.mj_differentiatePos(self._model, error, 1.0, self._start, self._desired)
-        return error
+        mujoco.mj_differentiatePos(self._model, difference, 1.0, start, self._desired)
+        return difference
 
     def _convert(self, position: FloatArray, qpos: FloatArray) -> None:
         """Write a position (n,), message form, as MuJoCo has it.
@@ -79,11 +89,13 @@ class DynamicsModel:
         The passive damping D is then that of the velocity at the period's end. The factorisation
         `L' D L` follows the tree of the links (Featherstone 2008, section 6.5), and uses no BLAS.
         """
-        data, diagonal = self._data, self._diagonal
-        without = data.M[diagonal]
-        data.M[diagonal] = without + (period * self._damping + added)
+        data, mass, diagonal = self._data, self._mass, self._diagonal
+        without = mass.take(diagonal)
+        if self._is_damped:
+            added = period * self._damping + added
+        mass.put(diagonal, without + added)
         mujoco.mj_factorM(self._model, data)
-        data.M[diagonal] = without
+        mass.put(diagonal, without)
         acceleration: FloatArray = np.empty(self._layout.size)
         mujoco.mj_solveM(self._model, data, acceleration[np.newaxis], force[np.newaxis])
         return acceleration
@@ -105,7 +117,8 @@ class DynamicsModel:
         """
         bias = np.zeros(self._layout.size)
         mujoco.mj_rne(self._model, self._data, 0, bias)
-        bias += self._damping * self._data.qvel
+        if self._is_damped:
+            bias += self._damping * self._qvel
         return bias
 
     def inverse_dynamics(self, acceleration: FloatArray) -> FloatArray:
@@ -113,7 +126,7 @@ class DynamicsModel:
         effort = np.empty(self._layout.size)
         self._data.qacc[:] = acceleration
         mujoco.mj_rne(self._model, self._data, 1, effort)
-        effort += self._damping * self._data.qvel
+        effort += self._damping * self._qvel
         return effort
 
     def gravity_force(self) -> FloatArray:

@@ -493,3 +493,22 @@ def test_a_malformed_clip_is_one_clear_line(
 def test_a_clip_that_is_not_there_is_refused(name: str, clip: str, words: str) -> None:
     with pytest.raises(ClipError, match=words):
         read_clip(character(name), clip)
+
+
+@pytest.mark.parametrize("clip", ["walk", "spin", "kick"])
+def test_states_sampled_together_are_those_sampled_one_by_one(clip: str) -> None:
+    reference = reference_of(clip)
+    times = [0.3 * DURATIONS[clip] + number * 0.37 for number in range(20)]  # over cycles, the end
+
+    together = reference.samples(times)
+
+    assert len(together) == len(times)
+    for time, state in zip(times, together, strict=True):
+        alone = reference.sample(time)
+        pairs = (
+            (state.configuration.position, alone.configuration.position),
+            (state.configuration.orientations_xyzw, alone.configuration.orientations_xyzw),
+            (state.velocity, alone.velocity),
+            (state.acceleration, alone.acceleration),
+        )
+        assert all(ours.tobytes() == its.tobytes() for ours, its in pairs)
