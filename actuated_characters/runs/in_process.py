@@ -44,11 +44,12 @@ def ticks_in_process(
         simulation.watches_contacts = controller.needs_contacts
         (character,) = simulation.characters
         episode_ns = character.state.stamp_ns
+        drives_all = character.commanded.all()
         for _ in range(plan.ticks):
             state = character.state
             touched = None if character.contacts is None else character.contacts.wrenches
             effort, reference = controller.compute_effort(state, episode_ns, touched)
-            commanded = np.where(character.commanded, effort, 0.0)
+            commanded = effort if drives_all else np.where(character.commanded, effort, 0.0)
             acting, thrown = wrenches.take(simulation.tick), balls.take(simulation.tick)
             simulation.step([commanded], [acting], thrown)
             following = character.state

@@ -6,31 +6,25 @@ joint's rotation `q` in the engine is `o q o^-1` here, its velocity `w` is `o w`
 orientation `q` in the engine is `q o^-1` here.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.bullet import load_urdf, pybullet
 from msgs_config.character.layout import JointType
-from msgs_config.character.model import Character
+from msgs_config.character.model import Character, Pose
 from msgs_config.geometry import fixed_order, frames, rotations
 from sim_node.physics.engine_defaults import remove_motors, set_link_dynamics
+from sim_node.physics.touches import TouchedLinks, net_wrenches
 
+_QUATERNION = 4  # numbers; the engine has one for a ball joint
 _FAR = 1e3  # m, beyond which the engine need not look for what is near
 
 
-class Touch(NamedTuple):
-    """One contact as one of its two links feels it; world axes."""
-
-    link: int  # the engine's number
-    force: Sequence[float]  # (3,) N
-    point: Sequence[float]  # (3,) m, where the engine let the force act
-
-
-TouchedLinks: TypeAlias = Mapping[int, Sequence[Touch]]
-"""By body number, what touches its links."""
+BaseFrame: TypeAlias = tuple[frames.Triple, frames.Quaternion, frames.Axes]
+"""Origin in m, orientation xyzw and axes of a base link in the world."""
 
 
 class Body:
@@ -56,7 +50,9 @@ class Body:
         self._turns_back = rotations.conjugate(turns)
         self._base_offset = poses[0].position
         self._base_turn = turns[0]
+        self._base_is_inertial = poses[0] == Pose()
         self._base_turn_back: list[float] = self._turns_back[0].tolist()
+        self._base_read: BaseFrame | None = None  # since the engine's last step
         self._find_joints(character)
         set_link_dynamics(client, self._body, friction)
         pairs = zip(self._joints, self._axes, strict=True)
@@ -85,30 +81,35 @@ class Body:
             frames.axes(turns[joint.name]) if joint.type is JointType.SPHERICAL else None
             for joint in joints
         ]
+        pairs = zip(self._entries, self._axes, strict=True)
+        self._balls = [(entries, axes) for entries, axes in pairs if axes is not None]
+        # most inertial frames are not: then their axes alter nothing but the sign of zeros
+        self._turned = [ball for ball in self._balls if ball[1] != frames.NO_TURN]
 
-    def read(self) -> tuple[FloatArray, FloatArray]:
-        """Position and velocity (n,)."""
+    def read(self) -> FloatArray:
+        """Position and velocity, (2, n)."""
         position: list[float] = []
         velocity: list[float] = []
         if self._floating:
             origin, motion, turn = self._read_base()
-            position += (*origin, *frames.rotation_vector(turn))
+            position += origin
+            position += frames.rotation_vector(turn)
             velocity += motion
-        states: tuple[Any, ...] = ()
         if self._joints:
             states = pybullet.getJointStatesMultiDof(
                 self._body, self._joints, physicsClientId=self._client
             )
-        for (value, speed, *_), axes in zip(states, self._axes, strict=True):
-            if axes is not None:
-                value = frames.to_parent(axes, frames.rotation_vector(value))
-                speed = frames.to_parent(axes, speed)
-            position += value
-            velocity += speed
-        return np.array(position), np.array(velocity)
+            for value, speed, _, _ in states:
+                position += frames.rotation_vector(value) if len(value) == _QUATERNION else value
+                velocity += speed
+        for entries, axes in self._turned if all(position) and all(velocity) else self._balls:
+            position[entries] = frames.to_parent(axes, position[entries])
+            velocity[entries] = frames.to_parent(axes, velocity[entries])
+        return np.array(position + velocity).reshape(2, -1)
 
     def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
         """Put the character into a state given as `read` gives it."""
+        self.forget_reading()
         if self._floating:
             self._place_base(position[:3], rotations.exp(position[3:6]))
             self._set_base_velocity(velocity[:3], velocity[3:6])
@@ -125,13 +126,16 @@ class Body:
                 physicsClientId=self._client,
             )
 
+    def forget_reading(self) -> None:
+        """Forget what was read last: the engine's state is set to another one."""
+        self._base_read = None
+
     def apply(self, effort: FloatArray) -> None:
         """Apply a generalised effort (n,) during the engine's next step, and only then."""
         values = effort.tolist()
-        forces = [
-            values[entries] if axes is None else frames.to_child(axes, values[entries])
-            for entries, axes in zip(self._entries, self._axes, strict=True)
-        ]
+        for entries, axes in self._turned:
+            values[entries] = frames.to_child(axes, values[entries])
+        forces = [values[entries] for entries in self._entries]
         pybullet.setJointMotorControlMultiDofArray(
             self._body,
             self._joints,
@@ -140,15 +144,16 @@ class Body:
             physicsClientId=self._client,
         )
         if self._floating and any(values[:6]):
-            self._apply_to_base(effort[:3], effort[3:6])
+            self._apply_to_base(values[:3], values[3:6])
+        self._base_read = None  # the engine's next step moves it
 
-    def _apply_to_base(self, force: FloatArray, torque_in_base: FloatArray) -> None:
+    def _apply_to_base(self, force: Sequence[float], torque_in_base: Sequence[float]) -> None:
         """Apply a force (N, world) at the base link's origin, and a torque (N m, base frame)."""
-        origin, _, axes = self._base_frame()
+        origin, _, axes = self._base_read or self._base_frame()
         pybullet.applyExternalForce(
             self._body, -1, force, origin, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
-        torque = frames.to_parent(axes, torque_in_base.tolist())
+        torque = frames.to_parent(axes, torque_in_base)
         pybullet.applyExternalTorque(
             self._body, -1, torque, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
@@ -199,29 +204,8 @@ class Body:
     def contact_wrenches(
         self, touched: TouchedLinks, centres: Sequence[Sequence[float]]
     ) -> tuple[FloatArray, BoolArray]:
-        """Net contact wrench (links, 6) of what touches, world axes; and which links do (links,).
-
-        It is the force in N, and the torque in N m about `centres` (links, 3), the links' centres
-        of mass when the engine's step began. A contact between two links of the body counts on
-        both, in opposite directions.
-        """
-        sums: dict[int, list[float]] = {}  # by row; plain numbers: of few contacts it is faster
-        for number, (fx, fy, fz), (px, py, pz) in touched.get(self._body, ()):
-            row = self._row[number]
-            cx, cy, cz = centres[row]
-            x, y, z = px - cx, py - cy, pz - cz
-            total = sums.setdefault(row, [0.0] * 6)
-            total[0] += fx
-            total[1] += fy
-            total[2] += fz
-            total[3] += y * fz - z * fy
-            total[4] += z * fx - x * fz
-            total[5] += x * fy - y * fx
-        wrenches = np.zeros((len(self._numbers), 6))
-        touching = np.zeros(len(self._numbers), dtype=np.bool_)
-        for row, total in sums.items():
-            wrenches[row], touching[row] = total, True
-        return wrenches, touching
+        """Net contact wrench (links, 6) of what touches; and which links do: see `net_wrenches`."""
+        return net_wrenches(touched.get(self._body, ()), self._row, centres)
 
     def gaps(self, other: int) -> FloatArray:
         """Distance (links,) of each link's surface to another body's, m; inf where there is none.
@@ -253,11 +237,12 @@ class Body:
         )
         return (base, *states)
 
-    def _base_frame(self) -> tuple[frames.Triple, frames.Quaternion, frames.Axes]:
-        """Origin in m, orientation xyzw and axes of the base link in the world."""
+    def _base_frame(self) -> BaseFrame:
         com, inertial_turn = pybullet.getBasePositionAndOrientation(
             self._body, physicsClientId=self._client
         )
+        if self._base_is_inertial and all(com) and all(inertial_turn):
+            return com, inertial_turn, frames.axes(inertial_turn)
         turn = frames.product(inertial_turn, self._base_turn_back)
         axes = frames.axes(turn)
         x, y, z = frames.to_parent(axes, self._base_offset)
@@ -265,9 +250,12 @@ class Body:
 
     def _read_base(self) -> tuple[frames.Triple, tuple[float, ...], frames.Quaternion]:
         """Origin, velocity (6,) and orientation xyzw of the floating base, message form."""
-        origin, turn, axes = self._base_frame()
-        (vx, vy, vz), angular = pybullet.getBaseVelocity(self._body, physicsClientId=self._client)
+        self._base_read = origin, turn, axes = self._base_frame()
+        linear, angular = pybullet.getBaseVelocity(self._body, physicsClientId=self._client)
         angular_in_base = frames.to_child(axes, angular)
+        if self._base_is_inertial and all(linear):
+            return origin, (*linear, *angular_in_base), turn
+        vx, vy, vz = linear
         x, y, z = frames.to_parent(axes, frames.cross(angular_in_base, self._base_offset))
         return origin, (vx - x, vy - y, vz - z, *angular_in_base), turn
 

@@ -49,6 +49,7 @@ class PassiveForces:
         self._model = DynamicsModel(character) if self._limits else None
         wanted = character.passive_damping()
         self._damping = bounded_damping(wanted, inverse_mass, step_s)
+        self._undamping = -self._damping  # N m s/rad or N s/m
         self.active = bool(self._limits or wanted.any())
         self.warnings = tuple(
             f"the passive damping of '{name}' is kept at {applied:.3g} of {asked:.3g}: more would "
@@ -61,12 +62,12 @@ class PassiveForces:
 
     def effort(self, position: FloatArray, velocity: FloatArray) -> FloatArray:
         """The passive effort (n,) in a state, message form; N m or N."""
-        effort: FloatArray = -self._damping * velocity
+        effort: FloatArray = self._undamping * velocity
         if self._model is None:
             return effort
         bounds, rows = [], []
         turns, spins = position.tolist(), velocity.tolist()
-        for entries, limit in self._limits:
+        for entries, limit in self._near_limits(turns, spins):
             for bound in passed_bounds(limit, turns[entries], spins[entries], self._step_s):
                 bounds.append(bound)
                 rows.append(np.zeros(len(effort)))
@@ -77,6 +78,26 @@ class PassiveForces:
             forces = complementary_forces(bounds, self._model.delassus_matrix(jacobian))
             effort -= fixed_order.apply(jacobian.T, forces)
         return effort
+
+    def _near_limits(
+        self, turns: Sequence[float], spins: Sequence[float]
+    ) -> list[tuple[slice, SoftLimit]]:
+        """The limits that some component of a rotation vector is beyond, or within reach of.
+
+        Of all joints' rotation vectors (n,) in rad and angular velocities (n,) in rad/s.
+        """
+        # up to two thirds of a turn a rotation vector is less than twice as fast as its joint
+        near, twice_step = [], 2.0 * self._step_s
+        for joint in self._limits:
+            entries, limit = joint
+            (ax, ay, az), (bx, by, bz) = limit.lower, limit.upper
+            u, v, w = spins[entries]
+            reach = twice_step * math.sqrt(u * u + v * v + w * w)
+            x, y, z = turns[entries]
+            below = x < ax + reach or y < ay + reach or z < az + reach
+            if below or x > bx - reach or y > by - reach or z > bz - reach:
+                near.append(joint)
+        return near
 
 
 class PassedBound(NamedTuple):
@@ -94,11 +115,6 @@ def passed_bounds(
 
     Its rotation vector (3,) in rad, its angular velocity (3,) in the child frame in rad/s.
     """
-    x, y, z = spin
-    # up to two thirds of a turn a rotation vector is less than twice as fast
-    reach = 2.0 * step_s * math.sqrt(x * x + y * y + z * z)
-    if not _is_near(turn, limit, reach):
-        return
     turn = closest_rotation_vector(turn, limit)
     jacobian = frames.right_jacobian_inverse(turn)
     rates = frames.to_parent(jacobian, spin)
@@ -116,14 +132,6 @@ def passed_bounds(
                 explicit,
                 step_s * (limit.stiffness * step_s + limit.damping),
             )
-
-
-def _is_near(turn: Sequence[float], limit: SoftLimit, reach: float) -> bool:
-    """Whether a component of a rotation vector (3,) is beyond a bound, or within reach of it."""
-    for part, lower, upper in zip(turn, limit.lower, limit.upper, strict=True):
-        if part < lower + reach or part > upper - reach:
-            return True
-    return False
 
 
 def closest_rotation_vector(turn: Sequence[float], limit: SoftLimit) -> Sequence[float]:

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from msgs_config.character.effort_limits import EffortLimits
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedState
-from sim_node.physics.body import Body, TouchedLinks
+from sim_node.physics.body import Body
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.projectiles import Projectiles
+from sim_node.physics.touches import TouchedLinks
 from sim_node.physics.wrenches import ExternalWrench
 
 
@@ -62,8 +64,12 @@ class SimulatedCharacter:
     pushes: tuple[ExternalWrench, ...]  # that acted during the last tick
     balls: Projectiles  # of the world that it is in
 
-    def __init__(self, setup: CharacterSetup, *, delay_ticks: int, step_s: float) -> None:
+    def __init__(
+        self, setup: CharacterSetup, *, delay_ticks: int, step_s: float, speed_limit: float
+    ) -> None:
         """Check the setup, for efforts that come late by some ticks and engine steps of `step_s`.
+
+        A speed beyond the limit, in rad/s or m/s, counts as divergence.
 
         Raises:
             ConfigurationError: an array does not fit the character.
@@ -73,12 +79,14 @@ class SimulatedCharacter:
         self.character = setup.character
         self.layout = setup.character.layout
         self.commanded: BoolArray = self.layout.mask(setup.commanded_joints)
-        self._limits = setup.character.effort_limits()
-        self.saturated_ticks: IntArray = np.zeros(len(self._limits), dtype=np.intp)  # (b,)
+        self._limits = EffortLimits(self.layout, setup.character.effort_limits())
+        self.saturated_ticks: IntArray = np.zeros(len(self._limits.values), dtype=np.intp)  # (b,)
         self._position = self._initial("initial_position", setup.initial_position)
         self._velocity = self._initial("initial_velocity", setup.initial_velocity)
         self._passive = PassiveForces(setup.character, step_s, setup.inverse_mass)
         self._delay_ticks = delay_ticks
+        # (2, n) largest position and velocity of a sound state
+        self._bounds = np.array([[np.finfo(float).max], [speed_limit]]).repeat(self.layout.size, 1)
 
     def begin_in(self, position: FloatArray, velocity: FloatArray) -> None:
         """Make a state, each (n,), the initial one of every world that it enters from now on."""
@@ -104,9 +112,9 @@ class SimulatedCharacter:
         """Take the effort (n,) and the pushes of a tick."""
         self._delayed.append(effort + 0.0)  # -0.0 becomes 0.0: a tick has one effort, to the bit
         wanted = self._delayed.popleft()
-        self._applied = self.layout.clipped(wanted, self._limits)
+        self._applied = self._limits.clipped(wanted)
         if self._applied is not wanted:
-            self.saturated_ticks += self.layout.norms(wanted) > self._limits
+            self.saturated_ticks += self.layout.norms(wanted) > self._limits.values
         self.pushes = tuple(pushes)
         self.contacts = self._no_contacts() if watches_contacts else None
 
@@ -149,6 +157,7 @@ class SimulatedCharacter:
         self.state, self.contacts, self.pushes = snapshot.state, snapshot.contacts, snapshot.pushes
         self._delayed = deque(snapshot.delayed)
         self.saturated_ticks = snapshot.saturated_ticks.copy()
+        self._body.forget_reading()
 
     def link_frames(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""
@@ -158,17 +167,16 @@ class SimulatedCharacter:
         """Origin (3,) in m and orientation xyzw (4,) of the base link in the world."""
         return self._body.base_frame()
 
-    def check_divergence(self, tick: int, speed_limit: float) -> None:
-        """Raise SimulationError if the state is not finite or faster than a limit."""
-        state = self.state
-        speed = np.abs(state.velocity)
-        sound = (speed <= speed_limit) & np.isfinite(state.position)  # NaN is unsound
-        if not sound.all():
-            worst = int(np.argmin(sound))
+    def check_divergence(self, tick: int) -> None:
+        """Raise SimulationError if the state is not finite or faster than the limit."""
+        sound = np.abs(self._motion) <= self._bounds  # NaN is unsound
+        if np.count_nonzero(sound) < sound.size:
+            state = self.state
+            worst = int(np.argmin(sound.all(axis=0)))
             raise SimulationError(
                 f"diverged at tick {tick}: '{self.setup.prefix}{self.layout.dof_names[worst]}' is "
                 f"at {state.position[worst]:.4g} with velocity {state.velocity[worst]:.4g}; "
-                f"the limit is {speed_limit:g}"
+                f"the limit is {self._bounds[1, worst]:g}"
             )
 
     def _no_contacts(self) -> Contacts:
@@ -176,7 +184,8 @@ class SimulatedCharacter:
         return Contacts(np.zeros((links, 6)), np.zeros(links, dtype=np.bool_))
 
     def _read(self, stamp_ns: int, effort: FloatArray | None) -> None:
-        position, velocity = self._body.read()
+        self._motion = self._body.read()
+        position, velocity = self._motion
         self.state = StampedState(stamp_ns, position, velocity, effort)
 
     def _initial(self, name: str, values: tuple[float, ...]) -> FloatArray:

@@ -66,7 +66,10 @@ class Simulation:
         self.clock = TickClock(settings.rate_hz)
         self.characters = tuple(
             SimulatedCharacter(
-                setup, delay_ticks=settings.command_delay_ticks, step_s=settings.world.step_s
+                setup,
+                delay_ticks=settings.command_delay_ticks,
+                step_s=settings.world.step_s,
+                speed_limit=settings.speed_limit,
             )
             for setup in setups
         )
@@ -133,7 +136,7 @@ class Simulation:
             character.end_tick(self.stamp_ns)
         try:
             for character in self.characters:
-                character.check_divergence(self.tick, self.settings.speed_limit)
+                character.check_divergence(self.tick)
         except SimulationError:
             self.tick -= 1  # that state is not published; a reset's first one has its stamp
             raise

@@ -10,8 +10,9 @@ from typing import ClassVar
 from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.body import Body, Touch, TouchedLinks
+from sim_node.physics.body import Body
 from sim_node.physics.projectiles import Projectiles
+from sim_node.physics.touches import Touch, TouchedLinks
 
 _STATE_FILE = "state.bullet"  # the engine writes to files alone
 

@@ -96,3 +96,17 @@ def test_another_simulation_goes_on_from_a_snapshot(
 
         assert other.tick == 91
         assert advance(plan, other, TICKS).tobytes() == followed.tobytes()
+
+
+def test_efforts_on_the_root_act_where_the_saved_state_has_it() -> None:
+    walk: dict[str, object] = {"reference": "clip", "clip": "walk"}
+    plan = make_plan("humanoid", 10.0, walk, {}, {"root_assistance": True})
+    with fresh(plan) as simulation:
+        advance(plan, simulation, TICKS)
+        saved = simulation.snapshot()
+        followed = advance(plan, simulation, TICKS)
+        advance(plan, simulation, TICKS, noise=1.0)
+
+        simulation.load_snapshot(saved)
+
+        np.testing.assert_array_equal(advance(plan, simulation, TICKS), followed)
