@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller_node.control_laws import pd_effort, stable_pd_effort
+from controller_node.control_laws import anti_windup_mask, pd_effort, stable_pd_effort
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from sim_node.physics.simulation import Simulation
-from tests.support.physics import DenseDynamics, simulation
+from tests.support.physics import DenseDynamics, character, simulation
 
 MASS = 1.0  # kg, of the character `lift`
 RATE = 240
@@ -154,3 +154,12 @@ def test_with_substeps_explicit_pd_needs_damping_too() -> None:
     stiffness = largest_stable(lambda kp: pd(kp, damping), 0.5 * bound, 2.0 * bound, substeps)
 
     assert stiffness == pytest.approx(bound, rel=0.05)
+
+
+@pytest.mark.parametrize("excess", [1e-6, 0.5, 20.0])
+def test_an_integral_waits_however_little_its_effort_is_beyond_the_limit(excess: float) -> None:
+    layout, limit, error = character("lift").layout, np.array([10.0]), np.ones(1)
+
+    assert anti_windup_mask(limit + excess, limit, error, layout).all()
+    assert not anti_windup_mask(limit + excess, limit, -error, layout).any()
+    assert not anti_windup_mask(limit, limit, error, layout).any()

@@ -24,6 +24,7 @@ from actuated_characters.runs.run_directory import prepare_directory, read_metri
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
@@ -31,7 +32,7 @@ from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
 from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.physics import character
-from tests.support.ros import Processes
+from tests.support.ros import Processes, SimulatorClient
 from tests.support.runs import family, run_plan
 
 RATE = 240
@@ -276,3 +277,16 @@ def test_a_pusher_without_its_file_ends_with_one_clear_line(
     assert node.wait() == 1
     (line,) = node.stderr.splitlines()
     assert line.startswith(f"error: {file} holds no pushes: ")
+
+
+def test_by_default_all_is_sent_to_the_first_who_listens(
+    processes: Processes, client: SimulatorClient, tmp_path: Path
+) -> None:
+    write_planned(tmp_path / "pushes.json", PLANNED)
+    write_planned(tmp_path / "throws.json", BALLS)
+    pushes, throws = client.listen(topics.EXTERNAL_WRENCH), client.listen(topics.THROW)
+
+    processes.node("pusher", file="pushes.json", throws="throws.json")
+
+    client.spin_until(lambda: len(throws) == len(BALLS), "the throws")
+    client.spin_until(lambda: len(pushes) == len(PLANNED), "the pushes")

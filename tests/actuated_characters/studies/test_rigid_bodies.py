@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from actuated_characters.studies import joint_torque, rigid_body
 from actuated_characters.studies.framework.bodies import HINGE, Box, momenta, write_box
+from actuated_characters.studies.framework.plots import draw_over_theory
 from actuated_characters.studies.framework.result import StudyResult
 from actuated_characters.studies.framework.study import RunSpec
 from actuated_characters.studies.theory.euler import (
@@ -177,6 +179,14 @@ def test_forces_that_sum_to_zero_have_the_torque_about_any_point() -> None:
 
 
 # The studies
+
+
+def test_of_theory_a_legend_says_once_what_it_is() -> None:
+    axes = Figure().subplots()
+
+    draw_over_theory(axes, np.arange(4.0), np.zeros((4, 3)), np.ones((4, 3)), "xyz")
+
+    assert axes.get_legend_handles_labels()[1] == ["x", "y", "z", "theory"]
 
 
 @pytest.fixture(scope="module")

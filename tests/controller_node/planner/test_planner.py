@@ -271,6 +271,21 @@ def test_a_plan_that_is_taken_late_says_when_from_there() -> None:
     np.testing.assert_allclose(controller.outlook.times, 0.05 * np.arange(1, 7) - 2 / 240)
 
 
+@pytest.mark.parametrize(("tick", "is_over"), [(66, False), (67, True)])
+def test_a_plan_is_over_when_it_would_end_before_the_next_one_acts(
+    tick: int, is_over: bool
+) -> None:
+    """In real time states are skipped: the plan of tick 0 ends in tick 72, 5 ticks are delay."""
+    controller = a_controller(planning_delay_ticks=5)
+    sent = states(controller, tick + 1)
+    controller.compute_effort(sent[0], sent[0].stamp_ns)
+    before = controller.outlook
+
+    controller.compute_effort(sent[tick], sent[0].stamp_ns)
+
+    assert (controller.outlook is not before) == is_over
+
+
 def test_what_is_done_while_a_plan_is_waited_for_changes_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -538,16 +553,31 @@ def check_a_run_that_ended_at_once(recording: Recording) -> None:
     assert len(plan_chart(short, Marks()).axes) == 4
 
 
-BROKEN: dict[str, Callable[[PointCloud2], None]] = {
-    "a field is missing": lambda message: message.fields.pop(),
-    "a field is a float": lambda message: setattr(message.fields[0], "datatype", 7),
-    "its data are short": lambda message: setattr(message, "data", message.data[:-8]),
-    "its points are short": lambda message: setattr(message, "point_step", 8),
-    "its times go back": lambda message: setattr(message, "data", 2 * message.data[:216]),
-    "its times are no numbers": lambda message: setattr(message, "data", b"\xff" * 432),
-    "it has no points": lambda message: (
-        setattr(message, "width", 0),
-        setattr(message, "data", b""),
+BROKEN: dict[str, tuple[Callable[[PointCloud2], object], str]] = {
+    "a field is missing": (lambda message: message.fields.pop(), "a plan without its fields"),
+    "a field is a float": (
+        lambda message: setattr(message.fields[0], "datatype", 7),
+        "a plan without its fields",
+    ),
+    "its data are short": (
+        lambda message: setattr(message, "data", message.data[:-8]),
+        "a plan of 424 bytes that should be 432",
+    ),
+    "its points are short": (
+        lambda message: setattr(message, "point_step", 8),
+        "a plan of 432 bytes that should be 48",
+    ),
+    "its times go back": (
+        lambda message: setattr(message, "data", 2 * message.data[:216]),
+        "a plan whose times",
+    ),
+    "its times are no numbers": (
+        lambda message: setattr(message, "data", b"\xff" * 432),
+        "a plan whose times",
+    ),
+    "it has no points": (
+        lambda message: (setattr(message, "width", 0), setattr(message, "data", b"")),
+        "a plan of 0 bytes that should be 0",
     ),
 }
 
@@ -560,9 +590,10 @@ def test_what_is_no_plan_is_not_read_as_one(case: str) -> None:
     assert controller.outlook is not None
     message = plan_message(controller.outlook, state.stamp_ns)
     whole = decode_plan(serialize_message(message))
-    BROKEN[case](message)
+    alter, said = BROKEN[case]
+    alter(message)
 
-    with pytest.raises(MessageError, match="a plan"):
+    with pytest.raises(MessageError, match=said):
         decode_plan(serialize_message(message))
 
     assert whole.stamp_ns == state.stamp_ns

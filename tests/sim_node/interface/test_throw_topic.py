@@ -128,6 +128,8 @@ def test_balls_are_shown_where_they_are_until_a_reset(
     before, last = markers_at(shown, 2), markers_at(shown, tick_of(state))
     *body, ball = last
     assert [m.id for m in before] == [m.id for m in body]
+    until_reset = [m for tick in range(2, tick_of(state)) for m in markers_at(shown, tick)]
+    assert {m.action for m in until_reset} == {Marker.ADD}  # a ball that comes deletes nothing
     assert (ball.header.frame_id, ball.action, ball.type) == ("world", Marker.ADD, Marker.SPHERE)
     assert ball.id not in {m.id for m in body}
     assert ball.color.a > 0.0
