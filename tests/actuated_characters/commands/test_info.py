@@ -11,6 +11,7 @@ from std_msgs.msg import String
 
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
+from actuated_characters.commands.common.tables import show
 from actuated_characters.report.contents import read_contents
 from actuated_characters.report.facts import BagFacts, as_json, look_at
 from actuated_characters.report.timing import lateness, pauses, state_times
@@ -307,6 +308,21 @@ def test_the_tables_are_printed(
         "gains and limits in force",
     ):
         assert words in output
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "-"),
+        (float("nan"), "-"),
+        (0.123456, "0.1235"),
+        (7, "7"),
+        ({}, "none"),
+        ({"left": 2, "right": 3}, "left: 2, right: 3"),
+    ],
+)
+def test_a_table_has_a_dash_where_nothing_is_known(value: object, text: str) -> None:
+    assert show(value) == text
 
 
 # The wall clock

@@ -1,4 +1,4 @@
-"""Which settings of the middleware a node takes up."""
+"""What a node takes from its environment and its command line."""
 
 from pathlib import Path
 from xml.etree import ElementTree
@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from msgs_config.runtime.process import middleware_settings
-from tests.support.ros import DDS_PROFILES, RANGE
+from tests.support.ros import DDS_PROFILES, RANGE, Processes
 
 LOCALHOST = {RANGE: "LOCALHOST"}
 FOLDER = Path(__file__).parents[3] / "msgs_config/runtime"
@@ -51,3 +51,20 @@ def test_both_files_have_the_same_timers() -> None:
         return {name: " ".join(values) for name, values in found.items()}
 
     assert timers(ANYWHERE_FILE) == timers(LOCALHOST_FILE)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["humanoid"], "unknown argument 'humanoid'; "),
+        (["--ros-args", "-p", "humanoid"], "ROS does not take the arguments: "),
+    ],
+)
+def test_a_wrong_argument_is_one_line(
+    processes: Processes, arguments: list[str], said: str
+) -> None:
+    node = processes.python("-m", "sim_node.main", *arguments)
+
+    assert node.wait() == 1
+    (line,) = node.stderr.splitlines()
+    assert line.startswith(f"error: {said}")
