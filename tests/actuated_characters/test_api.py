@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pybullet
 import pytest
 
 import actuated_characters as ac
@@ -118,6 +119,24 @@ def test_a_reset_is_a_fresh_world(pendulum: ac.Character, world: ac.Simulation) 
     assert (*elsewhere.position, *elsewhere.velocity) == (0.3, -1.0)
     with ac.Simulation(pendulum, start) as fresh:
         assert np.array_equal(world.step(effort).position, fresh.step(effort).position)
+
+
+def test_a_world_that_is_left_or_closed_has_no_engine(pendulum: ac.Character) -> None:
+    before = engines()
+
+    with ac.Simulation(pendulum):
+        assert engines() == before + 1
+    assert engines() == before
+    other = ac.Simulation(pendulum)
+    other.close()
+
+    assert engines() == before
+
+
+def engines() -> int:
+    """How many of PyBullet's engines there are in this process."""
+    connections = (pybullet.getConnectionInfo(client) for client in range(64))
+    return sum(connection["isConnected"] for connection in connections)
 
 
 def test_parameters_act_on_both_sides(pendulum: ac.Character) -> None:

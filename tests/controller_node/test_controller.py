@@ -255,3 +255,24 @@ def test_an_episode_of_the_same_stamp_that_is_begun_has_nothing_of_the_one_befor
     # Assert
     again = [driver.compute_effort(state, stamp(1))[0].tobytes() for state in (first, second)]
     assert again == before
+
+
+@pytest.mark.parametrize("kind", ["trajectory", "strengths"])
+def test_what_comes_ahead_of_an_episodes_first_state_counts_in_that_episode(kind: str) -> None:
+    before, *sent = states(6)
+    ahead = stamp(2)
+
+    def answers(episode: int | None) -> bytes:
+        """In the episode that begins with tick 2, after what was sent for some episode."""
+        driver = walker()
+        driver.compute_effort(before, stamp(1))
+        if kind == "trajectory" and episode is not None:
+            points = points_of_lists(["left_knee"], [0.1], [[-1.0]], [[]], [[]])
+            driver.set_trajectory(points, start_ns=ahead, now_ns=ahead, episode_ns=episode)
+        elif episode is not None:
+            weak = strengths_of(HUMANOID, ("left_knee",), (0.1,), ahead)
+            driver.set_strengths(weak, episode_ns=episode)
+        return np.array([driver.compute_effort(state, ahead)[0] for state in sent]).tobytes()
+
+    assert answers(stamp(1)) == answers(None)
+    assert answers(ahead) != answers(None)

@@ -293,16 +293,19 @@ def changed(file: Path, tmp_path: Path, **made: object) -> Path:
 
 
 def test_pushes_that_it_was_found_with_come_again_unless_others_are_given(
-    kick: tuple[Path, Reconstruction], tmp_path: Path
+    kick: tuple[Path, Reconstruction], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, one = changed(kick[0], tmp_path, pushes=PUSHES), ("--push", PUSHES[0])
 
-    known = hash_of(file, tmp_path / "known")
+    known, known_said = hash_of(file, tmp_path / "known"), capsys.readouterr().out
     none = hash_of(file, tmp_path / "none", "--push", "none")
     other = hash_of(file, tmp_path / "other", *one)
+    others_said = capsys.readouterr().out
 
     assert none == kick[1].metrics.state_hash != known
     assert other == hash_of(kick[0], tmp_path / "2", *one) not in (known, none)
+    brought = f"brings {len(PUSHES)} pushes (--push none: without them)"
+    assert brought in " ".join(known_said.split()) and "brings" not in others_said
 
 
 def test_pushes_that_would_begin_at_the_end_or_later_are_left_out() -> None:

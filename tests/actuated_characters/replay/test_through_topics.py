@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import yaml
 from rclpy.context import Context
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -470,6 +471,10 @@ def test_the_command_shows_what_another_gain_changes(
 WRONG_OPTIONS: dict[str, tuple[list[str], str]] = {
     "a setting of no use": (["--set", "controller_node.law:=pd"], "--through-topics simulator"),
     "no start of no use": (["--through-topics", "--no-start"], "--through-topics simulator"),
+    "a setting of no node": (
+        ["--through-topics", "simulator", "--set", "law:=pd"],
+        "write it as controller_node.NAME:=VALUE",
+    ),
     "another node's setting": (
         ["--through-topics", "simulator", "--set", "sim_node.rate:=3"],
         "unknown node 'sim_node'",
@@ -502,11 +507,14 @@ def test_an_option_that_cannot_be_used_is_refused_in_a_line(
     assert line.startswith("error: ") and expected in line
 
 
+@pytest.mark.parametrize("asked", [False, True])
 def test_somebodys_own_controller_is_waited_for_and_compared(
-    processes: Processes, foreign: Path, domain: int
+    processes: Processes, foreign: Path, domain: int, tmp_path: Path, *, asked: bool
 ) -> None:
+    """Requests of another controller in the bag are none to it: it need not hear them."""
+    bag = with_a_request(foreign / "bag", tmp_path / "asked") if asked else foreign
     options = ["--through-topics", "simulator", "--no-start"]
-    process = processes.command("replay", str(foreign), *options)
+    process = processes.command("replay", str(bag), *options)
     wait_until(lambda: "waiting for a controller" in process.stderr, "it says what it waits for")
 
     processes.python(str(EXAMPLE))
@@ -514,6 +522,21 @@ def test_somebodys_own_controller_is_waited_for_and_compared(
     assert process.wait() == 0
     assert f"ROS_DOMAIN_ID={domain}" in process.stdout
     assert "identical: the commands that answer" in process.stdout
+
+
+def with_a_request(bag: Path, target: Path) -> Path:
+    """A copy of a bag with a trajectory that somebody asked for, in place of the contacts."""
+    requests = iter([serialize_message(JointTrajectory())])
+
+    def change(message: RecordedMessage) -> bytes | None:
+        return next(requests, None) if message.topic == "/contacts" else message.raw
+
+    def rename(name: str) -> str:
+        return f"/{REQUESTS[0].name}" if name == "/contacts" else name
+
+    rewrite(bag, target, change, rename)
+    assert read_rare_messages(target, read_recording(target)).requested == {REQUESTS[0].name}
+    return target
 
 
 def test_another_controller_is_found_at_its_first_answer(

@@ -335,6 +335,7 @@ WRONG: list[tuple[str, ...]] = [  # a command, and what its error names
     (f"{PENDULUM} --exclude contcts", "'contcts'", "mean 'contacts'"),
     (f"{PENDULUM} --exclude joint_states", "'joint_states'"),
     (f"{SET} sim_node.rate=240", "sim_node.rate=240", ":="),
+    (f"{SET} rate:=240", "write it as NODE.NAME:=VALUE"),
     (
         "run --duration 1 --in-process --throw 'mass=2 speed=8 at=0.9 target=chset'",
         *("throw 'mass=2", "did you mean 'chest'"),

@@ -201,6 +201,19 @@ def test_one_hit_has_one_reaction_however_short(duration: float, impulse: float)
     assert whole.modes[2].phase.facts["impulse"] == pytest.approx(impulse, rel=0.2)
 
 
+def test_a_harder_hit_while_it_reacts_makes_it_go_limp() -> None:
+    slow, fast = (
+        ProjectileThrow(speed, tick, direction=FROM_FRONT)
+        for speed, tick in ((5.0, 240), (20.0, 250))
+    )
+
+    whole = run({"clip": "walk", "behaviour": "reactive"}, 300, (slow, fast), mass=2.0)
+
+    assert whole.mode_names() == ["TRACK", "REACT", "LIMP"]
+    facts = whole.modes[-1].phase.facts
+    assert facts["why"] == "hit" and facts["impulse"] >= THRESHOLD
+
+
 def test_the_response_grows_with_the_impulse() -> None:
     nominal = unhit().positions
     peaks = []
