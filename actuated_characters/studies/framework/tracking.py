@@ -47,7 +47,7 @@ def lag(angle: FloatArray, reference: FloatArray, period: float, longest: float)
     shifted = np.lib.stride_tricks.sliding_window_view(angle, len(middle))  # by -most, ..., most
     shifted = shifted - shifted.mean(axis=1, keepdims=True)
     lengths = np.linalg.norm(shifted, axis=1)
-    products = shifted @ (middle - middle.mean())
+    products = shifted @ middle  # rows without a mean: that of `middle` adds nothing
     correlation = np.divide(products, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
     best = int(correlation.argmax())
     between = 0.0
