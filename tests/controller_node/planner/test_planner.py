@@ -590,10 +590,10 @@ def test_what_is_no_plan_is_not_read_as_one(case: str) -> None:
     assert controller.outlook is not None
     message = plan_message(controller.outlook, state.stamp_ns)
     whole = decode_plan(serialize_message(message))
-    alter, said = BROKEN[case]
+    alter, text = BROKEN[case]
     alter(message)
 
-    with pytest.raises(MessageError, match=said):
+    with pytest.raises(MessageError, match=text):
         decode_plan(serialize_message(message))
 
     assert whole.stamp_ns == state.stamp_ns

@@ -54,17 +54,17 @@ def test_both_files_have_the_same_timers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "output"),
     [
         (["humanoid"], "unknown argument 'humanoid'; "),
         (["--ros-args", "-p", "humanoid"], "ROS does not take the arguments: "),
     ],
 )
 def test_a_wrong_argument_is_one_line(
-    processes: Processes, arguments: list[str], said: str
+    processes: Processes, arguments: list[str], output: str
 ) -> None:
     node = processes.python("-m", "sim_node.main", *arguments)
 
     assert node.wait() == 1
     (line,) = node.stderr.splitlines()
-    assert line.startswith(f"error: {said}")
+    assert line.startswith(f"error: {output}")
