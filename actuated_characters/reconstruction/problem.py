@@ -45,7 +45,9 @@ class Problem:
         Raises:
             ActuatedCharactersError: a name or value is wrong.
         """
-        return self._plan(self.clip, {**_PLANNING, **self.controller, "plan.workers": 1})
+        gives_way = {"plan.gives_way": bool(self.pushes)}  # else the clip's own place is wanted
+        planning = {**_PLANNING, **gives_way, **self.controller, "plan.workers": 1}
+        return self._plan(self.clip, planning)
 
     def plan_of(self, file: Path) -> RunPlan:
         """The run in which a file's plan is played. Raises ActuatedCharactersError likewise."""

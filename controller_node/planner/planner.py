@@ -255,6 +255,8 @@ class PredictivePlanner:
         """A state in the reference's world, (q,) and (n,), which may have given way to it."""
         position = self._model.position_of(state.position)
         velocity = state.velocity.copy()  # a message's cannot be written to: another type
+        if not self.settings.gives_way:
+            return position, velocity
         seen = self._anchor.to_reference_world(position, velocity)
         features = self._rollouts.features_of(*seen, body)
         since_plan = tick - (tick if self._plan is None else self._plan.seen)

@@ -60,6 +60,12 @@ PLANNER_PARAMETERS = [
         minimum=1e-3,
         maximum=10.0,
     ),
+    Parameter(
+        "plan.gives_way",
+        True,
+        "the reference's place and heading follow a character that is pushed out of reach, and "
+        "return; without, it is always held to its own place",
+    ),
     Parameter("plan.seed", 0, "of the samples", maximum=2**53),
     Parameter("plan.friction", 0.38, "of contacts as foreseen; a margin against slips", maximum=10),
     Parameter(
@@ -94,6 +100,7 @@ class PlannerSettings:
     rounds: int
     tolerance: float
     noise: float
+    gives_way: bool  # of the reference, to what it cannot absorb
     seed: int
     friction: float
     workers: int
@@ -153,6 +160,7 @@ def make_settings(character: Character, values: Values) -> PlannerSettings:
         rounds=values.integer("plan.rounds"),
         tolerance=values.number("plan.tolerance"),
         noise=values.number("plan.noise"),
+        gives_way=values.flag("plan.gives_way"),
         seed=values.integer("plan.seed"),
         friction=values.number("plan.friction"),
         workers=values.integer("plan.workers") or len(os.sched_getaffinity(0)),

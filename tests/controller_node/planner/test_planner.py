@@ -327,6 +327,19 @@ def _after(act: Callable[[], object]) -> Callable[..., Any]:
     return later
 
 
+@pytest.mark.parametrize("gives_way", [True, False])
+def test_a_reference_gives_way_to_a_push_unless_it_is_to_stay(gives_way: bool) -> None:
+    controller = a_controller(**{"plan.gives_way": gives_way})
+    sent = states(controller, 25)
+
+    for each in sent:
+        pushed = replace(each, position=each.position + 0.4 * (ENTRIES == 0))
+        controller.compute_effort(pushed, sent[0].stamp_ns)
+
+    assert controller.outlook is not None
+    assert (abs(controller.outlook.anchor.place) > 0.05) == gives_way
+
+
 @pytest.mark.parametrize("again", [6, 9])
 def test_a_state_that_comes_while_a_plan_is_sought_is_no_news(again: int) -> None:
     """Pushed, so that the reference gives way; the plan of tick 12 is sought in tick 7."""
