@@ -39,7 +39,8 @@ class World:
     Restore right after a step: the engine keeps an effort that was applied but not stepped yet.
     """
 
-    _breaking_threshold: ClassVar = 0.02  # in force; the engine has one for all worlds of a process
+    # in force; the engine has one for all worlds of a process
+    _breaking_threshold: ClassVar[float] = WorldSettings.contact_breaking_threshold
 
     def __init__(self, settings: WorldSettings) -> None:
         """Start the engine.

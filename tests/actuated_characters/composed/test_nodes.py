@@ -185,6 +185,10 @@ def test_a_push_from_another_process_acts(processes: Processes, client: Simulato
         "a push that acted",
     )
 
+    acted = next(each for each in applied.messages if each.joint_names)
+    assert set(acted.joint_names) == {"rod"}  # sent again and again, several act at once
+    assert {each.force.x for each in acted.wrench} == {5.0}
+
 
 @pytest.mark.slow
 def test_a_reset_while_a_plan_is_waited_for_begins_a_whole_episode(
