@@ -12,8 +12,9 @@ from msgs_config.arrays import FloatArray
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.sphere_sweep import BallAndCharacter
 from sim_node.physics.world import World, WorldSettings
+from sim_node.simulation_factory import make_settings
 
-_LEAST_CHANGE = 1e-3  # m/s, of a ball's velocity in a tick beside that by gravity
+_LEAST_CHANGE = 1e-3  # m/s, of a ball's velocity in a tick beside that without the character
 _NEAR = 5e-3  # m between surfaces that have just touched, and half of what the ball moves in a tick
 _PUT_AWAY = 100.0  # m in a tick: the end of `ball_lifetime`
 
@@ -45,35 +46,45 @@ def describe_hits(
     in_order = sorted(range(len(throws)), key=lambda index: throws[index].stamp_ns)
     words = [""] * len(throws)
     for ball, index in enumerate(in_order):
-        hit = find_hit(plan, throws[index], ball, states)
+        hit = find_hit(plan, [throws[each] for each in in_order], ball, states)
         words[index] = "missed" if hit is None else f"hit '{hit[1]}' at {hit[0]:.3f} s"
     return words
 
 
 def find_hit(
-    plan: RunPlan, throw: PlannedThrow, ball: int, states: States
+    plan: RunPlan, in_order: Sequence[PlannedThrow], ball: int, states: States
 ) -> tuple[float, str] | None:
     """When a ball has first touched the character, and the link; None if it never has.
 
-    That is at the end of the first tick, s from the first state, that has changed the ball's
-    velocity, not by gravity alone, near a link. `ball` is its place in the order of throwing.
+    That is at the end of the first tick, s from the first state, in which the ball's velocity
+    became, near a link, another one than gravity, the ground and the other balls would give it.
+    `ball` is its place among the throws, which are in their order in time.
     """
-    step = 1.0 / plan.simulator.integer("rate")
-    fall = np.array((0.0, 0.0, -plan.simulator.number("gravity") * step))
-    centre, velocity = np.array(throw.throw.position), np.array(throw.throw.velocity)
-    with World(WorldSettings(ground=False)) as world:
-        both = BallAndCharacter(world, plan.character, throw.throw.radius)
+    settings = make_settings(plan.simulator)
+    step = 1.0 / settings.rate_hz
+    with World(settings.world) as alone, World(WorldSettings(ground=False)) as world:
+        both = BallAndCharacter(world, plan.character, in_order[ball].throw.radius)
         for number, (position, motion) in enumerate(states, start=1):
+            for planned in in_order[len(alone.balls.numbers) : len(motion)]:
+                alone.balls.add(planned.throw)
+            before, expected = _step_alone(alone, settings.substeps)
+            alone.balls.set_motion(motion)
             if len(motion) <= ball:
                 continue
-            moved, speed = np.linalg.norm(motion[ball, :3] - centre), np.linalg.norm(velocity)
-            change = np.linalg.norm(motion[ball, 7:10] - velocity - fall)
-            centre, velocity = motion[ball, :3], motion[ball, 7:10]
-            if moved > _PUT_AWAY:
+            centre, speed = motion[ball, :3], np.linalg.norm(before[ball, 7:10])
+            if np.linalg.norm(centre - before[ball, :3]) > _PUT_AWAY:
                 break
-            if change > _LEAST_CHANGE:
+            if np.linalg.norm(motion[ball, 7:10] - expected[ball, 7:10]) > _LEAST_CHANGE:
                 both.put_character(position)
                 gaps = both.put_ball(centre)
                 if gaps.min() < _NEAR + 0.5 * speed * step:
                     return number * step, plan.character.links[int(gaps.argmin())].name
     return None
+
+
+def _step_alone(world: World, substeps: int) -> tuple[FloatArray, FloatArray]:
+    """The balls' motion (m, 13) before and after a tick in which there is no character."""
+    before = world.balls.motion()
+    for _ in range(substeps):
+        world.step()
+    return before, world.balls.motion()

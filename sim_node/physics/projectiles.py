@@ -75,6 +75,14 @@ class Projectiles:
             self.numbers[ball], centre, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
         )
 
+    def set_motion(self, motion: FloatArray) -> None:
+        """Give the balls a motion (m, 13), as `motion` returns it."""
+        for number, row in zip(self.numbers, motion, strict=True):
+            pybullet.resetBasePositionAndOrientation(
+                number, row[:3], row[3:7], physicsClientId=self._client
+            )
+            pybullet.resetBaseVelocity(number, row[7:10], row[10:], physicsClientId=self._client)
+
     def motion(self) -> FloatArray:
         """Centre m, orientation xyzw, velocity m/s, angular velocity rad/s, world: (m, 13)."""
         client, rows = self._client, []

@@ -73,7 +73,7 @@ def first_hit(plan: RunPlan, planned: PlannedThrow) -> tuple[int, tuple[str, ...
         if found:
             break
     (tick, links) = found[0]
-    time, link = find_hit(plan, planned, 0, states) or (0.0, "")
+    time, link = find_hit(plan, [planned], 0, states) or (0.0, "")
     assert (round(time * RATE), link in links) == (tick - 1, True)
     return tick, links, states[-2][1][0]
 
