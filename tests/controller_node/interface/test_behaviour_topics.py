@@ -66,6 +66,11 @@ class Ticks:
         assert self._contacts is not None
         self._contacts.publish(self.touch(force))
 
+    def again(self, force: float) -> None:
+        """Other contacts of the tick whose state was answered."""
+        assert self._contacts is not None
+        self._contacts.publish(self.touch(force))
+
     def next(self, force: float = 0.0, *, state_first: bool = False) -> JointState:
         """The torques that answer the next state, before which a force pushed the chest."""
         self.tick += 1
@@ -149,6 +154,21 @@ def test_contacts_of_an_episode_that_was_reset_do_not_count_in_the_next(ticks: T
     ticks.next(force=1200.0)
 
     ticks.wait_told([("TRACK", 1), ("TRACK", 5), ("REACT", 8)])
+
+
+def test_contacts_of_a_tick_that_was_answered_do_not_count_with_the_next_state(
+    ticks: Ticks,
+) -> None:
+    for _ in range(3):
+        ticks.next()
+    ticks.again(force=2400.0)
+
+    for _ in range(3):
+        ticks.next()
+    ticks.next(force=1200.0)
+
+    ticks.wait_told([("TRACK", 1), ("REACT", 7)])
+    assert json.loads(ticks.modes.last.data)["impulse"] == pytest.approx(5.0)
 
 
 def test_a_contact_without_end_is_refused_in_a_line_and_ends_nothing(

@@ -79,10 +79,19 @@ def pendulum(processes: Processes, simulator: ControllerClient) -> Iterator[Pend
 def expected(start_ns: int, *positions: float) -> TrajectoryReference:
     """What the controller is to track, on time since the first tick."""
     whole = character("pendulum")
+    still = TrajectoryReference(whole, HoldReference(whole))
+    return still.replaced(points(*positions), since_first(start_ns))
+
+
+def points(*positions: float) -> TrajectoryPoints:
+    """The points of `trajectory`."""
     times = np.arange(1, len(positions) + 1) * 0.1
-    points = TrajectoryPoints(("hinge",), times, np.array(positions).reshape(-1, 1))
-    start = (start_ns - CLOCK.stamp_ns(1)) / 1e9
-    return TrajectoryReference(whole, HoldReference(whole)).replaced(points, start)
+    return TrajectoryPoints(("hinge",), times, np.array(positions).reshape(-1, 1))
+
+
+def since_first(stamp: int) -> float:
+    """Time of a stamp since the first tick, s."""
+    return (stamp - CLOCK.stamp_ns(1)) / 1e9
 
 
 def test_a_trajectory_without_a_stamp_begins_at_the_next_state_and_leads_to_its_points(
@@ -95,8 +104,7 @@ def test_a_trajectory_without_a_stamp_begins_at_the_next_state_and_leads_to_its_
     last = REST
     for _ in range(60):
         reference = pendulum.next()
-        since = (stamp_ns(reference) - CLOCK.stamp_ns(1)) / 1e9
-        state = tracked.sample(since)
+        state = tracked.sample(since_first(stamp_ns(reference)))
         assert list(reference.position) == state.configuration.position.tolist()
         assert list(reference.velocity) == state.velocity.tolist()
         assert abs(reference.position[0] - last) < 0.2  # no jump
@@ -112,6 +120,28 @@ def test_a_stamped_trajectory_begins_at_exactly_its_tick(pendulum: Pendulum) -> 
     while pendulum.tick < 400:
         assert pendulum.next().position[0] == REST
     assert pendulum.next().position[0] > REST
+
+
+def test_another_one_takes_over_where_the_first_one_is(pendulum: Pendulum) -> None:
+    first_ns = pendulum.start(trajectory(TARGET))
+    for _ in range(12):
+        before = pendulum.next()
+
+    second_ns = pendulum.start(trajectory(0.2))
+
+    first = expected(first_ns, TARGET)
+    tracked = first.replaced(points(0.2), since_first(second_ns))
+    assert REST + 0.1 < before.position[0] < TARGET - 0.05  # it is on its way
+    at = tracked.sample(since_first(second_ns))
+    assert at.configuration.position[0] == pytest.approx(
+        first.sample(since_first(second_ns)).configuration.position[0], abs=1e-12
+    )
+    for _ in range(60):
+        reference = pendulum.next()
+        state = tracked.sample(since_first(stamp_ns(reference)))
+        assert list(reference.position) == state.configuration.position.tolist()
+        assert list(reference.velocity) == state.velocity.tolist()
+    assert reference.position[0] == pytest.approx(0.2, abs=1e-9)
 
 
 def test_a_new_episode_forgets_it(pendulum: Pendulum) -> None:

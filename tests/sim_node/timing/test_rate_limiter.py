@@ -151,6 +151,24 @@ def test_lateness_is_summed_up_in_microseconds() -> None:
     assert summary["late_us_p99.9"] == pytest.approx(1e6 * np.percentile(lates, 99.9), abs=0.2)
 
 
+def test_lateness_and_durations_are_those_of_the_last_ticks_alone() -> None:
+    capacity = 1 << 15
+    pace = started()
+    for number in range(1, 2 * capacity + 1):
+        pace.tick(START + number * PERIOD)
+
+    for number in range(2 * capacity + 1, 3 * capacity + 2):
+        pace.tick(START + number * PERIOD + 0.0625)
+
+    summary = pace.summary()
+    assert summary["late_us_p50"] == summary["late_us_p99.9"] == 62500.0
+    assert summary["tick_us_p50"] == summary["tick_us_p99"] == 1e6 * PERIOD
+    half = capacity // 2
+    for number in range(3 * capacity + 2, 3 * capacity + 2 + half):
+        pace.tick(START + number * PERIOD)
+    assert pace.summary()["late_us_p50"] == pytest.approx(31250.0)  # the oldest half is replaced
+
+
 @pytest.mark.parametrize(("before", "after"), [(PERIOD, 0.5), (PERIOD, 0.0), (0.0, PERIOD)])
 def test_another_period_counts_from_now(before: float, after: float) -> None:
     pace = started(before)
