@@ -26,6 +26,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.session import ANONYMOUS, given_session
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
@@ -235,12 +236,11 @@ class ControllerNode(ComposableNode):
         reply = self._last_reply
         if reply is None or state.effort is None or self._simulators.runs_on:
             return
-        clock = self._controller.clock
-        apart = clock.tick(state.stamp_ns) - clock.tick(reply.state.stamp_ns)
+        rate_hz, apart_ns = self._controller.clock.rate_hz, state.stamp_ns - reply.state.stamp_ns
+        apart = round(apart_ns * rate_hz / NANOSECONDS_PER_SECOND)
         if apart > 1 and reply.session == self._simulators.bound:
             self._once_logger.log_once(
-                f"states come {apart} ticks of {clock.rate_hz} Hz apart; set 'rate' to the "
-                "simulator's"
+                f"states come {apart} ticks of {rate_hz} Hz apart; set 'rate' to the simulator's"
             )
 
     def _episode_of(self, state: StampedState) -> int | None:

@@ -9,8 +9,8 @@ from sensor_msgs.msg import PointCloud2, PointField
 from controller_node.interface.plan_message import FIELDS
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import MessageError
+from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.joint_state import decode
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from actuated_characters.metrics.collector import CONFIGURATION, HEARD, MetricsC
 from actuated_characters.runs.run_directory import BAG, SUMMARY, metrics_directory, write_metrics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
+from msgs_config.messages.cdr import decode
 from msgs_config.messages.configuration import parse_world
-from msgs_config.messages.joint_state import decode
 
 _DAMAGED, _SCRATCH = ".damaged", ".recovering"
 _REPORT_PERIOD = 1000  # messages

@@ -15,8 +15,9 @@ from actuated_characters.bags.rebuilding import Rebuilt, rebuild
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import CommandError, LayoutError, MessageError, RecordingError
 from msgs_config.messages import topics
+from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.joint_state import JointStateDecoder, decode, state_in_layout
+from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
 from msgs_config.messages.session import ANONYMOUS, read_session
 from msgs_config.messages.throw import ProjectileThrow

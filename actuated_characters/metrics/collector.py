@@ -7,9 +7,10 @@ from actuated_characters.metrics.run_metrics import Measurement, Series
 from actuated_characters.metrics.tick_assembler import TickAssembler
 from msgs_config.errors import RecordingError
 from msgs_config.messages import configuration, topics
+from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
-from msgs_config.messages.joint_state import JointStateDecoder, decode, state_in_layout
+from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.state import StampedReference
 
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name

@@ -10,7 +10,7 @@ from std_msgs.msg import String
 from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import decode, read_frame_id
+from msgs_config.messages.cdr import decode, read_frame_id
 from msgs_config.messages.session import (
     ANONYMOUS,
     ForeignSessions,

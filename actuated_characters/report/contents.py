@@ -18,8 +18,8 @@ from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.recording import find_bag
 from msgs_config.errors import MessageError, RecordingError
 from msgs_config.messages import topics
+from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.joint_state import decode
 
 _STATES = topics.JOINT_STATES.name
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name

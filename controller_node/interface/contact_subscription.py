@@ -8,7 +8,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import read_frame_id
+from msgs_config.messages.cdr import read_frame_id
 from msgs_config.messages.wrenches import decode_wrenches
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription

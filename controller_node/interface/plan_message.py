@@ -6,7 +6,7 @@ import numpy as np
 from sensor_msgs.msg import PointCloud2, PointField
 
 from controller_node.planner.outlook import Outlook
-from msgs_config.messages.joint_state import split_stamp
+from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.wrenches import WORLD
 
 FIELDS = ("x", "y", "z", "time", "cost", "alternative", "anchor_x", "anchor_y", "anchor_yaw")

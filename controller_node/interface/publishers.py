@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from rclpy.node import Node
@@ -18,20 +18,20 @@ from controller_node.strength import Strengths
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import DoublesEncoder, JointStateEncoder, split_stamp
+from msgs_config.messages.cdr import DoublesEncoder, split_stamp
+from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.topics import Outgoing
 from msgs_config.messages.wrenches import WORLD
 
 
-@dataclass(frozen=True)
-class Reply:
+class Reply(NamedTuple):
     """The reply to a state; a state that comes again gets it again, without another computation."""
 
     raw_state: bytes
     state: StampedState
-    effort: FloatArray  # (n,) what is sent of it, zero elsewhere
+    effort: FloatArray  # (n,), of which the commanded entries are sent
     torques: bytes  # the message
     session: str  # of the simulator whose state it is
     reference: StampedReference
@@ -88,18 +88,16 @@ class Publishers:
     ) -> Reply:
         """The reply with an effort (n,) to a state, ready to be published."""
         torques = self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded])
-        sent = np.zeros(self._layout.size)
-        sent[self._commanded] = effort[self._commanded]
-        return Reply(raw, state, sent, torques, self._session, reference)
+        return Reply(raw, state, effort, torques, self._session, reference)
 
     def publish(self, reply: Reply) -> None:
         """Publish a reply, the torques first: the simulator goes on while the rest is made."""
-        self._torques.publish(reply.torques)
+        topics.publish_together([(self._torques, reply.torques)])
         topics.publish_together(self._beside_torques(reply))
 
     def _beside_torques(self, reply: Reply) -> Iterator[Outgoing]:
         """The messages that the simulator does not wait for, where there are subscribers."""
-        if self._references.get_subscription_count():
+        if topics.has_subscribers(self._references):
             reference = reply.reference
             yield (
                 self._references,
@@ -107,7 +105,7 @@ class Publishers:
                     reference.stamp_ns, reference.position, reference.velocity
                 ),
             )
-        if self._wrenches.get_subscription_count():
+        if topics.has_subscribers(self._wrenches):
             yield self._wrenches, self._net_wrench(reply)
 
     def flush(self, seconds: float) -> None:
@@ -144,7 +142,7 @@ class Publishers:
         """
         if outlook is not None and outlook is not self._published_outlook:
             self._published_outlook = outlook
-            if self._plans.get_subscription_count():
+            if topics.has_subscribers(self._plans):
                 self._plans.publish(plan_message(outlook, stamp_ns))
         if mode is not None and mode is not self._published_mode:
             self._published_mode = mode
@@ -152,6 +150,8 @@ class Publishers:
 
     def _net_wrench(self, reply: Reply) -> bytes:
         """The serialised message."""
+        sent = np.zeros(self._layout.size)
+        sent[self._commanded] = reply.effort[self._commanded]
         configuration = self._layout.configuration(reply.state.position)
-        force, torque = net_wrench(self._layout, configuration, reply.effort)
+        force, torque = net_wrench(self._layout, configuration, sent)
         return self._wrench_encoder.encode(reply.state.stamp_ns, np.concatenate((force, torque)))

@@ -17,9 +17,9 @@ from msgs_config.errors import (
     MessageError,
 )
 from msgs_config.messages import configuration, topics
+from msgs_config.messages.cdr import decode, read_frame_id
 from msgs_config.messages.clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.configuration import RunConfiguration
-from msgs_config.messages.joint_state import decode, read_frame_id
 from msgs_config.messages.session import (
     ForeignSessions,
     SessionBinding,

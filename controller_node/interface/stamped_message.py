@@ -5,8 +5,8 @@ from typing import Any
 from builtin_interfaces.msg import Duration, Time
 
 from msgs_config.errors import MotionError
+from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.joint_state import decode
 from msgs_config.runtime.stamped_subscription import PastStampError
 
 _LARGEST = 2**25  # bytes of a message

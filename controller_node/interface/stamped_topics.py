@@ -10,8 +10,8 @@ from controller_node.interface.stamped_message import decode_stamped, nanosecond
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
 from msgs_config.messages import topics
+from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.joint_state import split_stamp
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.stamped_subscription import StampedSubscription
 

@@ -1,7 +1,6 @@
 """Decodes the states that a controller can answer."""
 
-import numpy as np
-
+from msgs_config.arrays import all_finite
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import MessageError
 from msgs_config.messages.clock import TickClock
@@ -27,7 +26,7 @@ class StateDecoder:
         """
         arrays = self._decoder.decode(raw)
         state = state_in_layout(self._layout, arrays)
-        if not (np.isfinite(state.position).all() and np.isfinite(state.velocity).all()):
+        if not (all_finite(state.position) and all_finite(state.velocity)):
             raise MessageError("it is not finite")
         self._clock.tick(state.stamp_ns)
         return state, arrays.frame_id

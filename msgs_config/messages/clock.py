@@ -36,8 +36,9 @@ class TickClock:
         Raises:
             ClockError: the stamp is none of this clock's; the sender runs at another rate.
         """
-        tick = self.first_tick_from(stamp_ns)
-        if self.stamp_ns(tick) != stamp_ns:
+        rate = self.rate_hz  # written out: asked for several times a tick
+        tick = -(-stamp_ns * rate // NANOSECONDS_PER_SECOND)
+        if tick * NANOSECONDS_PER_SECOND // rate != stamp_ns:
             raise ClockError(
                 f"stamp {stamp_ns} ns is no tick at {self.rate_hz} Hz; "
                 "simulator and controller must have the same parameter 'rate'"

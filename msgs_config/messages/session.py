@@ -8,6 +8,7 @@ import re
 import secrets
 from collections import Counter
 from collections.abc import Callable
+from functools import lru_cache
 
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Parameter, Values
@@ -59,6 +60,7 @@ def is_session(text: str) -> bool:
     return _MARK in text and _FORM.fullmatch(text) is not None
 
 
+@lru_cache(maxsize=64)  # every message names one, mostly the same
 def read_session(frame_id: str) -> str:
     """The session that a `frame_id` names, else `ANONYMOUS`."""
     return frame_id if is_session(frame_id) else ANONYMOUS

@@ -82,6 +82,11 @@ def create_publisher(node: Node, topic: Topic) -> Publisher:
     )
 
 
+def has_subscribers(publisher: Publisher) -> bool:
+    """Whether anybody subscribes; asked at every tick, so without rclpy's guard of the handle."""
+    return bool(publisher.handle.get_subscription_count())
+
+
 def publish_together(messages: Iterable[Outgoing]) -> None:
     """Publish serialised messages in a row.
 
@@ -89,7 +94,7 @@ def publish_together(messages: Iterable[Outgoing]) -> None:
     between them each would find its subscribers asleep again.
     """
     for publisher, raw in list(messages):  # all are made before the first is published
-        publisher.publish(raw)
+        publisher.handle.publish_raw(raw)
 
 
 def flush(publishers: Iterable[Publisher], seconds: float) -> bool:

@@ -13,12 +13,7 @@ from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.geometry.rotations import IDENTITY_XYZW
-from msgs_config.messages.joint_state import (
-    encode_arrays,
-    encode_head,
-    read_message,
-    with_stamp,
-)
+from msgs_config.messages.cdr import encode_arrays, encode_head, read_message, with_stamp
 
 WORLD = "world"
 """The frame of everything that is given in the world."""

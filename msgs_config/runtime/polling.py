@@ -44,6 +44,7 @@ class DirectSubscription:
         self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
         self.dropped = 0  # messages, as more came than were taken
         self._node = node
+        self._message_type = topic.message_type
         # When the loop blocks in the executor, it is the executor that takes the message. It
         # hands a callback of two arguments the message's info too, which rclpy's types leave out.
         self._subscription = node.create_subscription(
@@ -55,6 +56,8 @@ class DirectSubscription:
             # not one thing more for the executor to look at in each turn; `waiting.py` says it
             event_callbacks=events or SubscriptionEventCallbacks(use_default_callbacks=False),
         )
+        # without rclpy's guard of the handle, which another thread might destroy: there is none
+        self._take_message = self._subscription.handle.take_message
 
     def _keep(self, raw: bytes, info: dict[str, int]) -> None:
         most = self._pending.maxlen
@@ -74,8 +77,10 @@ class DirectSubscription:
 
     def take(self) -> bytes | None:
         """The next serialised message; None if there is none now."""
-        received = self.take_received()
-        return None if received is None else received.raw
+        if self._pending:
+            return self._pending.popleft().raw
+        taken = self._take_message(self._message_type, True)
+        return None if taken is None else taken[0]
 
     def discard(self) -> None:
         """Take the messages that have come so far, and do nothing with them."""
@@ -87,9 +92,7 @@ class DirectSubscription:
         """The next message with when it was published, and its number; None if there is none."""
         if self._pending:
             return self._pending.popleft()
-        handle = self._subscription.handle
-        with handle:
-            taken = handle.take_message(self._subscription.msg_type, True)
+        taken = self._take_message(self._message_type, True)
         return None if taken is None else _received(*taken)
 
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from rclpy.node import Node
 
 from msgs_config.errors import CommandError, LayoutError, MessageError, MotionError
+from msgs_config.messages.cdr import read_frame_id
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.joint_state import read_frame_id
 from msgs_config.messages.session import OwnSession
 from msgs_config.messages.topics import Topic
 from msgs_config.runtime.once_logger import OnceLogger

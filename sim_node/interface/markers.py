@@ -16,7 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, Shape, ShapeType
 from msgs_config.geometry import rotations
-from msgs_config.messages.joint_state import split_stamp
+from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WORLD
 

@@ -15,12 +15,8 @@ from msgs_config.character.model import UrdfOptions
 from msgs_config.character.robot_description import robot_description
 from msgs_config.geometry import rotations
 from msgs_config.messages import configuration, topics
-from msgs_config.messages.joint_state import (
-    DoublesEncoder,
-    JointStateEncoder,
-    split_stamp,
-    with_stamp,
-)
+from msgs_config.messages.cdr import DoublesEncoder, split_stamp, with_stamp
+from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Outgoing, Topic
@@ -94,7 +90,7 @@ class Publishers:
     @property
     def wants_contacts(self) -> bool:
         """Whether the contacts have subscribers."""
-        return bool(self._contacts.get_subscription_count())
+        return topics.has_subscribers(self._contacts)
 
     def publish_configuration(
         self,
@@ -131,7 +127,7 @@ class Publishers:
         """The messages that a controller may wait for beside a tick's state, which follows them."""
         if self._character.contacts is not None and self.wants_contacts:
             yield self._contacts, self._encode_contacts()
-        if self._wrenches.get_subscription_count():
+        if topics.has_subscribers(self._wrenches):
             yield self._wrenches, self._encode_applied()
 
     def state(self) -> Outgoing:
@@ -201,8 +197,8 @@ class Publishers:
 
     def _publish_base(self) -> None:
         """Publish the base link's pose and twist, if there are subscribers."""
-        odometry = self._odometry.get_subscription_count()
-        transforms = self._transforms and self._transforms.get_subscription_count()
+        odometry = topics.has_subscribers(self._odometry)
+        transforms = self._transforms and topics.has_subscribers(self._transforms)
         if not (odometry or transforms):
             return
         origin, turn = self._character.base_frame()
@@ -227,7 +223,7 @@ class Publishers:
 
     def _publish_markers(self) -> None:
         """Publish the shapes and the world's balls where they are, if there are subscribers."""
-        if self._visualization.get_subscription_count():
+        if topics.has_subscribers(self._visualization):
             balls = self._character.balls
             origins, turns = self._character.link_frames()
             self._visualization.publish(

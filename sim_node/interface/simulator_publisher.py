@@ -6,7 +6,7 @@ from itertools import chain
 from rclpy.node import Node
 
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import encode_clock
+from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.topics import Outgoing
 from sim_node.interface.publishers import Publishers
@@ -64,7 +64,8 @@ class SimulatorPublisher:
 
     def _messages(self) -> Iterator[Outgoing]:
         """The messages that are published before the tick can be answered, the states last."""
-        yield self._clock_topic, encode_clock(self._simulation.stamp_ns)
+        if topics.has_subscribers(self._clock_topic):
+            yield self._clock_topic, encode_clock(self._simulation.stamp_ns)
         yield from self._world.messages()
         for each in self.of_characters:
             yield from each.before_state()

@@ -53,7 +53,7 @@ class WorldInterface:
             self._published_ns = simulation.stamp_ns
             for throw in simulation.throws:
                 yield self._applied, self._codec.encode(simulation.stamp_ns, throw)
-        if self._thrown.get_subscription_count():
+        if topics.has_subscribers(self._thrown):
             names = ball_names(len(simulation.balls))
             balls = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
             yield self._thrown, encode_balls(balls, self._own_session.session)

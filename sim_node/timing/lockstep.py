@@ -3,12 +3,11 @@
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
-from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from msgs_config.arrays import BoolArray, FloatArray, IntArray, all_finite
 from msgs_config.errors import CommandError
 
 _REMEMBERED = 1000  # ticks
@@ -32,6 +31,7 @@ class CommandCollector(ABC):
         """Only entries that are `allowed` (n,) may be commanded."""
         self._dof_names = tuple(dof_names)
         self._allowed = allowed
+        self._allowed_indices: IntArray | None = None  # the last ones that were
         self.stamp_ns = 0
         self.conflict: str | None = None  # the first entry of the tick's last conflict
         self.counts: Counter[CommandStatus] = Counter()
@@ -57,22 +57,28 @@ class CommandCollector(ABC):
             raise CommandError(f"{len(indices)} names but {len(effort)} efforts")
         if len(indices) == 0:
             raise CommandError("an empty command")
-        if not np.isfinite(effort).all():
+        if not all_finite(effort):
             worst = int(np.argmin(np.isfinite(effort)))
             name = self._dof_names[indices[worst]]
             raise CommandError(f"effort of '{name}' is {effort[worst]}; it must be finite")
+        if indices is not self._allowed_indices:  # those of one sender are one array
+            self._check_allowed(indices)
+            self._allowed_indices = indices
+
+    def _check_allowed(self, indices: IntArray) -> None:
         if not self._allowed[indices].all():
             name = self._dof_names[indices[int(np.argmin(self._allowed[indices]))]]
             hint = "; root_assistance of controller_node is on" if name.startswith("root_") else ""
             raise CommandError(f"'{name}' is not among the commanded joints{hint}")
 
 
-@dataclass
 class _Tick:
     """The commands of one tick."""
 
-    given: BoolArray  # (n,)
-    effort: FloatArray  # (n,)
+    def __init__(self, size: int) -> None:
+        self.given: BoolArray = np.zeros(size, dtype=np.bool_)
+        self.effort: FloatArray = np.zeros(size)
+        self.is_empty = True
 
 
 class LockstepBarrier(CommandCollector):
@@ -86,12 +92,14 @@ class LockstepBarrier(CommandCollector):
     def __init__(self, dof_names: Sequence[str], required: BoolArray) -> None:
         super().__init__(dof_names, required)
         self._past: dict[int, _Tick] = {}  # by stamp, the oldest first
+        self._required = np.count_nonzero(required)
         self._begin()
 
     def begin_tick(self, stamp_ns: int) -> None:
         """Begin to wait for the commands that answer the state of this stamp."""
         if stamp_ns != self.stamp_ns:
-            self._tick.given &= ~self._filled
+            if self._filled is not None:
+                self._tick.given &= ~self._filled
             self._past[self.stamp_ns] = self._tick
             if len(self._past) > _REMEMBERED:
                 del self._past[next(iter(self._past))]
@@ -104,9 +112,9 @@ class LockstepBarrier(CommandCollector):
         self._begin()
 
     def _begin(self) -> None:
-        self._tick = _Tick(np.zeros_like(self._allowed), np.zeros(len(self._allowed)))
-        self._filled = np.zeros_like(self._allowed)  # (n,) without a command of a sender
-        self.complete = not self._allowed.any()
+        self._tick = _Tick(len(self._allowed))
+        self._filled: BoolArray | None = None  # (n,) without a command of a sender
+        self.complete = self._required == 0
         """Whether every required entry has its command."""
         self.conflict = None
 
@@ -123,9 +131,10 @@ class LockstepBarrier(CommandCollector):
     def fill_missing(self, effort: FloatArray) -> None:
         """Complete the tick with the entries of `effort` (n,) wherever a command is missing."""
         lacking = self._lacking
-        self._filled |= lacking
+        self._filled = lacking if self._filled is None else self._filled | lacking
         self._tick.effort[lacking] = effort[lacking]
         self._tick.given |= lacking
+        self._tick.is_empty = False
         self.complete = True
 
     @property
@@ -139,16 +148,18 @@ class LockstepBarrier(CommandCollector):
         tick = self._tick if stamp_ns == self.stamp_ns else self._past.get(stamp_ns)
         if tick is None:
             return CommandStatus.STALE
-        given = tick.given[indices]
-        differs = given & (tick.effort[indices] != effort)
-        if differs.any():
-            self.conflict = self._dof_names[indices[int(np.argmax(differs))]]
-            return CommandStatus.CONFLICT
+        if not tick.is_empty:
+            given = tick.given[indices]
+            differs = given & (tick.effort[indices] != effort)
+            if differs.any():
+                self.conflict = self._dof_names[indices[int(np.argmax(differs))]]
+                return CommandStatus.CONFLICT
+            if given.all() and tick is self._tick:
+                return CommandStatus.DUPLICATE
         if tick is not self._tick:
             return CommandStatus.STALE
-        if given.all():
-            return CommandStatus.DUPLICATE
         tick.effort[indices] = effort
         tick.given[indices] = True
-        self.complete = not self._lacking.any()
+        tick.is_empty = False
+        self.complete = np.count_nonzero(tick.given) == self._required
         return CommandStatus.ACCEPTED

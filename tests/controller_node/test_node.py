@@ -10,8 +10,8 @@ from std_msgs.msg import Header
 
 from controller_node.parameters import PARAMETERS, character_parameters
 from msgs_config.arrays import FloatArray
+from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.joint_state import split_stamp
 from msgs_config.messages.state import StampedReference, StampedState
 from tests.support.physics import character, controller
 from tests.support.ros import ControllerClient, Processes, joint_state, stamp_ns

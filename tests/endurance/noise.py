@@ -36,9 +36,9 @@ from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
 from benchmarks.support.nodes import private_memory  # noqa: E402
 from msgs_config.errors import MessageError  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402
+from msgs_config.messages.cdr import read_frame_id  # noqa: E402
 from msgs_config.messages.joint_state import (  # noqa: E402
     JointStateDecoder,
-    read_frame_id,
     state_in_layout,
 )
 from msgs_config.messages.session import make_session  # noqa: E402

@@ -18,11 +18,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import RunError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
-from msgs_config.messages.joint_state import (
-    JointStateDecoder,
-    JointStateEncoder,
-    state_in_layout,
-)
+from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, state_in_layout
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import SESSION, given_session, read_session
 from msgs_config.messages.state import StampedState

@@ -25,7 +25,8 @@ from actuated_characters.replay.players.simulator_outputs import (
 )
 from msgs_config.errors import MessageError, RecordingError, RunError
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import JointStateDecoder, encode_clock
+from msgs_config.messages.cdr import encode_clock
+from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.session import (
     ANONYMOUS,
     SESSION,

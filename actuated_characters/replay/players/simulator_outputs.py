@@ -18,8 +18,9 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import Recording, find_bag
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
+from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, decode
+from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Topic
 from msgs_config.messages.wrenches import decode_wrenches, encode_wrenches

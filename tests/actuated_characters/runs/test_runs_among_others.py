@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory
 from actuated_characters.bags.reader import read_messages
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import read_frame_id, split_stamp
+from msgs_config.messages.cdr import read_frame_id, split_stamp
 from msgs_config.messages.session import is_session
 from msgs_config.runtime.polling import DirectSubscription
 from tests.sim_node.interface.test_hostile_messages import mutants

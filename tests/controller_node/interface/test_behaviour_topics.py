@@ -12,8 +12,8 @@ from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from msgs_config.errors import ConfigurationError
 from msgs_config.messages import topics
+from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.joint_state import split_stamp
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 from tests.support.physics import character
 from tests.support.ros import (

@@ -11,8 +11,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from controller_node.references.hold import HoldReference
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
 from msgs_config.messages import topics
+from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.joint_state import split_stamp
 from tests.support.physics import character
 from tests.support.ros import ControllerClient, Processes, ReceivedMessages, joint_state, stamp_ns
 

@@ -15,7 +15,8 @@ from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import MessageError
-from msgs_config.messages.joint_state import JointStateEncoder, with_stamp
+from msgs_config.messages.cdr import with_stamp
+from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches, encode_wrenches, select
 
 PROPERTY = settings(max_examples=150, deadline=None)

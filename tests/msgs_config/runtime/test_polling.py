@@ -6,7 +6,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from msgs_config.messages.joint_state import decode
+from msgs_config.messages.cdr import decode
 from msgs_config.messages.topics import Topic
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from tests.support.ros import wait_until

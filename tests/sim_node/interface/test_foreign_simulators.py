@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
 from msgs_config.messages import topics
-from msgs_config.messages.joint_state import split_stamp
+from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 from tests.controller_node.test_model_check import REFUSED_SIMULATORS, description
