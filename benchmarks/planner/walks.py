@@ -34,7 +34,7 @@ KINDS = {
     "balls": Kind(20.0, pushes=5, every=4.0, duration=20.0, balls=True),
     "standing": Kind(12.0, pushes=11, every=5.0, lasts=0.1, duration=60.0, stands=True),
     "any": Kind(40.0, hardest=240.0, duration=5.5),
-    "fall": Kind(200.0, duration=16.0, behaviour="active_ragdoll"),
+    "fall": Kind(300.0, duration=16.0, behaviour="active_ragdoll"),
 }
 
 
