@@ -2,24 +2,26 @@
 
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from unittest.mock import patch
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from actuated_characters.runs.plan import make_plan
+from benchmarks.closed_loop import in_process
 from benchmarks.support.chains import write_chain
 from benchmarks.support.nodes import Nodes
 from benchmarks.support.ratios import Ratio
+from benchmarks.support.timed import timed
 from msgs_config.arrays import FloatArray
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from sim_node.parameters import CharacterParameters, SimulatorParameters, load_parameters
+from sim_node.physics.simulation import Simulation
 from sim_node.physics.world import World
 from sim_node.simulation_factory import make_simulation
 
@@ -59,7 +61,8 @@ def measure_cost(console: Console) -> list[Ratio]:
                 costs.append(_measure(label, given))
             console.print(_table(costs))
             ratios += cost_ratios(costs)
-    return ratios
+    limp_us = costs[0].alone_us
+    return [*ratios, Ratio("limp humanoid", limp_us / _walking_us(console), "tick / a walk's tick")]
 
 
 def cost_ratios(costs: list[Cost]) -> list[Ratio]:
@@ -69,8 +72,22 @@ def cost_ratios(costs: list[Cost]) -> list[Ratio]:
     return [
         *(Ratio(c.label, c.alone_us / c.engine_us, "tick / engine step alone") for c in costs),
         Ratio(f"{last.label}, growth", growth, f"tick per DoF / that of {first.label}"),
+        Ratio(
+            f"{last.label}, all", last.alone_us / first.alone_us, f"tick / that of {first.label}"
+        ),
         Ratio(f"{first.label}, topics", first.over_topics_us / first.alone_us, "topics / alone"),
     ]
+
+
+def _walking_us(console: Console) -> float:
+    """Median duration in µs of the simulator's tick of a walk, without topics."""
+    reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
+    plan = make_plan("humanoid", (_WARM_UP + _TICKS) / 240.0, reference, {}, {})
+    with timed(Simulation, "step") as steps:
+        in_process(plan)
+    walking_us = 1e6 * float(np.median(steps[_WARM_UP:]))
+    console.print(f"a walk's tick of the simulator: {walking_us:.0f} µs")
+    return walking_us
 
 
 def _label(count: int, kind: str) -> str:
@@ -93,25 +110,10 @@ def humanoids(count: int) -> dict[str, object]:
 def _measure(label: str, given: Mapping[str, object]) -> Cost:
     loaded = load_parameters(given)
     dofs = sum(each.character.layout.size for each in loaded.characters)
-    with timed_engine() as engine:
+    with timed(World, "step") as engine:
         alone = np.median(1e6 * step_durations(loaded))
     engine_us = 1e6 * float(np.median(engine[-_TICKS:]))
     return Cost(label, dofs, engine_us, float(alone), _over_topics(loaded, given))
-
-
-@contextmanager
-def timed_engine() -> Iterator[list[float]]:
-    """Durations in s of the engine's steps within the block, without what surrounds them."""
-    durations: list[float] = []
-    step = World.step
-
-    def timed(world: World) -> None:
-        started = time.perf_counter()
-        step(world)
-        durations.append(time.perf_counter() - started)
-
-    with patch.object(World, "step", timed):
-        yield durations
 
 
 def step_durations(loaded: SimulatorParameters) -> FloatArray:

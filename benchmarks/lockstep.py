@@ -1,4 +1,9 @@
-"""What lockstep over topics costs, beside a bare round trip and the loop in one process."""
+"""What lockstep over topics costs, beside a bare round trip and the loop in one process.
+
+Of a tick over topics, (c) in two processes or (d) composed, what the loop in one process (b) takes
+is no cost of the topics; the rest counts in bare round trips (a), in which another process is
+woken twice.
+"""
 
 import numpy as np
 from rich.console import Console
@@ -8,7 +13,9 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from benchmarks.closed_loop import in_process, over_topics
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.round_trip import round_trips
+from benchmarks.support.timed import timed
 from msgs_config.arrays import FloatArray
+from sim_node.physics.world import World
 
 _COUNT = 5000  # round trips
 _DURATION = 20.0  # s of simulated time
@@ -26,16 +33,19 @@ def measure_lockstep(console: Console) -> list[Ratio]:
     ratios = []
     for name, reference in _REFERENCES.items():
         console.print(f"lockstep: {name} ...")
-        ratios.append(_measure(make_plan(name, _DURATION, reference, {}, {}), table))
+        ratios += _measure(make_plan(name, _DURATION, reference, {}, {}), table)
     console.print(table)
     return ratios
 
 
-def _measure(plan: RunPlan, table: Table) -> Ratio:
-    """Add the rows of one character; the ratio of a tick over topics to what it is made of."""
+def _measure(plan: RunPlan, table: Table) -> list[Ratio]:
+    """Add the rows of one character; the ratios of a tick over topics to what it is made of."""
     name, rate = plan.character.name, plan.simulator.integer("rate")
     layout = plan.character.layout
+    with timed(World, "step") as steps:
+        in_process(plan)
     rows = {
+        "(e) the engine's own step": _row(np.array(steps)),
         "(a) bare round trip, taken directly": _row(round_trips(layout, _COUNT, direct=True)),
         "(a') bare round trip, by executors": _row(round_trips(layout, _COUNT, direct=False)),
         "(b) in one process": _row(in_process(plan)),
@@ -43,10 +53,16 @@ def _measure(plan: RunPlan, table: Table) -> Ratio:
         "(d) over topics, composed": _reported(over_topics(plan, composed=True)),
     }
     for label, (p50, p99, per_second) in rows.items():
-        factor = "" if "bare" in label else f"{per_second / rate:.1f}"
+        factor = "" if label[:3] in ("(a)", "(a'", "(e)") else f"{per_second / rate:.1f}"
         table.add_row(f"{name} {label}", f"{p50:.0f}", f"{p99:.0f}", f"{per_second:.0f}", factor)
-    direct, _, joined, apart, _ = (values[0] for values in rows.values())
-    return Ratio(f"lockstep, {name}", apart / (joined + direct), "(c) / ((b) + (a))")
+    engine, direct, _, joined, apart, composed = (values[0] for values in rows.values())
+    return [
+        Ratio(f"lockstep, {name}", apart / (joined + direct), "(c) / ((b) + (a))"),
+        Ratio(f"two processes, {name}", (apart - joined) / direct, "((c) - (b)) / (a)"),
+        Ratio(f"composed, {name}", (composed - joined) / direct, "((d) - (b)) / (a)"),
+        Ratio(f"composed, {name}, all", composed / joined, "(d) / (b)"),
+        Ratio(f"in one process, {name}", joined / engine, "(b) / (e)"),
+    ]
 
 
 def _reported(reports: list[dict[str, str]]) -> tuple[float, ...]:
