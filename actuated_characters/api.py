@@ -259,6 +259,7 @@ def run(
     *,
     output: str | Path,
     in_process: bool = False,
+    composed: bool = False,
     overwrite: bool = False,
     simulator: Mapping[str, object] = _NONE,
     controller: Mapping[str, object] = _NONE,
@@ -271,6 +272,7 @@ def run(
         duration: Length in s.
         output: Directory of the results: bag, figures, parameters and logs (docs/runs.md).
         in_process: Join simulation and controller in this process: the same states, no bag.
+        composed: Have simulator and controller as nodes of one process: the same, sooner.
         overwrite: Replace the results in `output`.
         simulator: Parameters of `sim_node`, by name.
         controller: Parameters of `controller_node`, by name.
@@ -282,6 +284,8 @@ def run(
     Raises:
         ActuatedCharactersError: a name or a value is wrong, or a process failed.
     """
+    if in_process and composed:
+        raise ConfigurationError("in_process has no nodes; composed must be false")
     plan = make_plan(character, duration, reference, simulator, controller)
     if in_process and make_node_settings(plan.simulator).tick_period:
         raise ConfigurationError("in_process takes neither 'mode' realtime nor a real_time_factor")
@@ -290,7 +294,7 @@ def run(
     if in_process:
         run_in_process(plan, directory)
     else:
-        run_over_topics(plan, directory, write_bag=True)
+        run_over_topics(plan, directory, write_bag=True, composed=composed)
     metrics, _ = read_metrics(directory)
     return metrics
 

@@ -159,6 +159,7 @@ def test_parameters_act_on_both_sides(pendulum: ac.Character) -> None:
         (lambda one: ac.Controller(one, clip="walk", reference="sine"), "'reference' is sine"),
         (lambda one: ac.Controller(one, clip="a", keyframes="b"), "give one of them"),
         (lambda _: ac.run(output="none", clip="a", controller={"clip": "b"}), "give one of them"),
+        (lambda _: ac.run(output="none", in_process=True, composed=True), "composed must be false"),
         (lambda one: ac.Simulation(one, graviti=1.0), "graviti"),
         (lambda one: ac.Simulation(one).step(np.zeros(3)), r"shape \(3,\); it must be \(1,\)"),
         (lambda one: ac.Simulation(one).push("wing", (1.0, 0.0, 0.0)), "wing"),
@@ -172,6 +173,7 @@ def test_parameters_act_on_both_sides(pendulum: ac.Character) -> None:
         "two",
         "both",
         "twice",
+        "ways",
         "parameter",
         "effort",
         "link",
@@ -192,15 +194,16 @@ def test_a_run_over_topics_has_the_hash_of_the_lines_of_the_api(tmp_path: Path) 
     assert metrics["state_hash"] == hash_of_run("pendulum", 0.5, controller=SWINGING)
     with pytest.raises(ac.ActuatedCharactersError, match="overwrite"):
         ac.run("pendulum", 0.5, output=tmp_path / "run")
-    joined = ac.run(
-        "pendulum",
-        0.5,
-        output=tmp_path / "run",
-        overwrite=True,
-        in_process=True,
-        controller=SWINGING,
-    )
-    assert joined["state_hash"] == metrics["state_hash"]
+    for way in ("in_process", "composed"):
+        again = ac.run(
+            "pendulum",
+            0.5,
+            output=tmp_path / "run",
+            overwrite=True,
+            controller=SWINGING,
+            **{way: True},
+        )
+        assert again["state_hash"] == metrics["state_hash"]
 
 
 @pytest.mark.slow
