@@ -6,7 +6,12 @@ from setuptools import find_packages, setup
 
 PACKAGE = "actuated_characters"
 ROOTS = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
-SHARED = {"launch": "*.launch.py", "config": "*.yaml", "examples": "*.py"}
+SHARED = {
+    "launch": "*.launch.py",
+    "config": "*.yaml",
+    "examples": "*.py",
+    "examples/without_rclpy": "*",
+}
 setup(
     name=PACKAGE,
     version="0.2.0",

@@ -48,11 +48,11 @@ def test_executables_lie_where_ros2_run_looks_for_them(prefix: Path) -> None:
     assert not (prefix / "bin").exists()
 
 
-@pytest.mark.parametrize("folder", ["launch", "config", "examples"])
+@pytest.mark.parametrize("folder", ["launch", "config", "examples", "examples/without_rclpy"])
 def test_what_users_read_and_launch_is_shared(prefix: Path, folder: str) -> None:
-    shipped = {p.name for p in (PROJECT / folder).iterdir() if p.suffix in (".py", ".yaml")}
+    shipped = {path.name for path in (PROJECT / folder).iterdir() if path.is_file()}
 
-    shared = {path.name for path in (prefix / "share" / PACKAGE / folder).iterdir()}
+    shared = {p.name for p in (prefix / "share" / PACKAGE / folder).iterdir() if p.is_file()}
 
     assert shared == shipped
     assert shared
