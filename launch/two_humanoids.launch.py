@@ -1,7 +1,7 @@
 """One simulator of two characters, and a controller in the namespace of each."""
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, Shutdown
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
@@ -13,28 +13,7 @@ CHARACTERS = ("left", "right")
 
 
 def generate_launch_description() -> LaunchDescription:
-    """The three nodes, and their parameter file."""
-    simulator = Node(
-        package=PACKAGE,
-        executable="sim_node",
-        name="sim_node",
-        # not `parameters`, where a file that does not exist is no error
-        ros_arguments=["--params-file", CONFIG],
-        output="screen",
-        on_exit=Shutdown(reason="the simulator has ended"),
-    )
-    controllers = [
-        Node(
-            package=PACKAGE,
-            executable="controller_node",
-            name="controller_node",
-            namespace=character,
-            ros_arguments=["--params-file", CONFIG],
-            output="screen",
-            on_exit=Shutdown(reason="a controller has ended"),
-        )
-        for character in CHARACTERS
-    ]
+    """The three nodes, and their arguments."""
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -42,7 +21,39 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="two_humanoids.yaml",
                 description="parameter file: the name of one that ships, or an absolute path",
             ),
-            simulator,
-            *controllers,
+            DeclareLaunchArgument(
+                "max_ticks",
+                default_value="",
+                description="end after so many ticks; empty: as in the config, 0: never",
+            ),
+            OpaqueFunction(function=_start),
         ]
     )
+
+
+def _start(context: LaunchContext) -> list[Node]:
+    ticks = LaunchConfiguration("max_ticks")
+    return [
+        Node(
+            package=PACKAGE,
+            executable="sim_node",
+            name="sim_node",
+            # not among `parameters`, where a file that does not exist is no error
+            ros_arguments=["--params-file", CONFIG],
+            parameters=[{"max_ticks": ticks}] if ticks.perform(context) else [],
+            output="screen",
+            on_exit=Shutdown(reason="the simulator has ended"),
+        ),
+        *(
+            Node(
+                package=PACKAGE,
+                executable="controller_node",
+                name="controller_node",
+                namespace=character,
+                ros_arguments=["--params-file", CONFIG],
+                output="screen",
+                on_exit=Shutdown(reason="a controller has ended"),
+            )
+            for character in CHARACTERS
+        ),
+    ]

@@ -14,6 +14,7 @@ from typing import NoReturn, Protocol
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.runtime.exit_watchdog import exit_after
+from msgs_config.runtime.shadowing import shadowed_packages
 from msgs_config.runtime.shared_memory import remove_orphans
 
 EXIT_ERROR = 1
@@ -103,6 +104,8 @@ def run_node(load: Callable[[], Callable[[], RunnableNode]], about: str = "") ->
     """
     stop = StopSignal()
     node, code = None, EXIT_ERROR
+    for sentence in shadowed_packages():
+        print(f"warning: {sentence}", file=sys.stderr, flush=True)
     try:
         with stop.ending_at_once():
             _start_ros(about)
