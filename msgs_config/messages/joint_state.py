@@ -62,14 +62,10 @@ class JointStateEncoder:
         if lengths != self._lengths:
             self._lengths = lengths
             self._gaps = gaps_before(len(self._head), (position, velocity, effort))
-        before, between, after = self._gaps
-        parts = (
-            with_stamp(self._head, stamp_ns),
-            *(before, position.tobytes()),
-            *(between, velocity.tobytes()),
-            *(after, effort.tobytes()),
-        )
-        return b"".join(parts)
+        stamped = with_stamp(self._head, stamp_ns)
+        a, b, c = self._gaps
+        lists = (a, position.tobytes(), b, velocity.tobytes(), c, effort.tobytes())
+        return stamped + b"".join(lists)
 
 
 class JointStateDecoder:

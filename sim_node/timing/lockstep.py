@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
-from enum import Enum
+from enum import StrEnum
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from msgs_config.errors import CommandError
 _REMEMBERED = 1000  # ticks
 
 
-class CommandStatus(Enum):
+class CommandStatus(StrEnum):
     """The verdict on a command."""
 
     ACCEPTED = "accepted"
