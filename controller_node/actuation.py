@@ -1,10 +1,10 @@
 """Which degrees of freedom efforts drive, and what efforts do to the character as a whole."""
 
-import numpy as np
-
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import GeneralizedPosition, JointLayout
-from msgs_config.geometry import rotations
+from msgs_config.character.layout import JointLayout
+from msgs_config.geometry import frames
+
+_NOTHING = (0.0, 0.0, 0.0)
 
 
 def describe_actuation(actuators: int, degrees_of_freedom: int) -> dict[str, int | bool]:
@@ -17,14 +17,16 @@ def describe_actuation(actuators: int, degrees_of_freedom: int) -> dict[str, int
 
 
 def net_wrench(
-    layout: JointLayout, configuration: GeneralizedPosition, effort: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Force (3,) in N and torque (3,) in N m of all efforts (n,) on the character as a whole.
+    layout: JointLayout, position: FloatArray, effort: FloatArray
+) -> tuple[frames.Triple, frames.Triple]:
+    """Force in N and torque in N m of all efforts (n,) on the character as a whole, at (n,).
 
     World axes, the torque about the base link's origin. A joint's torque acts on the child and its
     opposite on the parent, so all joints together give nothing; what remains is the root's force
     and torque.
     """
     if not layout.has_floating_base:
-        return np.zeros(3), np.zeros(3)
-    return effort[:3].copy(), rotations.rotate(configuration.orientations_xyzw[0], effort[3:6])
+        return _NOTHING, _NOTHING
+    fx, fy, fz, *torque_in_base = effort[:6].tolist()
+    turn = frames.axes(frames.quaternion(position[3:6].tolist()))
+    return (fx, fy, fz), frames.to_parent(turn, torque_in_base)

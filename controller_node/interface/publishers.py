@@ -152,6 +152,5 @@ class Publishers:
         """The serialised message."""
         sent = np.zeros(self._layout.size)
         sent[self._commanded] = reply.effort[self._commanded]
-        configuration = self._layout.configuration(reply.state.position)
-        force, torque = net_wrench(self._layout, configuration, sent)
-        return self._wrench_encoder.encode(reply.state.stamp_ns, np.concatenate((force, torque)))
+        force, torque = net_wrench(self._layout, reply.state.position, sent)
+        return self._wrench_encoder.encode(reply.state.stamp_ns, np.array(force + torque))

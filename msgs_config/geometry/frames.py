@@ -32,6 +32,20 @@ def product(a_xyzw: Sequence[float], b_xyzw: Sequence[float]) -> Quaternion:
     )
 
 
+def quaternion(rotation_vector: Sequence[float]) -> Quaternion:
+    """The unit quaternion of a rotation vector in rad."""
+    x, y, z = rotation_vector
+    half = 0.5 * math.sqrt(x * x + y * y + z * z)
+    share = 0.5 * math.sin(half) / max(half, _TINY)
+    return (x * share, y * share, z * share, math.cos(half))
+
+
+def conjugate(q_xyzw: Sequence[float]) -> Quaternion:
+    """The inverse of a unit quaternion."""
+    x, y, z, w = q_xyzw
+    return (-x, -y, -z, w)
+
+
 def axes(q_xyzw: Quaternion) -> Axes:
     """The rotation matrix of a unit quaternion."""
     x, y, z, w = q_xyzw

@@ -19,6 +19,7 @@ WORLD = "world"
 """The frame of everything that is given in the world."""
 
 NO_ROWS = np.zeros((0, 6))
+_MAX_KEPT_HEADS = 256
 
 Rows: TypeAlias = FloatArray | Sequence[FloatArray] | Sequence[tuple[float, ...]]
 
@@ -61,6 +62,41 @@ def encode_wrenches(wrenches: WrenchArrays) -> bytes:
     head = encode_head(wrenches.links, wrenches.frame_id)
     lists = (transforms, NO_ROWS, wrenches.wrenches)
     return encode_arrays(with_stamp(head, wrenches.stamp_ns), lists)
+
+
+class SelectionEncoder:
+    """Serialises wrenches on some of a character's links, as `select` chooses them.
+
+    Which links are touched changes seldom, so all bytes but stamp and wrenches are kept.
+    """
+
+    def __init__(self, names: Sequence[str], frame_id: str = WORLD) -> None:
+        """The names of all links, in the order of the arrays' rows."""
+        self._names = names
+        self._frame_id = frame_id
+        self._heads: dict[bytes, bytes] = {}  # by the links that are chosen
+
+    def encode(self, stamp_ns: int, wrenches: FloatArray, chosen: BoolArray) -> bytes:
+        """The serialised message of those wrenches (links, 6) of which `chosen` (links,) is true.
+
+        In N and N m, world axes.
+        """
+        key = chosen.tobytes()
+        head = self._heads.get(key)
+        if head is None:
+            if len(self._heads) == _MAX_KEPT_HEADS:
+                del self._heads[next(iter(self._heads))]
+            head = self._heads[key] = self._make_head(chosen)
+        return with_stamp(head, stamp_ns) + wrenches[chosen].tobytes()
+
+    def _make_head(self, chosen: BoolArray) -> bytes:
+        """The message but its wrenches, which are at its end."""
+        rows = np.flatnonzero(chosen).tolist()
+        blank = WrenchArrays.of_rows(
+            0, [self._names[row] for row in rows], np.zeros((len(rows), 6)), [], self._frame_id
+        )
+        whole = encode_wrenches(blank)
+        return whole[: len(whole) - blank.wrenches.nbytes]
 
 
 def decode_wrenches(raw: bytes) -> WrenchArrays:

@@ -13,14 +13,19 @@ from std_msgs.msg import Header, String
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.robot_description import robot_description
-from msgs_config.geometry import rotations
+from msgs_config.geometry import frames
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.cdr import DoublesEncoder, split_stamp, with_stamp
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Outgoing, Topic
-from msgs_config.messages.wrenches import WORLD, WrenchArrays, encode_wrenches, select
+from msgs_config.messages.wrenches import (
+    WORLD,
+    SelectionEncoder,
+    WrenchArrays,
+    encode_wrenches,
+)
 from msgs_config.parameters import Values
 from msgs_config.runtime.composition import UNTIL_A_MESSAGE, Turns
 from msgs_config.runtime.process import StopSignal
@@ -79,7 +84,10 @@ class Publishers:
         session = self._session
         self._state_encoder = JointStateEncoder(self._character.layout.dof_names, session)
         self._no_wrenches = encode_wrenches(WrenchArrays.of_rows(0, [], [], [], session))
+        self._contacts_encoder = SelectionEncoder(self._links, session)
         self._odometry_encoder = DoublesEncoder(WORLD, self._base)
+        # the covariances stay zero, which means unknown
+        self._odometry_doubles = np.zeros(_ODOMETRY_DOUBLES)
         self._markers = MarkerEncoder(self._character.character)
 
     @property
@@ -177,8 +185,7 @@ class Publishers:
         contacts, stamp_ns = self._character.contacts, self._character.state.stamp_ns
         if contacts is None:
             return with_stamp(self._no_wrenches, stamp_ns)
-        touching = (self._links, contacts.wrenches, contacts.touching)
-        return encode_wrenches(select(stamp_ns, *touching, self._session))
+        return self._contacts_encoder.encode(stamp_ns, contacts.wrenches, contacts.touching)
 
     def _encode_applied(self) -> bytes:
         """The pushes that acted during the tick."""
@@ -212,12 +219,13 @@ class Publishers:
             self._transforms.publish(TFMessage(transforms=[transform]))
 
     def _encode_odometry(self, origin: FloatArray, turn: FloatArray) -> bytes:
-        """The serialised message; its covariances are zero, which means unknown."""
-        values = np.zeros(_ODOMETRY_DOUBLES)
+        """The serialised message."""
+        values = self._odometry_doubles
         values[_POSITION], values[_ORIENTATION] = origin, turn
         if self._character.layout.has_floating_base:
             velocity = self._character.state.velocity
-            values[_LINEAR] = rotations.rotate(rotations.conjugate(turn), velocity[:3])
+            into_base = frames.axes(frames.conjugate(turn.tolist()))
+            values[_LINEAR] = frames.to_parent(into_base, velocity[:3].tolist())
             values[_ANGULAR] = velocity[3:6]
         return self._odometry_encoder.encode(self._character.state.stamp_ns, values)
 

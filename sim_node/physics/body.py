@@ -160,7 +160,7 @@ class Body:
 
     def base_frame(self) -> tuple[FloatArray, FloatArray]:
         """Origin (3,) in m and orientation xyzw (4,) of the base link in the world."""
-        origin, turn, _ = self._base_frame()
+        origin, turn, _ = self._base_read or self._base_frame()
         return np.array(origin), np.array(turn)
 
     def link_frames(self) -> tuple[FloatArray, FloatArray]:

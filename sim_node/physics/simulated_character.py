@@ -81,6 +81,8 @@ class SimulatedCharacter:
         self.commanded: BoolArray = self.layout.mask(setup.commanded_joints)
         self._limits = EffortLimits(self.layout, setup.character.effort_limits())
         self.saturated_ticks: IntArray = np.zeros(len(self._limits.values), dtype=np.intp)  # (b,)
+        links = len(self.character.links)
+        self._no_contacts = Contacts(np.zeros((links, 6)), np.zeros(links, dtype=np.bool_))
         self._position = self._initial("initial_position", setup.initial_position)
         self._velocity = self._initial("initial_velocity", setup.initial_velocity)
         self._passive = PassiveForces(setup.character, step_s, setup.inverse_mass)
@@ -102,7 +104,7 @@ class SimulatedCharacter:
         self._delayed = deque([np.zeros(self.layout.size)] * self._delay_ticks)
         self._body, self.balls = body, balls
         body.set_state(self._position, self._velocity)
-        self.contacts = self._no_contacts()
+        self.contacts = self._no_contacts
         self.pushes = ()
         self._read(stamp_ns, effort=None)
 
@@ -116,7 +118,7 @@ class SimulatedCharacter:
         if self._applied is not wanted:
             self.saturated_ticks += self.layout.norms(wanted) > self._limits.values
         self.pushes = tuple(pushes)
-        self.contacts = self._no_contacts() if watches_contacts else None
+        self.contacts = self._no_contacts if watches_contacts else None
 
     def begin_substep(self, first: bool) -> None:
         """Apply all forces again for one engine step."""
@@ -134,6 +136,9 @@ class SimulatedCharacter:
         """Add the contacts of the last engine step, which is a share of the tick."""
         assert self.contacts is not None
         wrenches, touching = self._body.contact_wrenches(touched, self._centres)
+        if share == 1.0:  # mostly
+            self.contacts = Contacts(wrenches, touching)
+            return
         self.contacts = Contacts(
             self.contacts.wrenches + share * wrenches, self.contacts.touching | touching
         )
@@ -178,10 +183,6 @@ class SimulatedCharacter:
                 f"at {state.position[worst]:.4g} with velocity {state.velocity[worst]:.4g}; "
                 f"the limit is {self._bounds[1, worst]:g}"
             )
-
-    def _no_contacts(self) -> Contacts:
-        links = len(self.character.links)
-        return Contacts(np.zeros((links, 6)), np.zeros(links, dtype=np.bool_))
 
     def _read(self, stamp_ns: int, effort: FloatArray | None) -> None:
         self._motion = self._body.read()

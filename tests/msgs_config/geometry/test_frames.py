@@ -11,6 +11,16 @@ vectors = st.tuples(numbers, numbers, numbers)
 turns = vectors.map(lambda vector: tuple(rotations.exp(np.array(vector)).tolist()))
 
 
+@given(st.one_of(st.just((0.0, 0.0, 0.0)), vectors))
+def test_quaternions_and_their_inverses_are_the_arrays(vector: frames.Triple) -> None:
+    wanted = rotations.exp(np.array(vector))
+
+    turn = frames.quaternion(vector)
+
+    assert turn == tuple(wanted.tolist())
+    assert frames.conjugate(turn) == tuple(rotations.conjugate(wanted).tolist())
+
+
 @given(turns, turns)
 def test_products_are_the_arrays(a: frames.Quaternion, b: frames.Quaternion) -> None:
     wanted = rotations.multiply(np.array(a), np.array(b))

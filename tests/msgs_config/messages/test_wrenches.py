@@ -17,7 +17,13 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import MessageError
 from msgs_config.messages.cdr import with_stamp
 from msgs_config.messages.joint_state import JointStateEncoder
-from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches, encode_wrenches, select
+from msgs_config.messages.wrenches import (
+    SelectionEncoder,
+    WrenchArrays,
+    decode_wrenches,
+    encode_wrenches,
+    select,
+)
 
 PROPERTY = settings(max_examples=150, deadline=None)
 SECOND = 10**9
@@ -93,6 +99,20 @@ def test_only_what_touches_is_selected(touching: list[bool]) -> None:
     np.testing.assert_array_equal(selected.wrenches, wrenches[touching])
     assert selected.points.shape == (0, 3)
     assert_same_wrenches(decode_wrenches(encode_wrenches(selected)), selected)
+
+
+@pytest.mark.parametrize("links", [4, 9])
+def test_any_selection_is_encoded_as_it_is_elsewhere(links: int) -> None:
+    names = [f"link{'s' * row}" for row in range(links)]
+    encoder = SelectionEncoder(names, "/sim_node#1")
+    rng = np.random.default_rng(links)
+    every = [np.array([bits >> row & 1 for row in range(links)], bool) for bits in range(2**links)]
+
+    for touching in every + every:  # more than are kept, and each again
+        wrenches = rng.normal(size=(links, 6))
+        stamp_ns = int(rng.integers(10**10))
+        wanted = encode_wrenches(select(stamp_ns, names, wrenches, touching, "/sim_node#1"))
+        assert encoder.encode(stamp_ns, wrenches, touching) == wanted
 
 
 def test_a_message_with_another_stamp_is_the_same_otherwise() -> None:
