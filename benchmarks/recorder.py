@@ -40,15 +40,19 @@ def _real_time() -> RunPlan:
     return make_plan(CHARACTER, _REAL_TIME_DURATION, reference, simulator, {"law": "zero"})
 
 
-def time_run(plan: RunPlan, *, recorded: bool) -> Timing:
-    """Run simulator and controller, with a recorder of everything or without."""
+def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> Timing:
+    """Run simulator and controller as `run` does, with a recorder of everything or without."""
     with Nodes() as nodes, tempfile.TemporaryDirectory() as directory:
         recorder = None
         if recorded:
             recorder = nodes.start(topics.RECORDER_NODE, {"directory": directory})
         listeners = {"wait_for_subscribers": 1 + recorded}
-        nodes.start(topics.CONTROLLER_NODE, {**plan.controller, **listeners})
-        nodes.start(topics.SIM_NODE, {**plan.simulator, **listeners})
+        simulator, controller = {**plan.simulator, **listeners}, {**plan.controller, **listeners}
+        if composed:
+            nodes.start_composed(simulator, controller)
+        else:
+            nodes.start(topics.CONTROLLER_NODE, controller)
+            nodes.start(topics.SIM_NODE, simulator)
         nodes.wait_until(lambda: _tick(nodes) > 1)
         first, began = _tick(nodes), time.monotonic()
         busy = processor_time(recorder) if recorder else 0.0
@@ -64,31 +68,39 @@ def _tick(nodes: Nodes) -> int:
 
 def measure_recorder(console: Console) -> list[Ratio]:
     """Measure and print the table; how much slower the loop is, and the recorder's share."""
-    console.print(f"recorder: {CHARACTER} at {RATE} Hz, {_PAIRS} pairs of runs ...")
+    console.print(f"recorder: {CHARACTER} at {RATE} Hz, {_PAIRS} pairs of runs, two ways ...")
     plan = walk(_DURATION)
-    without, beside = [], []
+    pairs: dict[bool, list[tuple[Timing, Timing]]] = {True: [], False: []}
     for _ in range(_PAIRS):  # in turns: the machine may be busier at times
-        without.append(time_run(plan, recorded=False))
-        beside.append(time_run(plan, recorded=True))
-    real_time = time_run(_real_time(), recorded=True)
-    ratios = [a.ticks_per_s / b.ticks_per_s for a, b in zip(without, beside, strict=True)]
-    share = _median([t.share for t in beside])
-    rows = {
-        "ticks a second without it": f"{_median([t.ticks_per_s for t in without]):.0f}",
-        "beside it": f"{_median([t.ticks_per_s for t in beside]):.0f}",
-        "slow-down": f"{_median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})",
-        "its share of a core": f"{share:.0%}",
-        f"in real time, {real_time.ticks_per_s:.0f} ticks a second": f"{real_time.share:.0%}",
-    }
+        for composed, timings in pairs.items():
+            without = time_run(plan, recorded=False, composed=composed)
+            timings.append((without, time_run(plan, recorded=True, composed=composed)))
+    real_time = time_run(_real_time(), recorded=True, composed=False)
     title = f"recorder of all topics, {CHARACTER} at {RATE} Hz in lockstep, medians"
-    table = Table(title=title, title_justify="left", show_header=False)
-    for label, value in rows.items():
-        table.add_row(label, value)
+    table = Table("", "composed", "two processes", title=title, title_justify="left")
+    ratios = {composed: _slow_downs(timings) for composed, timings in pairs.items()}
+    shares = {way: _median([beside.share for _, beside in runs]) for way, runs in pairs.items()}
+    table.add_row("ticks a second without it", *(_ticks(runs, 0) for runs in pairs.values()))
+    table.add_row("beside it", *(_ticks(runs, 1) for runs in pairs.values()))
+    spans = [f"{_median(r):.2f} ({min(r):.2f} to {max(r):.2f})" for r in ratios.values()]
+    table.add_row("slow-down", *spans)
+    table.add_row("its share of a core", *(f"{share:.0%}" for share in shares.values()))
+    label = f"in real time, {real_time.ticks_per_s:.0f} ticks a second"
+    table.add_row(label, "", f"{real_time.share:.0%}")
     console.print(table)
     return [
-        Ratio("recorder, slow-down", _median(ratios), "a tick beside it / one without it"),
-        Ratio("recorder, share", share, "its processor time / the run's"),
+        Ratio("recorder, slow-down", _median(ratios[False]), "a tick beside it / one without it"),
+        Ratio("recorder, slow-down, composed", _median(ratios[True]), "likewise, composed"),
+        Ratio("recorder, share", shares[False], "its processor time / the run's"),
     ]
+
+
+def _slow_downs(timings: list[tuple[Timing, Timing]]) -> list[float]:
+    return [without.ticks_per_s / beside.ticks_per_s for without, beside in timings]
+
+
+def _ticks(timings: list[tuple[Timing, Timing]], which: int) -> str:
+    return f"{_median([pair[which].ticks_per_s for pair in timings]):.0f}"
 
 
 def _median(values: list[float]) -> float:
