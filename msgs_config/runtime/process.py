@@ -104,10 +104,10 @@ def run_node(load: Callable[[], Callable[[], RunnableNode]], about: str = "") ->
     """
     stop = StopSignal()
     node, code = None, EXIT_ERROR
-    for sentence in shadowed_packages():
-        print(f"warning: {sentence}", file=sys.stderr, flush=True)
     try:
         with stop.ending_at_once():
+            for sentence in shadowed_packages():
+                print(f"warning: {sentence}", file=sys.stderr, flush=True)
             _start_ros(about)
             make_node = load()
         node = make_node()
