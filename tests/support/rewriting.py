@@ -1,7 +1,6 @@
 """Bags with something changed in them: other messages, or one bit of a number."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +62,7 @@ def with_flipped_effort(
             return message.raw
         done = True
         effort = flipped(content.effort, content.names.index(name), bit)
-        return encoded(replace(content, effort=effort))
+        return encoded(content._replace(effort=effort))
 
     rewrite(bag, target, change)
     assert done
