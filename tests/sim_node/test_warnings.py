@@ -1,5 +1,6 @@
 """What the simulator's node warns of: what it lacks, what it cannot do, in lines that end."""
 
+import re
 from pathlib import Path
 
 from msgs_config.messages import topics
@@ -20,7 +21,8 @@ def test_a_simulator_that_lacks_subscribers_says_how_many_once_and_begins_when_t
     node = processes.simulator(wait_for_subscribers=2)
 
     wait_until(lambda: "waiting for" in node.stderr, "the warning")
-    assert "waiting for 2 subscribers of joint_states; there are 1;" in node.stderr
+    # as many as had been discovered by then: on a busy machine that may be none
+    assert re.search("waiting for 2 subscribers of joint_states; there are [01];", node.stderr)
     client.get_parameters(topics.SIM_NODE, ["rate"])  # what has come by now is received with it
     assert len(client.states) == 0
     second = join("second")

@@ -421,10 +421,13 @@ class SimulatorClient(Client):
             lambda: self.states.of_stamp(stamp), f"state of tick {tick}", patience
         )
 
-    def first_state(self) -> JointState:
-        """The state of tick 1, once the simulator hears commands and pushes as well."""
+    def first_state(self, listeners: int = 1) -> JointState:
+        """The state of tick 1, once so many hear commands and pushes: the simulator, a recorder."""
         for publisher in (self.torques, self.wrenches):
-            self.spin_until(publisher.get_subscription_count, "a simulator that listens")
+            self.spin_until(
+                lambda publisher=publisher: publisher.get_subscription_count() >= listeners,
+                f"{listeners} that listen to commands and pushes",
+            )
         return self.state(1)
 
     def command(self, stamp: int, efforts: Mapping[str, float]) -> None:

@@ -128,7 +128,7 @@ def test_what_was_flushed_is_on_the_disk_before_the_recorder_says_so(
 ) -> None:
     recorder = processes.node(topics.RECORDER_NODE, directory="run", progress_period=0.1)
     processes.simulator("pendulum", wait_for_subscribers=2)
-    state = client.advance(client.first_state(), {})
+    state = client.advance(client.first_state(listeners=2), {})
     while tick_of(state) < 30:
         state = client.advance(state, {})
 
@@ -215,7 +215,7 @@ def test_messages_that_were_lost_are_counted_by_topic_and_said(
     flood = client.speak(Topic("flood", Header, qos))
     recorder = processes.node(topics.RECORDER_NODE, directory="run", topics=["flood"])
     processes.simulator("pendulum", wait_for_subscribers=2)
-    state = client.first_state()
+    state = client.first_state(listeners=2)
     client.spin_until(flood.get_subscription_count, "a recorder")
 
     numbers = itertools.count()

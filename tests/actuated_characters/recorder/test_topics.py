@@ -29,7 +29,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.topics import Topic
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import character, simulation
-from tests.support.ros import Processes, SimulatorClient, tick_of, wrench_message
+from tests.support.ros import PATIENCE, Processes, SimulatorClient, tick_of, wrench_message
 
 pytestmark = pytest.mark.slow
 
@@ -50,10 +50,7 @@ def record(
     simulator = processes.simulator(
         "humanoid", max_ticks=TICKS, wait_for_subscribers=2, wrench_duration=3.0 / 240.0
     )
-    state = client.first_state()
-    client.spin_until(
-        lambda: client.wrenches.get_subscription_count() == 2, "simulator and recorder"
-    )
+    state = client.first_state(listeners=2)
     client.wrenches.publish(
         wrench_message(
             CLOCK.stamp_ns(PUSHED_AT),
@@ -65,6 +62,7 @@ def record(
         )
     )
     client.drive(state, TICKS, np.random.default_rng(4))
+    assert client.wrenches.wait_for_all_acked(Duration(seconds=PATIENCE))
     assert simulator.wait() == 0
     recorder.send(signal.SIGINT)
     assert recorder.wait() == 0

@@ -95,10 +95,7 @@ def test_two_resets_a_pause_and_clipped_torques_come_again(
     order = {"republish_period": 0.05, "step_count": 5, "wait_for_subscribers": 2}
     processes.simulator("humanoid", **motion, **order, **given)
     rng = np.random.default_rng(5)
-    state = client.first_state()
-    client.spin_until(
-        lambda: client.torques.get_subscription_count() == 2, "simulator and recorder"
-    )
+    state = client.first_state(listeners=2)
     state = drive_hard(client, state, 40, rng)
     for ticks in (60, 30):
         assert client.reset().success
