@@ -23,6 +23,7 @@ class RecordedMessage(NamedTuple):
     log_time_ns: int
     raw: bytes
     type_name: str  # as "sensor_msgs/msg/JointState"
+    published_ns: int | None = None  # wall time; None where nothing says it
 
     def decode(self) -> Any:
         """The message as an object of its ROS class.
@@ -41,7 +42,8 @@ class RecordedMessage(NamedTuple):
 def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
     """Yield the messages of a recording, or those of `topics` only.
 
-    They come in the order of their log times, those of equal time as they were written.
+    They come in the order of their log times; those of equal time in that of their publishing, and
+    then as they were written.
 
     Args:
         path: A rosbag2 directory, or a single .mcap or .db3 file that is complete.
@@ -75,7 +77,8 @@ def _messages(
     streams = [
         _read(path, place, file, names) for place, file in zip(bag.files, files, strict=True)
     ]
-    for log_time_ns, _, topic, stored in heapq.merge(*streams, key=lambda each: each.log_time_ns):
+    for message in heapq.merge(*streams, key=lambda each: each.log_time_ns):
+        log_time_ns, published_ns, _, topic, stored, _ = message
         packed = bag.compression_mode == metadata.MESSAGE
         if not is_bag:  # no metadata says it
             packed = stored.startswith(storage.ZSTD_MAGIC)
@@ -83,7 +86,7 @@ def _messages(
             raw = limits.unpack_message(stored, packed=packed)
         except limits.LimitError as error:
             raise ValueError(f"on '{topic.name}' {error}") from error
-        yield RecordedMessage(topic.name, log_time_ns, raw, topic.type_name)
+        yield RecordedMessage(topic.name, log_time_ns, raw, topic.type_name, published_ns)
 
 
 def _open(path: Path, file: Path, compression_mode: str, stack: ExitStack) -> McapFile | SqliteFile:

@@ -62,11 +62,17 @@ def rewrite(damaged: Path, new: Path, progress: Progress) -> RecoveredContents:
         parts = f" (unreadable: {'; '.join(contents.unreadable)})" if contents.unreadable else ""
         raise RecordingError(f"nothing to recover in {damaged}: no message reached the disk{parts}")
     is_compressed = any(file.is_compressed for file in files)
-    with BagWriter(new, compression=storage.ZSTD if is_compressed else storage.NONE) as bag:
+    simulated = first.topic.has_simulated_log_time
+    with BagWriter(
+        new,
+        compression=storage.ZSTD if is_compressed else storage.NONE,
+        log_time=storage.SIMULATED if simulated else storage.WALL,
+    ) as bag:
         announced = set[str]()
-        for topic, raw, log_time_ns in chain((first,), messages):
+        for message in chain((first,), messages):
+            log_time_ns, published_ns, _, topic, raw, number = message
             _announce(topic, bag, announced)
-            bag.write(topic.name, raw, log_time_ns)
+            bag.write(topic.name, raw, log_time_ns, published_ns, number or None)
             contents.add(topic.name, log_time_ns)
         for topic in (topic for file in files for topic in file.topics.values()):
             if topic.serialization == CDR:
@@ -111,8 +117,8 @@ def storage_files(bag: Path) -> list[Path]:
 
 def _salvage(
     files: list[McapFile], contents: RecoveredContents, progress: Progress
-) -> Iterator[tuple[StoredTopic, bytes, int]]:
-    """Yield topic, content and log time (ns) of the messages of all files, one after the other."""
+) -> Iterator[StoredMessage]:
+    """Yield the messages of all files, unpacked, one after the other."""
     types: dict[str, str] = {}
     for number, file in enumerate(files):
         try:
@@ -127,7 +133,7 @@ def _salvage(
                 except limits.DAMAGED as error:
                     file.unreadable[str(error)] += 1
                 else:
-                    yield message.topic, raw, message.log_time_ns
+                    yield message._replace(raw=raw)
         except RecordingError as error:  # another file may be sound
             contents.unreadable.append(str(error))
         if file.damage:
@@ -141,7 +147,7 @@ def _check(message: StoredMessage, types: dict[str, str]) -> None:
         raise ValueError(f"message on '{topic.name}' as {topic.serialization}, not as {CDR}")
     if types.setdefault(topic.name, topic.type_name) != topic.type_name:
         raise ValueError(f"message on '{topic.name}' of another type, {topic.type_name}")
-    if message.log_time_ns > storage.LATEST_NS:
+    if max(message.log_time_ns, message.published_ns or 0) > storage.LATEST_NS:
         raise ValueError("message of an impossible time")
 
 

@@ -21,19 +21,22 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer, WriterError
-from rosbags.rosbag2.storage_mcap import McapWriter
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, WriterError
 
 from actuated_characters.bags.directory_lock import DirectoryLock
 from actuated_characters.bags.format.definitions import MessageDefinition, read_definition
+from actuated_characters.bags.format.rosbags_storage import McapStorage, RosbagWriter, SqliteStorage
 from actuated_characters.bags.format.storage import (
     COMPRESSIONS,
     LATEST_NS,
+    LOG_TIME,
+    LOG_TIMES,
     MCAP,
     NONE,
+    SIMULATED,
     SQLITE3,
     STORAGES,
+    WALL,
     ZSTD,
     reason,
 )
@@ -54,22 +57,28 @@ class BagWriter:
     must not raise into `write` or `close`, which would leave half a record: let it set a flag.
     """
 
-    def __init__(self, path: Path, *, storage: str = MCAP, compression: str = NONE) -> None:
+    def __init__(
+        self, path: Path, *, storage: str = MCAP, compression: str = NONE, log_time: str = WALL
+    ) -> None:
         """Create the directory `path`, and its parents; nothing stays of it where that fails.
 
         Args:
             path: Where the recording goes.
             storage: `mcap`, or `sqlite3` as ROS 2 Humble has it by default.
             compression: `none` or `zstd`, of MCAP's chunks or of each message: half the size.
+            log_time: `wall` or `simulated`, the clock of the log times; the bag names the latter.
 
         Raises:
-            ConfigurationError: There is no such storage or compression.
+            ConfigurationError: There is no such storage, compression or log time.
             RecordingError: `path` exists already or cannot be created.
         """
-        if storage not in STORAGES:
-            raise ConfigurationError(one_of("storage", storage, list(STORAGES)))
-        if compression not in COMPRESSIONS:
-            raise ConfigurationError(one_of("compression", compression, list(COMPRESSIONS)))
+        for what, value, choices in (
+            ("storage", storage, STORAGES),
+            ("compression", compression, COMPRESSIONS),
+            ("log time", log_time, LOG_TIMES),
+        ):
+            if value not in choices:
+                raise ConfigurationError(one_of(what, value, list(choices)))
         wrong = next((character for character in "?#%" if character in str(path)), None)
         if storage == SQLITE3 and wrong is not None:  # SQLite takes it for a part of a URI
             raise RecordingError(
@@ -78,7 +87,9 @@ class BagWriter:
         self.path = path
         self._connections: dict[str, Connection] = {}
         try:
-            self._writer = Writer(path, version=9, storage_plugin=_PLUGINS[storage])
+            self._writer = RosbagWriter(path, version=9, storage_plugin=_PLUGINS[storage])
+            if log_time == SIMULATED:
+                self._writer.set_custom_data(LOG_TIME, SIMULATED)
             if compression == ZSTD:
                 self._writer.set_compression(_MODES[storage], CompressionFormat.ZSTD)
             self._open()
@@ -99,10 +110,9 @@ class BagWriter:
                 self._writer.abort()
             shutil.rmtree(self.path, ignore_errors=True)  # it was not there before
             raise
-        storage = self._writer.storage
-        if isinstance(storage, Sqlite3Writer):
-            # A process that is killed loses nothing by it, and a commit does not wait for the disk.
-            storage.conn.execute("PRAGMA synchronous=OFF")
+        self._storage = self._writer.storage
+        if isinstance(self._storage, McapStorage):
+            self._storage.has_simulated_log_time = LOG_TIME in self._writer.custom_data
 
     def __enter__(self) -> Self:
         return self
@@ -132,8 +142,22 @@ class BagWriter:
             offered_qos_profiles=offered,
         )
 
-    def write(self, topic: str, raw: bytes, log_time_ns: int) -> None:
-        """Append a message, serialised as CDR; `log_time_ns` is when it was published, ns.
+    def write(
+        self,
+        topic: str,
+        raw: bytes,
+        log_time_ns: int,
+        published_ns: int | None = None,
+        number: int | None = None,
+    ) -> None:
+        """Append a message, serialised as CDR.
+
+        Args:
+            topic: Its topic, which was added.
+            raw: The message.
+            log_time_ns: When it was published, by the clock of the bag's log times, ns.
+            published_ns: Wall time of that, ns; None: the log time. SQLite has no place for it.
+            number: Of the messages of its topic, in MCAP; None: counted from 1 on.
 
         Raises:
             RecordingError: The recording is closed, the topic was never added, the time is out of
@@ -144,6 +168,14 @@ class BagWriter:
             raise RecordingError(one_of("topic", topic, list(self._connections)))
         if not 0 <= log_time_ns <= LATEST_NS:
             raise RecordingError(f"log time {log_time_ns} ns is not within 0 to {LATEST_NS} ns")
+        if isinstance(self._storage, McapStorage):
+            if published_ns is None:
+                published_ns = log_time_ns
+            elif not 0 <= published_ns <= LATEST_NS:
+                raise RecordingError(
+                    f"time of publishing {published_ns} ns is not within 0 to {LATEST_NS} ns"
+                )
+            self._storage.describe_next(published_ns, number)
         self._attempt(self._writer.write, self._connections[topic], log_time_ns, raw)
 
     def flush(self) -> None:
@@ -157,17 +189,8 @@ class BagWriter:
             RecordingError: The recording is closed, or the disk refuses the data, which closes it.
         """
         self._check_open()
-        self._attempt(self._flush)
-
-    def _flush(self) -> None:
-        """rosbags has no public way to do it: this is the one place that knows its insides."""
-        storage = self._writer.storage
-        if isinstance(storage, McapWriter):
-            if storage.chunk.msgs:  # an empty chunk would be a record for nothing
-                storage.close_chunk()
-            storage.bio.flush()
-        elif isinstance(storage, Sqlite3Writer):
-            storage.conn.commit()
+        assert isinstance(self._storage, McapStorage | SqliteStorage)
+        self._attempt(self._storage.flush)
 
     def close(self) -> None:
         """Complete the recording: the rest of the messages, the index and the metadata.

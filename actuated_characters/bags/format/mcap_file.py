@@ -21,7 +21,14 @@ from mcap.records import Channel, Chunk, ChunkIndex, Footer, Header, Schema, Sta
 from mcap.stream_reader import StreamReader
 
 from actuated_characters.bags.format import limits
-from actuated_characters.bags.format.storage import StoredMessage, StoredTopic
+from actuated_characters.bags.format.storage import (
+    LOG_TIME,
+    OFFERED_QOS,
+    SIMULATED,
+    TYPE_HASH,
+    StoredMessage,
+    StoredTopic,
+)
 from msgs_config.errors import RecordingError
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -33,6 +40,7 @@ _MESSAGE, _CHUNK = int(Opcode.MESSAGE), int(Opcode.CHUNK)
 _IN_CHUNK = {int(Opcode.SCHEMA), int(Opcode.CHANNEL), _MESSAGE}
 _ENDS = {(int(Opcode.DATA_END), 4), (int(Opcode.FOOTER), 20)}  # kinds with their lengths
 _UNKNOWN = range(max(Opcode) + 1, 0x80)  # kinds; those of other programs begin at 0x80
+_BEHIND_SUMMARY_CRC = 4 + len(_MAGIC)  # bytes from the checksum to the end
 _CUT_OFF = "bytes cut off"
 _MOST_NAMED = 5  # kinds of damage
 _LEAST_HELD = 200  # bytes that a message takes in memory beside its own
@@ -162,14 +170,16 @@ class McapFile:
                 if kind in wanted and length > limits.MOST_OF_CHUNK:
                     self.unreadable[f"record of more than {limits.MOST_OF_CHUNK} bytes"] += 1
                 elif kind in wanted and kind == _MESSAGE and length >= _MESSAGE_HEAD.size:
-                    channel, _, log_time_ns, _ = _MESSAGE_HEAD.unpack(
-                        stream.read(_MESSAGE_HEAD.size)
-                    )
+                    head = stream.read(_MESSAGE_HEAD.size)
+                    channel, number, log_time_ns, published_ns = _MESSAGE_HEAD.unpack(head)
                     if (topic := self.topics.get(channel)) is None:
                         self.unreadable["message of a topic that is not announced"] += 1
                     elif self._names is None or topic.name in self._names:
                         raw = stream.read(length - _MESSAGE_HEAD.size)
-                        yield StoredMessage(log_time_ns, (place, begin), topic, raw)
+                        if not topic.has_simulated_log_time:  # publishers' clocks may differ
+                            published_ns = log_time_ns
+                        at = (place, begin)
+                        yield StoredMessage(log_time_ns, published_ns, at, topic, raw, number)
                 elif kind in wanted:
                     yield from self._parse(kind, stream.read(length), begin)
                 elif kind in _UNKNOWN:
@@ -206,8 +216,9 @@ class McapFile:
             schema.name,
             channel.message_encoding,
             schema.data.decode(errors="replace"),
-            channel.metadata.get("topic_type_hash", ""),  # as rosbag2 writes it from Jazzy on
-            channel.metadata.get("offered_qos_profiles", ""),
+            channel.metadata.get(TYPE_HASH, ""),  # as rosbag2 writes it from Jazzy on
+            channel.metadata.get(OFFERED_QOS, ""),
+            channel.metadata.get(LOG_TIME) == SIMULATED,
         )
 
     def _read_summary(self, file: BinaryIO) -> None:
@@ -226,6 +237,13 @@ class McapFile:
         if not footer.summary_start:
             return
         file.seek(footer.summary_start)
+        if footer.summary_crc:  # of all up to the checksum itself
+            size = file.seek(-_BEHIND_SUMMARY_CRC, SEEK_END) - footer.summary_start
+            limits.check_size("a summary", size, limits.MOST_OF_CHUNK)
+            file.seek(footer.summary_start)
+            if zlib.crc32(file.read(size)) != footer.summary_crc:
+                raise ValueError("the checksum of its summary is wrong")
+            file.seek(footer.summary_start)
         # The library's own `get_summary` would unpack what a damaged footer points to.
         reader = StreamReader(file, True, emit_chunks=True, record_size_limit=limits.MOST_OF_CHUNK)
         self._chunks = []

@@ -4,7 +4,14 @@ from collections.abc import Collection, Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-from actuated_characters.bags.format.storage import CDR, MCAP, SUFFIXES, ZSTD, reason
+from actuated_characters.bags.format.storage import (
+    CDR,
+    MCAP,
+    MOST_OF_METADATA,
+    SUFFIXES,
+    ZSTD,
+    reason,
+)
 from actuated_characters.runs.run_directory import BAG
 from msgs_config import files
 from msgs_config.errors import RecordingError, one_of
@@ -12,7 +19,6 @@ from msgs_config.errors import RecordingError, one_of
 METADATA = "metadata.yaml"
 FILE, MESSAGE = "file", "message"  # that rosbag2 compressed; MCAP's chunks tell themselves
 _LATEST_VERSION = 9  # of Jazzy
-_MOST = 1 << 22  # characters; of a hundred topics it has some 100,000
 
 
 class BagMetadata(NamedTuple):
@@ -56,9 +62,9 @@ def load_metadata(bag: Path) -> Any:
         OSError, UnicodeDecodeError, KeyError, TypeError: it cannot be read, or is something else.
     """
     with (bag / METADATA).open(encoding="utf-8") as file:
-        text = file.read(_MOST + 1)
+        text = file.read(MOST_OF_METADATA + 1)
     place = f"{METADATA} is damaged"
-    content = files.parse_yaml(place, text, RecordingError, most=_MOST)
+    content = files.parse_yaml(place, text, RecordingError, most=MOST_OF_METADATA)
     return content["rosbag2_bagfile_information"]
 
 

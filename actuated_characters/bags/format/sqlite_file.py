@@ -6,7 +6,15 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 
 from actuated_characters.bags.format import limits
-from actuated_characters.bags.format.storage import StoredMessage, StoredTopic
+from actuated_characters.bags.format.storage import (
+    LOG_TIME,
+    MOST_OF_METADATA,
+    SIMULATED,
+    StoredMessage,
+    StoredTopic,
+)
+from msgs_config.errors import RecordingError
+from msgs_config.files import parse_yaml
 
 _LONGEST_ROW = limits.MOST_OF_MESSAGE + 1024  # bytes
 
@@ -36,7 +44,20 @@ class SqliteFile:
         self._tables = stack.enter_context(closing(sqlite3.connect(uri, uri=True)))
         self._tables.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST_ROW)
         rows = self._tables.execute("SELECT id, name, type, serialization_format FROM topics")
-        self.topics = {number: StoredTopic(*topic) for number, *topic in rows}
+        simulated = self._has_simulated_log_time()
+        self.topics = {
+            number: StoredTopic(*topic)._replace(has_simulated_log_time=simulated)
+            for number, *topic in rows
+        }
+
+    def _has_simulated_log_time(self) -> bool:
+        """Whether the metadata in the file says so; older files have none."""
+        try:
+            (text,) = self._tables.execute("SELECT metadata FROM metadata").fetchone()
+            content = parse_yaml("its metadata", str(text), RecordingError, most=MOST_OF_METADATA)
+            return bool(content["custom_data"][LOG_TIME] == SIMULATED)
+        except (sqlite3.OperationalError, RecordingError, KeyError, TypeError):
+            return False
 
     def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
         """Yield the messages on some topics by log time.
@@ -51,7 +72,9 @@ class SqliteFile:
                 f"WHERE topic_id IN ({', '.join('?' * len(chosen))}) ORDER BY timestamp, id",
                 chosen,
             ):
-                yield StoredMessage(log_time_ns, (place, 0), self.topics[number], raw)
+                topic = self.topics[number]
+                published_ns = None if topic.has_simulated_log_time else log_time_ns
+                yield StoredMessage(log_time_ns, published_ns, (place, 0), topic, raw)
         except sqlite3.DataError as error:
             raise limits.LimitError(
                 f"a message is larger than the limit of {limits.MOST_OF_MESSAGE >> 20} MiB"

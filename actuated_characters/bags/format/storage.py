@@ -9,7 +9,13 @@ SUFFIXES = {MCAP: ".mcap", SQLITE3: ".db3"}
 ZSTD_SUFFIX = ".zstd"  # of a file that is compressed as a whole
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # no message begins so: CDR begins with a zero
 CDR = "cdr"  # the only serialisation that ROS 2 has
+MOST_OF_METADATA = 1 << 22  # characters; of a hundred topics it has some 100,000
 LATEST_NS = 2**63 - 1  # rosbag2 holds times in int64
+ROS_DISTRO = "jazzy"  # that of the wheels
+WALL, SIMULATED = "wall", "simulated"
+LOG_TIMES = (WALL, SIMULATED)
+LOG_TIME = "log_time"  # says which one, in the metadata of channels and in rosbag2's custom data
+OFFERED_QOS, TYPE_HASH = "offered_qos_profiles", "topic_type_hash"  # of rosbag2's channels
 
 
 class StoredTopic(NamedTuple):
@@ -21,15 +27,18 @@ class StoredTopic(NamedTuple):
     definition: str = ""
     type_hash: str = ""  # empty before Jazzy
     offered_qos: str = ""  # YAML, as rosbag2 writes it
+    has_simulated_log_time: bool = False  # else log times are of the wall clock
 
 
 class StoredMessage(NamedTuple):
     """A message of a file; those of one file sort by time, and then as they were written."""
 
     log_time_ns: int
+    published_ns: int | None  # wall time; None where the storage does not have it
     place: tuple[int, int]  # in the file
     topic: StoredTopic
     raw: bytes  # as it is stored: rosbag2 may have compressed each
+    number: int = 0  # of its channel's messages; 0 if it has none
 
 
 def reason(error: Exception) -> str:

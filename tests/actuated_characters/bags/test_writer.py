@@ -223,7 +223,7 @@ def test_the_metadata_has_every_field_of_rosbag2_version_9(recording: Path) -> N
         "relative_file_paths": ["walk.1.mcap"],
         "files": [{"path": "walk.1.mcap", **span}],
         "custom_data": None,
-        "ros_distro": "rosbags",
+        "ros_distro": "jazzy",
     }
     assert [topic["message_count"] for topic in topics] == [1] * 5
     for name, topic in topic_metadata(recording).items():
