@@ -25,6 +25,11 @@ class RecordedMessage(NamedTuple):
     type_name: str  # as "sensor_msgs/msg/JointState"
     published_ns: int | None = None  # wall time; None where nothing says it
 
+    @property
+    def sent_ns(self) -> int:
+        """Time of publishing, ns; the log time, maybe a simulated one, where nothing says it."""
+        return self.log_time_ns if self.published_ns is None else self.published_ns
+
     def decode(self) -> Any:
         """The message as an object of its ROS class.
 

@@ -59,7 +59,8 @@ class Recording:
     parameters: Mapping[str, Any] = field(repr=False)  # the simulator's
     versions: Mapping[str, str] = field(default_factory=dict, repr=False)  # it ran with them
     stamps_ns: IntArray  # (t + 1,): each state once, in order, no tick left out
-    published_ns: IntArray  # (t + 1,): wall time of each state, as the bag has it
+    published_ns: IntArray  # (t + 1,): wall time of each state, as the bag has it ...
+    has_wall_times: bool = True  # ... or its log time, if that is simulated and nothing says more
     position: FloatArray  # (t + 1, n)
     velocity: FloatArray  # (t + 1, n)
     effort: FloatArray  # (t, n), as really applied in each tick; NaN in one that was a reset
@@ -218,7 +219,8 @@ def _collect(bag: Path) -> tuple[list[CharacterTimeline], dict[str, WorldTimelin
         if (place := places[topic]) is not None:
             timeline, name = place
             try:
-                timeline.take(name, message.raw, message.log_time_ns)
+                timeline.has_wall_times &= message.published_ns is not None
+                timeline.take(name, message.raw, message.sent_ns)
             except ActuatedCharactersError:
                 with _naming(bag, timeline):
                     raise
@@ -255,6 +257,7 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
         versions=known.versions,
         stamps_ns=stamps,
         published_ns=states.integers("published_ns"),
+        has_wall_times=timeline.has_wall_times,
         position=states.rows("position", size),
         velocity=states.rows("velocity", size),
         effort=states.rows("effort", size)[1:],  # the first state has none

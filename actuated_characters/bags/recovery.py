@@ -160,4 +160,4 @@ def _collect(
             shared = message.topic == topics.DIAGNOSTICS.name
             name = message.topic if shared else message.topic.removeprefix(f"{namespace}/")
             if name in HEARD:
-                collector.take(name, message.raw, message.log_time_ns)
+                collector.take(name, message.raw, message.published_ns)

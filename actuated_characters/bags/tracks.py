@@ -90,6 +90,7 @@ class WorldTimeline:
     def __init__(self, namespace: str) -> None:
         """`namespace` is without the leading slash."""
         self.namespace = namespace
+        self.has_wall_times = True
         # by the stamp of the state after the tick
         self.throws: dict[int, tuple[ProjectileThrow, ...]] = {}
         self.balls: dict[int, BallStates] = {}  # by stamp
@@ -138,6 +139,7 @@ class CharacterTimeline:
     def __init__(self, namespace: str) -> None:
         """`namespace` is without the leading slash."""
         self.namespace = namespace
+        self.has_wall_times = True  # else times of publishing are simulated log times
         self.rebuilt: Rebuilt | None = None
         self.states, self.references = States(), States()
         self.wrenches: dict[str, dict[int, WrenchArrays]] = {  # by topic and stamp

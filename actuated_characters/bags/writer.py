@@ -111,8 +111,9 @@ class BagWriter:
             shutil.rmtree(self.path, ignore_errors=True)  # it was not there before
             raise
         self._storage = self._writer.storage
-        if isinstance(self._storage, McapStorage):
-            self._storage.has_simulated_log_time = LOG_TIME in self._writer.custom_data
+        self._mcap = self._storage if isinstance(self._storage, McapStorage) else None
+        if self._mcap is not None:
+            self._mcap.has_simulated_log_time = LOG_TIME in self._writer.custom_data
 
     def __enter__(self) -> Self:
         return self
@@ -168,14 +169,14 @@ class BagWriter:
             raise RecordingError(one_of("topic", topic, list(self._connections)))
         if not 0 <= log_time_ns <= LATEST_NS:
             raise RecordingError(f"log time {log_time_ns} ns is not within 0 to {LATEST_NS} ns")
-        if isinstance(self._storage, McapStorage):
+        if self._mcap is not None:
             if published_ns is None:
                 published_ns = log_time_ns
             elif not 0 <= published_ns <= LATEST_NS:
                 raise RecordingError(
                     f"time of publishing {published_ns} ns is not within 0 to {LATEST_NS} ns"
                 )
-            self._storage.describe_next(published_ns, number)
+            self._mcap.describe_next(published_ns, number)
         self._attempt(self._writer.write, self._connections[topic], log_time_ns, raw)
 
     def flush(self) -> None:

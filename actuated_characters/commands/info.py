@@ -72,7 +72,9 @@ def _bag_rows(facts: "BagFacts") -> Iterator[tuple[str, str]]:
     if contents.start_ns is not None:
         start = datetime.fromtimestamp(contents.start_ns // _NS_PER_S, tz=UTC)
         yield "begun", start.strftime("%Y-%m-%d %H:%M:%S UTC")
-    yield "wall time", f"{contents.wall_time:.6g} s"
+    wall_time = contents.wall_time
+    unknown = "unknown, log times are simulated and SQLite has no others"
+    yield "wall time", unknown if wall_time is None else f"{wall_time:.6g} s"
     sim_time = longest_sim_time(facts)
     yield "simulated time", "unknown" if sim_time is None else f"{sim_time:.6g} s"
 
@@ -87,7 +89,7 @@ def _topics_table(facts: "BagFacts") -> Table:
             topic.count,
             "-" if topic.rate_hz is None else f"{topic.rate_hz:.4g}",
             f"{topic.count / sim_time:.4g}" if sim_time else "-",
-            f"{topic.largest_gap_ns / _NS_PER_S:.4g}" if topic.count > 1 else "-",
+            "-" if topic.largest_gap is None else f"{topic.largest_gap:.4g}",
         )
         for topic in facts.contents.topics
     ]

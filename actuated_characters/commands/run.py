@@ -35,6 +35,7 @@ _NO_PUSH = "none"
 _RECORDING = {  # options, and the recorder's parameters
     "storage": "storage",
     "compression": "compression",
+    "log_time": "log_time",
     "topic": "topics",
     "exclude": "exclude",
 }
@@ -124,6 +125,11 @@ def _add_recorded(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--compression", choices=["none", "zstd"], help="how the bag is compressed (none)"
     )
+    run.add_argument(
+        "--log-time",
+        choices=["wall", "simulated"],
+        help="clock of the bag's log times (wall); with simulated, players show 20 s as 20 s",
+    )
     for name, about in (
         ("--topic", "record this topic beside those of the simulation"),
         ("--exclude", "do not record this topic of the simulation, such as contacts"),
@@ -207,10 +213,11 @@ def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
             "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
             "nor a 'real_time_factor'"
         )
-    about_bag = [f"--{name}" for name in _RECORDING if getattr(options, name) is not None]
+    about_bag = [name for name in _RECORDING if getattr(options, name) is not None]
     if about_bag and (options.in_process or options.no_record):
+        option = about_bag[0].replace("_", "-")
         raise ConfigurationError(
-            f"{about_bag[0]} is about the bag; with --in-process or --no-record there is none"
+            f"--{option} is about the bag; with --in-process or --no-record there is none"
         )
     if options.exclude:
         from actuated_characters.recorder.topics import EXCLUDABLE

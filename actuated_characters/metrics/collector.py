@@ -44,11 +44,11 @@ class MetricsCollector:
         self._decoder = JointStateDecoder()
         self._configuration: RunConfiguration | None = None
         self._configuration_text = ""
-        self._early: list[tuple[str, bytes, int]] = []
+        self._early: list[tuple[str, bytes, int | None]] = []
         self._early_bytes = 0
         self._counts: dict[str, int | None] = dict.fromkeys(COUNTS.values())
         self._first_command_ns: int | None = None
-        self._last_state_ns = 0
+        self._last_state_ns: int | None = 0
 
     @property
     def last_tick(self) -> int:
@@ -60,8 +60,8 @@ class MetricsCollector:
         """Number of ticks before the last one whose state never came."""
         return 0 if self._configuration is None else self._assembler.missing_ticks
 
-    def take(self, topic: str, raw: bytes, published_ns: int) -> None:
-        """Take a serialised message that was published at a wall time in ns.
+    def take(self, topic: str, raw: bytes, published_ns: int | None) -> None:
+        """Take a serialised message that was published at a wall time in ns; None if not known.
 
         Raises:
             ActuatedCharactersError: the message is not what its topic should carry.
@@ -94,14 +94,20 @@ class MetricsCollector:
         if self._configuration is None:
             raise RecordingError("no simulator was heard")
         self._assembler.finish()
-        wall_ns = self._last_state_ns - (self._first_command_ns or self._last_state_ns)
-        metrics = self._measurement.summary(wall_ns / NANOSECONDS_PER_SECOND)
+        metrics = self._measurement.summary(self._wall_time())
         losses = {
             "missing_ticks": self.missing_ticks,
             "dropped_references": self._assembler.dropped_references,
         }
         head = {"character": self._configuration.character}
         return head | metrics | self._counts | losses, self._measurement.series()
+
+    def _wall_time(self) -> float | None:
+        """From the first command to the last state, s; None if not known."""
+        last_ns = self._last_state_ns
+        if last_ns is None:
+            return None
+        return (last_ns - (self._first_command_ns or last_ns)) / NANOSECONDS_PER_SECOND
 
     def _configure(self, text: str) -> None:
         if self._configuration is not None:

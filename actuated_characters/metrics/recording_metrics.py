@@ -110,7 +110,8 @@ def measure_recording(recording: Recording) -> tuple[dict[str, object], Series]:
             measurement.add_tick(Tick(before, state, _reference(recording, row - 1)))
         before = state
     wall_ns = int(recording.published_ns[-1] - recording.published_ns[0])
-    return measurement.summary(wall_ns / NANOSECONDS_PER_SECOND), measurement.series()
+    wall_time = wall_ns / NANOSECONDS_PER_SECOND if recording.has_wall_times else None
+    return measurement.summary(wall_time), measurement.series()
 
 
 def _states(recording: Recording) -> Iterator[StampedState]:

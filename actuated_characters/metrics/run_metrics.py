@@ -121,7 +121,7 @@ class Measurement:
         rows = np.vstack([np.empty((0, len(self._columns))), *self._rows])
         return dict(zip(self._columns, rows.T, strict=True))
 
-    def summary(self, wall_time: float) -> dict[str, object]:
+    def summary(self, wall_time: float | None) -> dict[str, object]:
         """The figures by name, None if not measurable; `wall_time` is that of all ticks, s."""
         series, layout = self.series(), self._layout
         sim_time = (self._last_stamp - (self._first_stamp or 0)) / NANOSECONDS_PER_SECOND
@@ -135,7 +135,7 @@ class Measurement:
             "ticks": self._ticks,
             "sim_time_s": sim_time,
             "wall_time_s": wall_time,
-            "real_time_factor": sim_time / wall_time if wall_time > 0.0 else None,
+            "real_time_factor": sim_time / wall_time if wall_time and wall_time > 0.0 else None,
             "actuators": int(commanded.sum()),
             "root_actuators": int(of_root.sum()),
             "degrees_of_freedom": layout.size,

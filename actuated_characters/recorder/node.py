@@ -9,9 +9,19 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from actuated_characters.bags.format.storage import COMPRESSIONS, MCAP, NONE, STORAGES
+from actuated_characters.bags.format.storage import (
+    COMPRESSIONS,
+    LOG_TIME,
+    LOG_TIMES,
+    MCAP,
+    NONE,
+    SIMULATED,
+    STORAGES,
+    WALL,
+)
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, MetricsCollector
+from actuated_characters.recorder.log_time import SimulatedLogTime
 from actuated_characters.recorder.session_filter import Heard, SessionFilter, find_session
 from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import (
@@ -48,6 +58,13 @@ PARAMETERS = [
     Parameter("write_bag", True, "write the bag; without it the recorder only measures"),
     Parameter("storage", MCAP, "how the bag is stored", choices=STORAGES),
     Parameter("compression", NONE, "how the bag is compressed", choices=COMPRESSIONS),
+    Parameter(
+        LOG_TIME,
+        WALL,
+        "clock of the bag's log times, by which players play it: simulated time is that of each "
+        "message's stamp, or of the last state before it",
+        choices=LOG_TIMES,
+    ),
     Parameter("topics", [], "names of topics to record beside those of the contract", texts=True),
     Parameter("exclude", [], "names of topics of the contract not to record", texts=True),
     SESSION,
@@ -89,6 +106,8 @@ class RecorderNode(Node):
             name: MetricsCollector(simulator_name(self, name)) for name in characters
         }
         self._bag = self._open_bag(values)
+        is_simulated = values.text(LOG_TIME) == SIMULATED
+        self._log_time = SimulatedLogTime() if is_simulated else None
         for recorded in wanted:
             self._add(recorded, recorded.topic.qos)
         self.get_logger().info(f"recording to {self._directory}")
@@ -96,8 +115,12 @@ class RecorderNode(Node):
     def _open_bag(self, values: Values) -> BagWriter | None:
         if not values.flag("write_bag"):
             return None
-        storage, compression = values.text("storage"), values.text("compression")
-        return BagWriter(self._directory / BAG, storage=storage, compression=compression)
+        return BagWriter(
+            self._directory / BAG,
+            storage=values.text("storage"),
+            compression=values.text("compression"),
+            log_time=values.text(LOG_TIME),
+        )
 
     def _add(self, recorded: RecordedTopic, offered: QoSProfile) -> None:
         """Record a topic from now on, whose publishers offer this."""
@@ -127,6 +150,9 @@ class RecorderNode(Node):
             executor.close()
             for message in self._filter.finish():
                 self._keep(message)
+            if self._log_time is not None:
+                for message, log_time_ns in self._log_time.finish():
+                    self._write(message, log_time_ns)
             self._to_bag(lambda bag: bag.close())
         self._conclude()
 
@@ -187,6 +213,8 @@ class RecorderNode(Node):
             for published_ns, raw in reader.take(_AT_ONCE)
         ]
         batch.sort(key=lambda message: message.published_ns)
+        if self._log_time is not None:
+            batch = self._log_time.settle(batch, everything=not gives_way)
         for message in batch:
             if passed := self._filter.take(message):
                 for each in passed:
@@ -195,9 +223,17 @@ class RecorderNode(Node):
                     os.sched_yield()
         return len(batch)
 
+    def _write(self, message: Heard, log_time_ns: int) -> None:
+        recorded, raw, published_ns = message
+        self._to_bag(lambda bag: bag.write(recorded.name, raw, log_time_ns, published_ns))
+
     def _keep(self, message: Heard) -> None:
         recorded, raw, published_ns = message
-        self._to_bag(lambda bag: bag.write(recorded.name, raw, published_ns))
+        if self._log_time is None:
+            self._to_bag(lambda bag: bag.write(recorded.name, raw, published_ns))
+        else:
+            for each, log_time_ns in self._log_time.take(message):
+                self._write(each, log_time_ns)
         if recorded.own_name not in HEARD:
             return
         for name, collector in self._collectors.items():

@@ -34,32 +34,45 @@ class TopicContents:
     name: str
     type_name: str
     count: int = 0
-    first_ns: int = 0  # log time
+    first_ns: int = 0  # when it was published, by the wall clock
     last_ns: int = 0
     largest_gap_ns: int = 0  # between two messages that follow each other
+    has_wall_times: bool = True  # else times are simulated log times
 
-    def add(self, log_time_ns: int) -> None:
+    def add(self, message: RecordedMessage) -> None:
         """Count a message, later than all before."""
+        sent_ns = message.sent_ns
         if self.count:
-            self.largest_gap_ns = max(self.largest_gap_ns, log_time_ns - self.last_ns)
+            self.largest_gap_ns = max(self.largest_gap_ns, sent_ns - self.last_ns)
         else:
-            self.first_ns = log_time_ns
-        self.last_ns = log_time_ns
+            self.first_ns = sent_ns
+        self.last_ns = sent_ns
+        self.has_wall_times &= message.published_ns is not None
         self.count += 1
 
     @property
     def rate_hz(self) -> float | None:
-        """Messages a second of wall time; None if there are not two, or all are of one time."""
+        """Messages a second of wall time; None if there are not two, or no times between them."""
+        if not self.has_wall_times:
+            return None
         span = (self.last_ns - self.first_ns) / NANOSECONDS_PER_SECOND
         return (self.count - 1) / span if span > 0.0 else None
+
+    @property
+    def largest_gap(self) -> float | None:
+        """Longest wall time from a message to the next, s; None if there are not two."""
+        if self.count < 2 or not self.has_wall_times:
+            return None
+        return self.largest_gap_ns / NANOSECONDS_PER_SECOND
 
 
 @dataclass
 class StateMessages:
-    """Stamps and log times of a topic of states, and its simulator's configuration."""
+    """Stamps and times of a topic of states, and its simulator's configuration."""
 
     stamps_ns: "array[int]" = field(default_factory=lambda: array("q"))
-    log_times_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    published_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    has_wall_times: bool = True  # else times of publishing are simulated log times
     configuration: str = ""  # JSON, the first that there was; empty if there was none
     has_topic: bool = False  # whether there is a topic of states
 
@@ -70,7 +83,8 @@ class StateMessages:
             order = "<" if raw[1] & 1 else ">"
             seconds, nanoseconds = struct.unpack_from(f"{order}iI", raw, 4)
             self.stamps_ns.append(seconds * NANOSECONDS_PER_SECOND + nanoseconds)
-            self.log_times_ns.append(message.log_time_ns)
+            self.published_ns.append(message.sent_ns)
+            self.has_wall_times &= message.published_ns is not None
 
     def configure(self, message: RecordedMessage) -> None:
         """Keep a simulator's configuration, if it can be read."""
@@ -92,13 +106,21 @@ class Contents:
     states: dict[str, StateMessages]  # by namespace
 
     @property
-    def start_ns(self) -> int | None:
-        """Log time of the first message."""
-        return min((topic.first_ns for topic in self.topics if topic.count), default=None)
+    def has_wall_times(self) -> bool:
+        """Whether times are of the wall clock, and not simulated."""
+        return all(topic.has_wall_times for topic in self.topics)
 
     @property
-    def wall_time(self) -> float:
-        """From the first message to the last, s of wall time."""
+    def start_ns(self) -> int | None:
+        """Wall time of the first message; None if not known."""
+        found = [topic.first_ns for topic in self.topics if topic.count]
+        return min(found, default=None) if self.has_wall_times else None
+
+    @property
+    def wall_time(self) -> float | None:
+        """From the first message to the last, s of wall time; None if not known."""
+        if not self.has_wall_times:
+            return None
         last = max((topic.last_ns for topic in self.topics if topic.count), default=0)
         return (last - (self.start_ns or 0)) / NANOSECONDS_PER_SECOND
 
@@ -118,7 +140,7 @@ def read_contents(path: Path) -> Contents:
         if name not in found:
             found[name] = TopicContents(name, message.type_name)
             readers[name] = _reader(name, message.type_name, states)
-        found[name].add(message.log_time_ns)
+        found[name].add(message)
         reader = readers[name]
         if reader is not None:
             reader(message)

@@ -25,7 +25,6 @@ from actuated_characters.report.timing import lateness, pauses, state_times, wal
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointType
 from msgs_config.errors import ActuatedCharactersError
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.versions import read_versions
 
 _PERCENTILES = (50, 99)
@@ -127,11 +126,12 @@ def _stream(name: str, messages: StateMessages) -> StreamFacts:
 
 
 def _timing(messages: StateMessages, rate: int, parameters: dict[str, Any]) -> dict[str, Any]:
-    stamps, log_times = (np.array(each) for each in (messages.stamps_ns, messages.log_times_ns))
-    times = state_times(stamps, log_times, rate)
-    ticks, published = times.ticks, times.published_ns
+    stamps, sent = (np.array(each) for each in (messages.stamps_ns, messages.published_ns))
+    times = state_times(stamps, sent, rate)
+    ticks = times.ticks
+    published = times.published_ns if messages.has_wall_times else times.published_ns[:0]
     gaps, steps = pauses(published), wall_steps(published)
-    period = pace_period(parameters)
+    period = pace_period(parameters) if messages.has_wall_times else 0.0
     since = (ticks - ticks[0]) / rate
     return {
         "repeated": times.repeated,
@@ -247,7 +247,7 @@ def as_json(facts: BagFacts) -> str:
                 "count": topic.count,
                 "rate_wall_hz": topic.rate_hz,
                 "rate_sim_hz": topic.count / sim_time if sim_time else None,
-                "largest_gap_s": topic.largest_gap_ns / NANOSECONDS_PER_SECOND,
+                "largest_gap_s": topic.largest_gap,
             }
             for topic in contents.topics
         ],

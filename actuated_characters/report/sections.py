@@ -59,7 +59,8 @@ class CharacterReport:
         self._metrics, _ = measure_recording(recording)
         reacts = any(span.mode != TRACK for span in facts.modes)
         self._modes = facts.modes if reacts else []
-        self._pauses = pauses(recording.published_ns)
+        times = recording.published_ns if recording.has_wall_times else recording.published_ns[:0]
+        self._pauses = pauses(times)
         breaks = recording.episode_rows[1:]
         marks = charts.Marks(
             pushes=[(push.start, push.duration) for push in facts.pushes],
@@ -229,6 +230,9 @@ class CharacterReport:
 
     def _ticks(self) -> Section:
         title, recording = "tick times", self._recording
+        if not recording.has_wall_times:
+            remark = "Wall times are not known: log times are simulated, and SQLite has no others."
+            return Section(title, remarks=[remark])
         steps = wall_steps(recording.published_ns)
         if not len(steps):
             return Section(title, remarks=["There is one state only."])

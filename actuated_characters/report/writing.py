@@ -18,7 +18,6 @@ from actuated_characters.report.sections import NAMES, STILLS, CharacterReport
 from actuated_characters.runs.run_directory import REPORT
 from actuated_characters.whole_files import write_whole
 from msgs_config.errors import RecordingError
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
 PAGE = "index.html"
 
@@ -116,11 +115,12 @@ def _is_report(page: Path) -> bool:
 
 
 def _bag_section(contents: Contents) -> Section:
+    wall_time = contents.wall_time
     facts = [
         ("bag", str(contents.bag)),
         ("files", ", ".join(f"{name} ({size} bytes)" for name, size in contents.files.items())),
         ("storage", f"{contents.storage}, compression {contents.compression}"),
-        ("wall time", f"{contents.wall_time:.6g} s"),
+        ("wall time", NOT_KNOWN if wall_time is None else f"{wall_time:.6g} s"),
     ]
     rows = [
         (
@@ -128,7 +128,7 @@ def _bag_section(contents: Contents) -> Section:
             topic.type_name,
             str(topic.count),
             NOT_KNOWN if topic.rate_hz is None else f"{topic.rate_hz:.4g}",
-            f"{topic.largest_gap_ns / NANOSECONDS_PER_SECOND:.4g}",
+            NOT_KNOWN if topic.largest_gap is None else f"{topic.largest_gap:.4g}",
         )
         for topic in contents.topics
     ]

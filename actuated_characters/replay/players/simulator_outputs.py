@@ -135,7 +135,7 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
             rare.episodes[int(np.searchsorted(recording.stamps_ns, stamp_ns))] = message.raw
         elif message.topic in types:
             content = decode(message.raw, types[message.topic])
-            by_topic.setdefault(message.topic, []).append((message.log_time_ns, content))
+            by_topic.setdefault(message.topic, []).append((message.sent_ns, content))
     for topic, active in zip(REQUESTS, _ACTIVE, strict=True):
         sent = by_topic.get(_name(recording, active)) or by_topic.get(_name(recording, topic), [])
         for published_ns, content in sent:

@@ -280,6 +280,7 @@ def test_topics_by_name_are_recorded_as_their_publishers_offer_them(
         ({"exclude": ["joint_states"]}, ["'exclude'", "'joint_states'"]),
         ({"storage": "tape"}, ["'storage'", "'tape'", "mcap, sqlite3"]),
         ({"compression": "zip"}, ["'compression'", "'zip'", "none, zstd"]),
+        ({"log_time": "sim"}, ["'log_time'", "'sim'", "wall, simulated"]),
     ],
     ids=str,
 )

@@ -1,0 +1,113 @@
+"""Log times of messages in simulated time."""
+
+import re
+import struct
+import time
+from collections.abc import Iterator
+
+from actuated_characters.bags.format.definitions import find_message_type
+from actuated_characters.recorder.session_filter import Heard
+from msgs_config.errors import RecordingError
+from msgs_config.messages import topics
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+
+_STAMP_AT, _FIRST_STAMP_AT = 4, 8  # bytes of CDR before the first field, and behind a length
+_STAMPED = {"builtin_interfaces/Time", "std_msgs/Header"}
+_SEQUENCE = re.compile(r"sequence<(\w+)/(\w+)>")
+_SETTLED_NS = 10_000_000  # within which the messages of one moment have come on all topics
+_MOST_PENDING = 1000  # messages before the first state; few topics have any then
+
+
+class SimulatedLogTime:
+    """Gives each message the time of its stamp, or else that of the last state before it.
+
+    Stamps that are not set, and those of the wall clock, do not count. No message is older than
+    the first state: what is latched has the time at which the recording begins. Messages before
+    the first state are held until then.
+    """
+
+    def __init__(self) -> None:
+        self._first_ns: int | None = None
+        self._last_ns = 0  # stamp of the newest state
+        self._pending: list[Heard] = []
+        self._places: dict[str, int | None] = {}  # of the stamp, by topic
+        self._unsettled: list[Heard] = []
+
+    def settle(self, batch: list[Heard], *, everything: bool) -> list[Heard]:
+        """Keep the newest messages back until the next call; return the rest, and those before.
+
+        Where log times are equal the order of writing counts, and topics are read one by one.
+        """
+        before, latest_ns = self._unsettled, time.time_ns() - _SETTLED_NS
+        late = [not everything and each.published_ns > latest_ns for each in batch]
+        self._unsettled = [each for each, is_late in zip(batch, late, strict=True) if is_late]
+        ready = [each for each, is_late in zip(batch, late, strict=True) if not is_late]
+        return sorted([*before, *ready], key=lambda message: message.published_ns)
+
+    def take(self, message: Heard) -> Iterator[tuple[Heard, int]]:
+        """Yield the messages whose log times (ns) are known now, with these, in their order."""
+        if self._first_ns is not None:
+            yield message, self._log_time_ns(message)
+            return
+        self._pending.append(message)
+        if message.recorded.own_name == topics.JOINT_STATES.name:
+            yield from self._release(self._read_stamp(message))
+        elif len(self._pending) > _MOST_PENDING:
+            yield from self._release(0)
+
+    def finish(self) -> Iterator[tuple[Heard, int]]:
+        """Yield the rest at the end: there was no state, and simulated time never began."""
+        if self._first_ns is None:
+            yield from self._release(0)
+
+    def _release(self, first_ns: int) -> Iterator[tuple[Heard, int]]:
+        self._first_ns = self._last_ns = first_ns
+        pending, self._pending = self._pending, []
+        for message in pending:
+            yield message, self._log_time_ns(message)
+
+    def _log_time_ns(self, message: Heard) -> int:
+        stamp_ns, last_ns = self._read_stamp(message), self._last_ns
+        if stamp_ns <= 0 or abs(stamp_ns - message.published_ns) < abs(stamp_ns - last_ns):
+            return last_ns
+        if message.recorded.own_name == topics.JOINT_STATES.name:
+            self._last_ns = max(last_ns, stamp_ns)
+        assert self._first_ns is not None
+        return max(stamp_ns, self._first_ns)
+
+    def _read_stamp(self, message: Heard) -> int:
+        """The stamp of a message, ns; 0 if it has none."""
+        name, raw = message.recorded.name, message.raw
+        if name not in self._places:
+            self._places[name] = _stamp_place(message.recorded.topic.message_type)
+        place = self._places[name]
+        try:
+            if place is None:
+                return 0
+            order = "<" if raw[1] & 1 else ">"
+            if place == _FIRST_STAMP_AT and raw[_STAMP_AT:_FIRST_STAMP_AT] == bytes(4):
+                return 0  # an empty sequence
+            seconds, nanoseconds = struct.unpack_from(f"{order}iI", raw, place)
+        except (struct.error, IndexError):  # whatever these bytes are, they are recorded
+            return 0
+        return int(seconds) * NANOSECONDS_PER_SECOND + int(nanoseconds)
+
+
+def _stamp_place(message_type: type) -> int | None:
+    """Where a serialised message has its stamp: its own, or that of the first of its elements."""
+    first = _first_field(message_type)
+    if first in _STAMPED:
+        return _STAMP_AT
+    if element := _SEQUENCE.fullmatch(first):
+        try:
+            inner = find_message_type(f"{element[1]}/msg/{element[2]}")
+        except RecordingError:
+            return None
+        if _first_field(inner) in _STAMPED:
+            return _FIRST_STAMP_AT
+    return None
+
+
+def _first_field(message_type: type) -> str:
+    """The type of a message's first field, as `std_msgs/Header`."""
+    return next(iter(message_type.get_fields_and_field_types().values()), "")  # type: ignore[attr-defined]
