@@ -9,6 +9,7 @@ from msgs_config.character.model import Character, Joint, Link
 from msgs_config.geometry import fixed_order, rotations
 
 _GRAVITY = 9.81
+_NAME = "link "  # before each link's, because MuJoCo's own body is called `world`
 
 _MUJOCO_TYPES = {
     JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE,
@@ -235,20 +236,31 @@ def compile_exactly(spec: mujoco.MjSpec, character: Character) -> mujoco.MjModel
     """Compile a model with the links of a character, whose inertia is kept to the last bit."""
     spec.compiler.balanceinertia = False
     model = spec.compile()
-    # set afterwards: the compiler refuses a link with mass but without inertia, which is sound
-    # wherever the joints above it cannot turn it about its centre of mass alone
+    # set afterwards: the compiler refuses a link without mass or inertia, which is sound wherever
+    # the joints above it do not move it alone
     model.body_inertia[1:] = [link.inertia_diagonal for link in character.links]
+    _set_masses(model, [link.mass for link in character.links])
     model.dof_simplenum[:] = 0  # else a simple body's mass matrix is the one compiled
     return model
+
+
+def _set_masses(model: mujoco.MjModel, masses: list[float]) -> None:
+    """Set the masses of all bodies but the world's, and what MuJoCo has of their sums."""
+    if model.body_mass[1:].tolist() == masses:
+        return
+    model.body_mass[1:] = masses
+    model.body_subtreemass[:] = model.body_mass
+    for body in range(model.nbody - 1, 0, -1):
+        model.body_subtreemass[model.body_parentid[body]] += model.body_subtreemass[body]
 
 
 def _add_body(parent: mujoco.MjsBody, link: Link) -> mujoco.MjsBody:
     pose, inertial = link.joint.pose_in_parent, link.inertial_pose
     body = parent.add_body(
-        name=link.name,
+        name=_NAME + link.name,
         pos=pose.position,
         quat=rotations.wxyz_from_xyzw(np.array(pose.orientation_xyzw)),
-        mass=link.mass,
+        mass=link.mass or 1.0,
         ipos=inertial.position,
         iquat=rotations.wxyz_from_xyzw(np.array(inertial.orientation_xyzw)),
         inertia=(1.0, 1.0, 1.0),

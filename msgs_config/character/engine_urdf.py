@@ -7,6 +7,7 @@ from msgs_config.character.mesh_check import check_mesh
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf_check import NUMBERS
+from msgs_config.character.urdf_repair import repair_urdf
 from msgs_config.errors import CharacterError
 
 MAX_LINE_BYTES = 8000
@@ -23,6 +24,7 @@ def write_engine_urdf(loading: UrdfOptions) -> str:
         CharacterError: a mesh does not exist or cannot be used, or an element is too long.
     """
     robot = resolve_meshes(loading)
+    repair_urdf(robot, loading)
     for link in robot.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)

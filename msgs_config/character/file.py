@@ -8,7 +8,7 @@ from typing import Any
 from msgs_config import files
 from msgs_config.character.joint_bounds import write_bounds
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
-from msgs_config.character.urdf_check import check_urdf, has_world_base
+from msgs_config.character.urdf_check import check_urdf, has_massless_base
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.mappings import LARGEST, MappingReader
 
@@ -147,7 +147,7 @@ def _read_urdf(
         urdf_path=urdf,
         urdf_text=text if known or not bounds else write_bounds(robot, bounds, scale, path),
         scale=scale,
-        fixed_base=reader.flag("fixed_base", default=has_world_base(robot)),
+        fixed_base=reader.flag("fixed_base", default=has_massless_base(robot)),
         inertia_from_file=reader.choice("inertia", ["file", "shapes"]) == "file",
         self_collision=reader.flag("self_collision"),
     )

@@ -6,6 +6,7 @@ the controller's model of the dynamics are built from the same ones.
 
 import math
 from collections.abc import Iterable
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,8 @@ from msgs_config.character.model import (
     Pose,
 )
 from msgs_config.character.shapes import read_shapes
-from msgs_config.character.urdf_check import links_without_inertial
+from msgs_config.character.urdf_agreement import check_links
+from msgs_config.character.urdf_repair import repair_urdf
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.geometry import rotations
 
@@ -59,6 +61,9 @@ def build_character(file: CharacterFile) -> Character:
     finally:
         pybullet.disconnect(client)
     _check_links(urdf, links)
+    repaired = deepcopy(file.loading.robot)
+    repairs = repair_urdf(repaired, file.loading)
+    check_links(links, repaired, file.loading)
     links = _sort_depth_first(links)
     for index, link in enumerate(links):
         seen, collided = shapes[link.name]
@@ -80,7 +85,7 @@ def build_character(file: CharacterFile) -> Character:
         clips=file.clips,
         feet=file.feet,
         planning=file.planning,
-        warnings=_collect_warnings(file, layout, links),
+        warnings=(*_collect_warnings(file, layout, links), *repairs),
     )
 
 
@@ -230,16 +235,11 @@ def _collect_warnings(
     file: CharacterFile, layout: JointLayout, links: list[Link]
 ) -> tuple[str, ...]:
     limp = [name for name in layout.actuated_joint_names if name not in file.gains]
-    first = 1 if file.loading.fixed_base else 0
-    without_mass = links_without_inertial(file.loading.robot)
-    unknown = sorted(without_mass & {link.name for link in links[first:]})
     warnings = []
     if limp:
         warnings.append(f"joints without gains in {file.path.name} are limp: {', '.join(limp)}")
-    if unknown:
-        warnings.append(
-            f"links without <inertial>, the engine assumes a mass: {', '.join(unknown)}"
-        )
+    if file.loading.fixed_base and "fixed_base" not in file.text and links[0].name != "world":
+        warnings.append(f"base link '{links[0].name}' has no mass, so that it is fixed")
     return tuple(warnings)
 
 

@@ -1,14 +1,14 @@
 """The shapes of each link, those that are seen and those that collide, read from its URDF."""
 
+from dataclasses import replace
 from typing import TypeAlias
 from xml.etree import ElementTree
 
-import numpy as np
-
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import GREY, Pose, Quadruple, Shape, ShapeType, UrdfOptions
+from msgs_config.character.urdf_origin import read_numbers, read_origin
+from msgs_config.character.urdf_repair import repair_urdf
 from msgs_config.errors import CharacterError
-from msgs_config.geometry import rotations
 
 Shapes: TypeAlias = tuple[Shape, ...]
 
@@ -31,6 +31,7 @@ def read_shapes(loading: UrdfOptions) -> dict[str, tuple[Shapes, Shapes]]:
         CharacterError: a shape is malformed, or a mesh does not exist; names the file and the link.
     """
     robot = resolve_meshes(loading)
+    repair_urdf(robot, loading)
     colors = _named_colors(robot)
     shapes = {}
     for link in robot.findall("link"):
@@ -57,7 +58,7 @@ def _named_colors(robot: ElementTree.Element) -> dict[str, Quadruple]:
 
 
 def _color(color: ElementTree.Element) -> Quadruple:
-    red, green, blue, alpha = _numbers(color.get("rgba", ""), 4, "rgba of <color>")
+    red, green, blue, alpha = read_numbers(color.get("rgba", ""), 4, "rgba of <color>")
     return (red, green, blue, alpha)
 
 
@@ -72,11 +73,11 @@ def _shape(part: ElementTree.Element, colors: dict[str, Quadruple], scale: float
     for attribute, default in _SIZES[shape_type].items():
         count = 1 if attribute in ("radius", "length") else 3
         text = element.get(attribute, default)
-        size += _numbers(text, count, f"{attribute} of <{element.tag}>")
+        size += read_numbers(text, count, f"{attribute} of <{element.tag}>")
     return Shape(
         type=shape_type,
         size=tuple(scale * length for length in size),
-        pose=_pose(part.find("origin"), scale),
+        pose=_pose(part, scale),
         color_rgba=_color_of(part, colors),
         mesh=element.get("filename", "") if shape_type is ShapeType.MESH else "",
     )
@@ -91,19 +92,7 @@ def _color_of(part: ElementTree.Element, colors: dict[str, Quadruple]) -> Quadru
     return colors.get(material.get("name", ""), GREY) if color is None else _color(color)
 
 
-def _pose(origin: ElementTree.Element | None, scale: float) -> Pose:
-    if origin is None:
-        return Pose()
-    position = scale * np.array(_numbers(origin.get("xyz", "0 0 0"), 3, "xyz of <origin>"))
-    roll, pitch, yaw = _numbers(origin.get("rpy", "0 0 0"), 3, "rpy of <origin>")
-    about_x, about_y, about_z = rotations.exp(np.diag([roll, pitch, yaw]))
-    turn = rotations.multiply(rotations.multiply(about_z, about_y), about_x)
-    return Pose.of_arrays(position, turn)
-
-
-def _numbers(text: str, count: int, what: str) -> list[float]:
-    """Numbers of a text, of which `check_urdf` has made sure wherever they are given."""
-    pieces = text.split()
-    if len(pieces) != count:
-        raise CharacterError(f"{what} is missing")
-    return [float(piece) for piece in pieces]
+def _pose(part: ElementTree.Element, scale: float) -> Pose:
+    pose = read_origin(part)
+    x, y, z = (scale * length for length in pose.position)
+    return replace(pose, position=(x, y, z))

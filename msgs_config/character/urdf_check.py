@@ -6,9 +6,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from msgs_config import files
+from msgs_config.character.urdf_frames import is_frame
+from msgs_config.character.urdf_inertia import LEAST_MOMENT, ROUNDING
 from msgs_config.errors import CharacterError
 
-MAX_JOINTS = 127
+MAX_LINKS = 2000
+MAX_JOINTS = 127  # without those to mere frames, see `is_frame`
 MAX_POSITION_ENTRIES = 128  # beyond them PyBullet reads states as empty, without an error
 MAX_NAME_BYTES = 255
 
@@ -17,13 +20,14 @@ _TYPES = (*_WITH_AXIS, "spherical", "fixed")
 _LARGEST = 1e30  # the engine's single precision ends at 3e38
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _ANY, _POSITIVE = -_LARGEST, 0.0
+MOMENTS = ("ixx", "iyy", "izz")
 NUMBERS = {  # by element and attribute: how many, and the least that they may be
     "origin": {"xyz": (3, _ANY), "rpy": (3, _ANY)},
     "axis": {"xyz": (3, _ANY)},
     "mass": {"value": (1, _POSITIVE)},
     "inertia": {
-        **dict.fromkeys(("ixx", "iyy", "izz"), (1, _POSITIVE)),
-        **dict.fromkeys(("ixy", "ixz", "iyz"), (1, _ANY)),
+        # of at least 0 up to rounding, see `_check_moments`
+        **dict.fromkeys((*MOMENTS, "ixy", "ixz", "iyz"), (1, _ANY)),
     },
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), (1, _ANY)),
     "dynamics": dict.fromkeys(("damping", "friction"), (1, _ANY)),
@@ -73,23 +77,36 @@ def check_urdf(path: Path, text: str) -> ElementTree.Element:
         _check_joint(path, joint)
     for name in sorted({name for pair in ends for name in pair} - set(names)):
         raise CharacterError(f"{path}: a joint names the link {name!r}, which does not exist")
-    _check_size(path, joints)
+    _check_size(path, dict(zip(names, links, strict=True)), joints)
     _check_tree(path, names, ends)
     for element in [*links, *joints, *robot.findall("material")]:
         _check_numbers(path, element)
     return robot
 
 
-def links_without_inertial(robot: ElementTree.Element) -> set[str]:
-    """Names of the links to which a URDF gives no mass."""
-    links = robot.findall("link")
-    return {link.get("name", "") for link in links if link.find("inertial") is None}
+def has_massless_base(robot: ElementTree.Element) -> bool:
+    """Whether the base is fixed for ROS: called `world` and without inertial, or without any mass.
+
+    Its mass is also that of the links which are fixed to it.
+    """
+    joints = robot.findall("joint")
+    links = {link.get("name", ""): link for link in robot.findall("link")}
+    (base,) = set(links) - {_end(joint, "child") for joint in joints}
+    if base == "world" and links[base].find("inertial") is None:
+        return True
+    group = [base]
+    for name in group:
+        group += [
+            _end(joint, "child")
+            for joint in joints
+            if joint.get("type") == "fixed" and _end(joint, "parent") == name
+        ]
+    return all(_has_no_mass(links[name]) for name in group)
 
 
-def has_world_base(robot: ElementTree.Element) -> bool:
-    """Whether the base link is called `world` and has no mass: ROS' sign of a fixed base."""
-    children = {_end(joint, "child") for joint in robot.findall("joint")}
-    return "world" in links_without_inertial(robot) - children
+def _has_no_mass(link: ElementTree.Element) -> bool:
+    mass = link.find("inertial/mass")
+    return mass is None or not float(mass.get("value", "0"))
 
 
 def _check_name(path: Path, element: ElementTree.Element) -> None:
@@ -112,7 +129,13 @@ def _check_joint(path: Path, joint: ElementTree.Element) -> None:
         raise CharacterError(f"{path}: joint {name!r} is {kind} and has no <limit>")
 
 
-def _check_size(path: Path, joints: list[ElementTree.Element]) -> None:
+def _check_size(
+    path: Path, links: dict[str, ElementTree.Element], joints: list[ElementTree.Element]
+) -> None:
+    """Check that the engine can hold what is no mere frame, and that frames are not countless."""
+    if len(joints) > MAX_LINKS:
+        raise CharacterError(f"{path}: {len(joints)} joints; there can be {MAX_LINKS}")
+    joints = [joint for joint in joints if not is_frame(links[_end(joint, "child")], joint)]
     widths = {"spherical": 4, "fixed": 0}  # of a position in the engine, a quaternion for a ball
     entries = 7 + sum(widths.get(joint.get("type", ""), 1) for joint in joints)
     if len(joints) > MAX_JOINTS or entries > MAX_POSITION_ENTRIES:
@@ -133,9 +156,28 @@ def _check_numbers(path: Path, part: ElementTree.Element) -> None:
                     f"{path}: {part.tag} {part.get('name')!r}: {attribute} of <{element.tag}> is "
                     f"{text[:100]!r}; it must be {count} finite number{'s' * (count > 1)}{bound}"
                 )
+    for inertial in part.findall("inertial") if part.tag == "link" else ():
+        _check_inertial(path, part, inertial)
     axis = part.find("axis") if part.get("type") in _WITH_AXIS else None
     if axis is not None and not any(float(number) for number in axis.get("xyz", "1").split()):
         raise CharacterError(f"{path}: joint {part.get('name')!r} has an axis of length zero")
+
+
+def _check_inertial(path: Path, link: ElementTree.Element, inertial: ElementTree.Element) -> None:
+    """Check that it is whole, and no moment of inertia below 0 by more than a file's rounding."""
+    inertia = inertial.find("inertia")
+    if inertia is None or inertial.find("mass") is None:
+        raise CharacterError(
+            f"{path}: link {link.get('name')!r}: <inertial> must have <mass> and <inertia>"
+        )
+    moments = {name: float(inertia.get(name, "0")) for name in MOMENTS}
+    rounding = max(LEAST_MOMENT, ROUNDING * max(map(abs, moments.values())))
+    for name, moment in moments.items():
+        if moment < -rounding:
+            raise CharacterError(
+                f"{path}: link {link.get('name')!r}: {name} of <inertia> is "
+                f"{inertia.get(name)!r}; it must be 1 finite number of at least 0"
+            )
 
 
 def _are_numbers(text: str, count: int, minimum: float) -> bool:

@@ -128,7 +128,13 @@ def _check_inverse_mass(character: Character, inverse_mass_diagonal: FloatArray)
         return
     worst = int(np.argmin(sound))
     lower, upper = character.position_bounds()
-    if character.layout.has_floating_base and worst < _ROOT_ENTRIES:
+    base_mass = character.links[0].mass
+    if character.layout.has_floating_base and worst < _ROOT_ENTRIES and base_mass:
+        reason = (
+            f"the base link has {base_mass:g} kg but no inertia; 'inertia: shapes' in a .yaml "
+            "file takes that of its shapes"
+        )
+    elif character.layout.has_floating_base and worst < _ROOT_ENTRIES:
         reason = "the base link has no mass, so the engine holds it; 'fixed_base: true' says so too"
     elif lower[worst] == upper[worst]:
         reason = f"'{character.layout.dof_names[worst]}' has no room between its limits"

@@ -1,0 +1,63 @@
+"""The links that the engine has made of a URDF, compared with the URDF's own text.
+
+Both sides build on what the engine has read, so that their agreement cannot see it read wrongly.
+"""
+
+import math
+from collections.abc import Sequence
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Link, UrdfOptions
+from msgs_config.character.urdf_inertia import read_inertial
+from msgs_config.errors import CharacterError
+from msgs_config.geometry import fixed_order, rotations
+
+_LARGEST = 1e-9  # of the largest entry
+
+
+def check_links(links: Sequence[Link], repaired: ElementTree.Element, loading: UrdfOptions) -> None:
+    """Compare each link's mass, centre of mass and inertia with a repaired URDF, mass in all too.
+
+    The mass in all is that of the text before its repair. A fixed base, which cannot move, has no
+    mass in the engine. With `inertia: shapes` there is no inertia to compare.
+
+    Raises:
+        CharacterError: they differ; names the link, the quantity and both values.
+    """
+    elements = {link.get("name", ""): link for link in repaired.findall("link")}
+    moving = links[1:] if loading.fixed_base else links
+    for link in moving:
+        given = read_inertial(elements[link.name])
+        centre = loading.scale * np.array(given.pose.position)
+        pairs: list[tuple[str, ArrayLike, ArrayLike]] = [
+            ("a mass in kg", link.mass, given.mass),
+            ("a centre of mass in m", link.inertial_pose.position, centre),
+        ]
+        if loading.inertia_from_file:
+            pairs.append(("an inertia in kg m^2", _tensor(link), given.in_link_axes()))
+        for what, read, expected in pairs:
+            _compare(f"{loading.urdf_path}: link '{link.name}'", what, read, expected)
+    total = math.fsum(read_inertial(link).mass for link in loading.robot.findall("link"))
+    mass = math.fsum(link.mass for link in moving)
+    if loading.fixed_base:
+        mass += read_inertial(elements[links[0].name]).mass
+    _compare(f"{loading.urdf_path}: all links", "a mass in kg", mass, total)
+
+
+def _tensor(link: Link) -> FloatArray:
+    """A link's inertia (3, 3) about its centre of mass along its own axes, kg m^2."""
+    axes = rotations.matrix(np.array(link.inertial_pose.orientation_xyzw))
+    return fixed_order.product(axes * np.array(link.inertia_diagonal), axes.T)
+
+
+def _compare(where: str, what: str, read: ArrayLike, given: ArrayLike) -> None:
+    size = max(np.abs(read).max(), np.abs(given).max())
+    if not np.abs(np.subtract(read, given)).max() <= _LARGEST * size:
+        values = [" ".join(f"{value:.6g}" for value in np.ravel(side)) for side in (read, given)]
+        raise CharacterError(
+            f"{where}: the engine has {what} of {values[0]}; the URDF's text has {values[1]}"
+        )

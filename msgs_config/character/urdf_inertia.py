@@ -1,0 +1,137 @@
+"""Mass and inertia of links as a URDF's text gives them; inertia tensors that no body can have.
+
+Of a real body no principal moment of inertia is larger than the sum of the other two. The engine
+takes a tensor that is otherwise for zero, without an error.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+from xml.etree import ElementTree
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Pose, Vector
+from msgs_config.character.urdf_origin import read_origin
+from msgs_config.geometry import fixed_order, rotations
+
+ROUNDING = 1e-9
+"""Of the largest moment of inertia: what a file's digits may leave of a zero."""
+LEAST_MOMENT = 1e-15
+"""Moments of inertia, kg m^2, that are rounding whatever the others are."""
+
+_DIAGONAL, _BESIDE = ("ixx", "iyy", "izz"), (("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2))
+ENTRIES = (*_DIAGONAL, *(name for name, _, _ in _BESIDE))
+"""The attributes of `<inertia>`."""
+_DIGITS = 1e-20  # of the largest entry: what alters no digit of another
+_NO_POSE = Pose()
+_SWEEPS = 20  # of Jacobi's method, which doubles its digits with each
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """Mass and inertia of a link, in its own frame."""
+
+    mass: float = 0.0  # kg
+    pose: Pose = _NO_POSE
+    tensor: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0),) * 3  # kg m^2, axes of `pose`
+
+    @property
+    def is_nothing(self) -> bool:
+        """Whether the link has neither mass nor inertia."""
+        return self.mass == 0.0 and not np.abs(self.tensor).max() > LEAST_MOMENT
+
+    def in_link_axes(self) -> FloatArray:
+        """The tensor (3, 3) about the centre of mass along the link's axes, kg m^2."""
+        axes = rotations.matrix(np.array(self.pose.orientation_xyzw))
+        return fixed_order.product(axes, fixed_order.product(np.array(self.tensor), axes.T))
+
+
+def read_inertial(link: ElementTree.Element) -> Inertial:
+    """What a link's `<inertial>` says; without one it has neither mass nor inertia."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return Inertial()
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    tensor = np.zeros((3, 3))
+    if inertia is not None:
+        np.fill_diagonal(tensor, [float(inertia.get(name, "0")) for name in _DIAGONAL])
+        for name, row, column in _BESIDE:
+            tensor[row, column] = tensor[column, row] = float(inertia.get(name, "0"))
+    rows = [(x, y, z) for x, y, z in tensor.tolist()]
+    return Inertial(
+        0.0 if mass is None else float(mass.get("value", "0")),
+        read_origin(inertial),
+        (rows[0], rows[1], rows[2]),
+    )
+
+
+def write_moments(inertia: ElementTree.Element, moments: Vector) -> None:
+    """Give an `<inertia>` these principal moments, kg m^2, and no products."""
+    for name, moment in zip(_DIAGONAL, moments, strict=True):
+        inertia.set(name, repr(moment))
+    for name, _, _ in _BESIDE:
+        inertia.set(name, "0")
+
+
+def principal_axes(tensor: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Principal moments (3,) and axes (3, 3), as columns, of a symmetric tensor (3, 3).
+
+    Jacobi's method, in plain numbers: the same bits on every processor, and, unlike the engine's
+    own, exact (Golub and Van Loan 2013, "Matrix Computations", section 8.5).
+    """
+    a, axes = tensor.copy(), np.eye(3)
+    nothing = _DIGITS * float(np.abs(tensor).max())
+    for _ in range(_SWEEPS):
+        for _, p, q in _BESIDE:
+            if abs(a[p, q]) <= nothing:
+                continue
+            theta = 0.5 * (a[q, q] - a[p, p]) / a[p, q]
+            tangent = math.copysign(1.0 / (abs(theta) + math.sqrt(theta * theta + 1.0)), theta)
+            cosine = 1.0 / math.sqrt(tangent * tangent + 1.0)
+            turn = np.eye(3)
+            turn[p, p] = turn[q, q] = cosine
+            turn[p, q], turn[q, p] = tangent * cosine, -tangent * cosine
+            a = fixed_order.product(turn.T, fixed_order.product(a, turn))
+            a[p, q] = a[q, p] = 0.0
+            axes = fixed_order.product(axes, turn)
+    return np.diag(a).copy(), axes
+
+
+def nearest_physical(moments: FloatArray) -> Vector:
+    """The moments (3,) of a real body that are nearest to some (3,), by the sum of squares.
+
+    A real body's are `(b + c, a + c, a + b)` of some a, b, c of at least 0, the second moments of
+    its mass. Together with the axes they are the nearest tensor in the Frobenius norm.
+    """
+    best, least = [0.0, 0.0, 0.0], math.inf
+    for count in range(4):
+        for chosen in combinations(range(3), count):
+            found = _sums(_least_squares(moments, chosen))
+            squares = [(f - m) * (f - m) for f, m in zip(found, moments.tolist(), strict=True)]
+            distance = math.fsum(squares)
+            if distance < least:
+                best, least = found, distance
+    x, y, z = best
+    # to the last bit, because the engine compares so
+    x = min(x, y + z)
+    y = min(y, x + z)
+    return x, y, min(z, x + y)
+
+
+def _least_squares(moments: FloatArray, chosen: tuple[int, ...]) -> list[float]:
+    """The second moments, of which only those chosen are not zero, that fit some moments (3,).
+
+    Each stands in two of the three moments, two of them together in one: so the normal equations'
+    matrix is `1 + J` of all ones J, and its inverse `1 - J / (k + 1)`. One below 0 is 0.
+    """
+    x, y, z = moments.tolist()
+    right = (y + z, x + z, x + y)
+    shared = math.fsum(right[index] for index in chosen) / (len(chosen) + 1)
+    return [max(right[i] - shared, 0.0) if i in chosen else 0.0 for i in range(3)]
+
+
+def _sums(second: list[float]) -> list[float]:
+    a, b, c = second
+    return [b + c, a + c, a + b]

@@ -1,0 +1,123 @@
+"""A URDF as ROS means it: links without mass are frames, and every inertia is a body's."""
+
+from xml.etree import ElementTree
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import UrdfOptions
+from msgs_config.character.urdf_frames import LinkTree
+from msgs_config.character.urdf_inertia import (
+    ENTRIES,
+    LEAST_MOMENT,
+    Inertial,
+    nearest_physical,
+    principal_axes,
+    read_inertial,
+    write_moments,
+)
+from msgs_config.character.urdf_origin import write_origin
+from msgs_config.geometry import fixed_order, rotations
+
+_CHANGED = 1e-6  # of the largest moment of inertia: what is more than a file's last digits
+_NAMED = 5  # names in a warning
+
+
+def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]:
+    """Change a URDF's root to what it means; returns a warning of each kind of change.
+
+    Joints that move no mass are fixed. Links without `<inertial>` that are fixed to others are
+    merged into those; others have no mass. A floating base without mass takes that of a link which
+    is fixed to it. With `inertia_from_file` each inertia is given about its principal axes, and
+    where no body can have it, it is the nearest that one can.
+    """
+    warnings, tree = [], LinkTree(robot)
+    fixed = tree.fix_empty_joints()
+    if fixed:
+        warnings.append(f"joints that move no mass are fixed at 0: {_listed(fixed)}")
+    frames = tree.merge_frames()
+    if frames:
+        pairs = [f"{name} of {link}" for name, link in frames.items()]
+        warnings.append(f"links without <inertial> are frames of others: {_listed(pairs)}")
+    if not loading.fixed_base:
+        merged = tree.give_base_mass()
+        if merged:
+            base = tree.base().get("name")
+            warnings.append(f"base link '{base}' has no mass, and takes that of {merged[-1]}")
+    changed, scaled = list[str](), list[str]()
+    for link in robot.findall("link"):
+        if link.find("inertial") is None:
+            _write_no_inertial(link)
+        elif loading.inertia_from_file:
+            scaled += _scale_inertia(link)
+            changed += _repair_inertia(link)
+    if scaled:
+        warnings.append(f"<inertia_scaling>, which is Bullet's own, multiplies: {_listed(scaled)}")
+    if changed:
+        warnings.append(
+            "links whose inertia no body can have, with the nearest principal moments that one "
+            f"can (kg m^2): {'; '.join(changed)}"
+        )
+    return warnings
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _write_no_inertial(link: ElementTree.Element) -> None:
+    """Say that a link has no mass, for which the engine would assume 1 kg and 1 kg m^2."""
+    inertial = ElementTree.SubElement(link, "inertial")
+    ElementTree.SubElement(inertial, "mass", value="0")
+    write_moments(ElementTree.SubElement(inertial, "inertia"), (0.0, 0.0, 0.0))
+
+
+def _scale_inertia(link: ElementTree.Element) -> list[str]:
+    """Multiply a link's inertia by Bullet's own element, which is removed; says by how much."""
+    named = []
+    for contact in link.findall("contact"):
+        for scaling in contact.findall("inertia_scaling"):
+            contact.remove(scaling)
+            factor = float(scaling.get("value", "1"))
+            for inertia in link.iterfind("inertial/inertia") if factor != 1.0 else ():
+                for name in ENTRIES:
+                    inertia.set(name, repr(factor * float(inertia.get(name, "0"))))
+                named.append(f"inertia of {link.get('name')} by {factor:g}")
+    return named
+
+
+def _repair_inertia(link: ElementTree.Element) -> list[str]:
+    """Give a link principal moments that a body can have; says which, if they are others."""
+    inertia = link.find("inertial/inertia")
+    if inertia is None:
+        return []
+    inertial = read_inertial(link)
+    tensor = np.array(inertial.tensor)
+    is_diagonal = not (tensor - np.diag(np.diag(tensor))).any()
+    moments, axes = (np.diag(tensor), np.eye(3)) if is_diagonal else principal_axes(tensor)
+    physical = moments.tolist()
+    if not _is_physical(*physical):
+        physical = list(nearest_physical(moments))
+    elif is_diagonal:
+        return []
+    write_moments(inertia, (physical[0], physical[1], physical[2]))
+    if not is_diagonal:
+        _turn(link, inertial, axes)
+    change = float(np.abs(moments - physical).max())
+    if change <= max(LEAST_MOMENT, _CHANGED * float(np.abs(moments).max())):
+        return []
+    before, after = (", ".join(f"{moment:.4g}" for moment in m) for m in (moments, physical))
+    return [f"{link.get('name')} ({before}) -> ({after})"]
+
+
+def _is_physical(x: float, y: float, z: float) -> bool:
+    return min(x, y, z) >= 0.0 and x <= y + z and y <= x + z and z <= x + y
+
+
+def _turn(link: ElementTree.Element, inertial: Inertial, axes: FloatArray) -> None:
+    """Turn a link's inertial frame to its principal axes (3, 3)."""
+    element = link.find("inertial")
+    assert element is not None
+    own = rotations.matrix(np.array(inertial.pose.orientation_xyzw))
+    write_origin(element, np.array(inertial.pose.position), fixed_order.product(own, axes))
