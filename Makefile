@@ -6,6 +6,9 @@ PACKAGING := setup.py setup.cfg pyproject.toml
 PYTHON ?=
 SUPPORTED := import sys, ensurepip, venv; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))
 
+# Robots of other makers, as data alone; most of these packages need much more than their files do.
+ROBOTS := example-robot-data==6.0.0 icub-models==3.2.0 mani-skill==3.0.1 rtb-data==2.0.0 scikit-robot==0.4.7
+
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # .venv has its own ROS: a sourced one, or another environment's, would be mixed into it.
@@ -17,7 +20,7 @@ endif
 # and for each worker of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help venv demo backflip test quick docs hashes pages other-numpy bench soak kills noise long-recording format clean distclean
+.PHONY: help venv demo backflip test quick docs hashes pages other-numpy bench soak kills noise long-recording robots format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -74,6 +77,11 @@ noise: .venv/.installed ## Run among 20,000 mutated messages on each topic; same
 
 long-recording: .venv/.installed ## Record 5 minutes at 1 kHz; no message lost
 	$(BIN)/python -m tests.endurance.long_recording
+
+robots: .venv/.installed-test ## Try the URDF files of six packages (850 MB), and compare them with Pinocchio
+	$(BIN)/python -m pip install -qq -e '.[robots]'
+	test -d build/robots || $(BIN)/python -m pip install -qq --no-deps --target build/robots $(ROBOTS)
+	$(BIN)/python -m tests.support.urdf_collection
 
 format: .venv/.installed-test ## Format the code and fix what can be fixed
 	$(BIN)/ruff check --fix

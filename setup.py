@@ -65,6 +65,9 @@ setup(
         "completion": ["argcomplete>=3.5,<4"],
         # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
         "video": ["av>=14,<19"],
+        # Pinocchio, which `make robots` compares masses and forces with (BSD-2, 380 MB with what it
+        # needs); the URDF files themselves go to build/robots, without what their packages need.
+        "robots": ["pin>=3.7,<5"],
         # `colcon test` chooses pytest because this extra, of this name, lists it.
         # The linters are held to one minor version: a new one may have new rules.
         "test": [

@@ -1,0 +1,104 @@
+"""One URDF of other makers: its character held for some seconds, its dynamics compared."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import make_plan
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.engine_urdf import write_engine_urdf
+from msgs_config.character.layout import JointType
+from msgs_config.character.loading import load_character
+from msgs_config.character.model import Character
+from msgs_config.errors import ActuatedCharactersError, SimulationError
+
+HOLDS = 0.1  # rad or m, from the rest pose in the end
+_ALTERED = ("links whose inertia", "joints that move no mass", "<inertia_scaling>")
+_STATES = 5  # in which the dynamics are compared
+
+
+@dataclass(frozen=True)
+class TrialResult:
+    """What became of a URDF."""
+
+    kind: str  # ran, refused, diverged, traceback, crashed or too slow
+    reason: str = ""
+    size: int = 0  # degrees of freedom
+    mass: float = 0.0  # kg
+    drift: float = 0.0  # rad or m, from the rest pose in the end
+    warnings: tuple[str, ...] = ()
+    differences: dict[str, float] = field(default_factory=dict)
+    """From Pinocchio's, of the largest entry; nothing where that cannot be."""
+
+    @property
+    def label(self) -> str:
+        """The kind; of one that ran, whether it holds."""
+        return "holds" if self.kind == "ran" and self.drift < HOLDS else self.kind
+
+
+def try_urdf(path: Path, duration: float) -> TrialResult:
+    """Hold the character of a URDF alone; an error that is not ours is raised."""
+    character, drift = None, 0.0
+    try:
+        character = load_character(str(path))
+        plan = make_plan(str(path), duration, {"reference": "hold"}, {}, {}, loaded=character)
+        rest = np.array(character.rest_position)
+        for tick in ticks_in_process(plan):
+            drift = float(np.abs(tick.following.position - rest).max(initial=0.0))
+    except ActuatedCharactersError as error:
+        kind = "diverged" if isinstance(error, SimulationError) else "refused"
+        result = TrialResult(kind, str(error))
+    else:
+        result = TrialResult("ran")
+    if character is None:
+        return result
+    return replace(
+        result,
+        size=character.layout.size,
+        mass=character.mass,
+        drift=drift,
+        warnings=character.warnings,
+        differences=compare_with_pinocchio(character),
+    )
+
+
+def compare_with_pinocchio(character: Character) -> dict[str, float]:
+    """How far mass matrix, bias force and gravity differ from Pinocchio's, of the largest entry.
+
+    Nothing where Pinocchio is not there, has no such joints (ball joints), or refuses the file.
+    """
+    try:
+        from tests.support.pinocchio_model import PinocchioModel
+    except ImportError:
+        return {}
+    if any(joint.type is JointType.SPHERICAL for joint in character.moving_joints):
+        return {}
+    try:
+        theirs = PinocchioModel(counting_text(character), character.layout)
+    except ValueError:
+        return {}  # what urdfdom refuses, such as a <limit> without effort
+    ours, damping = DynamicsModel(character), character.passive_damping()
+    worst = {"mass matrix": 0.0, "bias": 0.0, "gravity": 0.0}
+    rng = np.random.default_rng(1)
+    for _ in range(_STATES):
+        position, velocity = rng.uniform(-1.0, 1.0, (2, character.layout.size))
+        ours.update(position, velocity)
+        bias = ours.bias_force() - damping * velocity
+        found = (ours.mass_matrix(), bias, ours.gravity_force())
+        for name, own, other in zip(worst, found, theirs.dynamics(position, velocity), strict=True):
+            worst[name] = max(worst[name], _difference(own, other))
+    return worst
+
+
+def counting_text(character: Character) -> str:
+    """The URDF's own text; where that had to be altered, the repaired one."""
+    altered = any(warning.startswith(_ALTERED) for warning in character.warnings)
+    return write_engine_urdf(character.loading) if altered else character.loading.urdf_text
+
+
+def _difference(own: FloatArray, other: FloatArray) -> float:
+    largest = float(np.abs(other).max(initial=0.0))
+    return float(np.abs(own - other).max(initial=0.0)) / largest if largest else 0.0
