@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointLayout
 from msgs_config.character.model import Character
@@ -10,6 +11,7 @@ from msgs_config.geometry import fixed_order
 from msgs_config.messages.probe import DynamicsSample
 
 _LARGEST = 0.01  # where the two engines themselves differ by less than a millionth
+_SINGULAR = 1e-6  # of all that a joint moves: the part that joints before it do not move
 _TINY = 1e-150  # keeps 0 / 0 away
 
 
@@ -31,14 +33,17 @@ def check_agreement(model: DynamicsModel, layout: JointLayout, probe: DynamicsSa
 
     Raises:
         CharacterError: they differ by more than 1 %; the message names the quantity and remedies.
+            Where the mass matrix is close to singular, it names the joint.
     """
     model.update(probe.position, probe.velocity)
-    measured = [*fixed_order.apply(model.mass_matrix(), probe.acceleration), probe.kinetic_energy]
+    mass_matrix = model.mass_matrix()
+    measured = [*fixed_order.apply(mass_matrix, probe.acceleration), probe.kinetic_energy]
     expected = [*(probe.effort - model.bias_force()), model.kinetic_energy()]
     size = np.maximum(np.abs(measured), np.abs(expected))
     differences = np.abs(np.subtract(measured, expected)) / np.maximum(size, _TINY)
     worst = int(np.argmax(differences))  # a NaN is the largest
     if not differences[worst] <= _LARGEST:
+        _check_regular(mass_matrix, layout)
         whats = [*(f"what accelerates '{name}'" for name in layout.dof_names), "kinetic energy"]
         raise CharacterError(
             "the simulator's character is not the controller's: in the same state "
@@ -46,3 +51,17 @@ def check_agreement(model: DynamicsModel, layout: JointLayout, probe: DynamicsSa
             "file, its URDF, 'scale' or 'gravity' another one on the other side, or an inertia in "
             "the URDF an impossible one?"
         )
+
+
+def _check_regular(mass_matrix: FloatArray, layout: JointLayout) -> None:
+    """Raise CharacterError where Gauss' elimination in a mass matrix (n, n) leaves no pivot."""
+    rest = mass_matrix.copy()
+    for entry, name in enumerate(layout.dof_names):
+        pivot = rest[entry, entry]
+        if not pivot > _SINGULAR * mass_matrix[entry, entry]:
+            raise CharacterError(
+                f"nothing with mass or inertia moves at '{name}' that the joints before it do not "
+                "move as well; has the URDF a link with a mass but without inertia there?"
+            )
+        column = rest[:, entry] / pivot
+        rest -= column[:, np.newaxis] * rest[entry]

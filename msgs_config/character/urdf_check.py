@@ -6,12 +6,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from msgs_config import files
-from msgs_config.character.urdf_frames import is_frame
+from msgs_config.character.urdf_frames import MAX_JOINTS, find_frames
 from msgs_config.character.urdf_inertia import LEAST_MOMENT, ROUNDING
 from msgs_config.errors import CharacterError
 
 MAX_LINKS = 2000
-MAX_JOINTS = 127  # without those to mere frames, see `is_frame`
 MAX_POSITION_ENTRIES = 128  # beyond them PyBullet reads states as empty, without an error
 MAX_NAME_BYTES = 255
 
@@ -77,7 +76,7 @@ def check_urdf(path: Path, text: str) -> ElementTree.Element:
         _check_joint(path, joint)
     for name in sorted({name for pair in ends for name in pair} - set(names)):
         raise CharacterError(f"{path}: a joint names the link {name!r}, which does not exist")
-    _check_size(path, dict(zip(names, links, strict=True)), joints)
+    _check_size(path, robot, joints)
     _check_tree(path, names, ends)
     for element in [*links, *joints, *robot.findall("material")]:
         _check_numbers(path, element)
@@ -129,13 +128,12 @@ def _check_joint(path: Path, joint: ElementTree.Element) -> None:
         raise CharacterError(f"{path}: joint {name!r} is {kind} and has no <limit>")
 
 
-def _check_size(
-    path: Path, links: dict[str, ElementTree.Element], joints: list[ElementTree.Element]
-) -> None:
+def _check_size(path: Path, robot: ElementTree.Element, joints: list[ElementTree.Element]) -> None:
     """Check that the engine can hold what is no mere frame, and that frames are not countless."""
     if len(joints) > MAX_LINKS:
         raise CharacterError(f"{path}: {len(joints)} joints; there can be {MAX_LINKS}")
-    joints = [joint for joint in joints if not is_frame(links[_end(joint, "child")], joint)]
+    frames = find_frames(robot)
+    joints = [joint for joint in joints if joint not in frames]
     widths = {"spherical": 4, "fixed": 0}  # of a position in the engine, a quaternion for a ball
     entries = 7 + sum(widths.get(joint.get("type", ""), 1) for joint in joints)
     if len(joints) > MAX_JOINTS or entries > MAX_POSITION_ENTRIES:

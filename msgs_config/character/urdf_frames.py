@@ -1,15 +1,26 @@
 """Links without mass that are fixed to others: frames, merged into what they are fixed to."""
 
-from collections.abc import Callable
 from xml.etree import ElementTree
 
 from msgs_config.character.urdf_inertia import read_inertial
 from msgs_config.character.urdf_origin import move_origin, read_origin
 
+MAX_JOINTS = 127
+"""That the engine can hold, without those of mere frames, which are merged before it reads them."""
 
-def is_frame(link: ElementTree.Element, joint: ElementTree.Element) -> bool:
-    """Whether a link is no more than a frame of the link above it: fixed, and without inertial."""
-    return joint.get("type") == "fixed" and link.find("inertial") is None
+
+def find_frames(robot: ElementTree.Element) -> list[ElementTree.Element]:
+    """The joints to links that are mere frames of the links above: fixed, and without inertial.
+
+    Where the engine could not hold the others, also those to links that have no mass by number.
+    """
+    links = {link.get("name", ""): link for link in robot.findall("link")}
+    joints = robot.findall("joint")
+    fixed = [joint for joint in joints if joint.get("type") == "fixed"]
+    frames = [joint for joint in fixed if links[_end(joint, "child")].find("inertial") is None]
+    if len(joints) - len(frames) > MAX_JOINTS:
+        return [j for j in fixed if read_inertial(links[_end(j, "child")]).is_nothing]
+    return frames
 
 
 class LinkTree:
@@ -44,7 +55,7 @@ class LinkTree:
     def merge_frames(self) -> dict[str, str]:
         """Merge all frames; returns the name of each, with that of the link it is merged into."""
         merged: dict[str, str] = {}
-        for joint in self._fixed(lambda child: is_frame(child, _FIXED)):
+        for joint in find_frames(self._robot):
             parent, child = _end(joint, "parent"), _end(joint, "child")
             self._merge(joint)
             merged[child] = parent
@@ -61,7 +72,11 @@ class LinkTree:
         base = self.base()
         merged = []
         while read_inertial(base).is_nothing:
-            fixed = [j for j in self._fixed(lambda _: True) if self._above(j) is base]
+            fixed = [
+                joint
+                for joint in self._joints
+                if joint.get("type") == "fixed" and self._above(joint) is base
+            ]
             if not fixed:
                 break
             joint = max(fixed, key=lambda joint: read_inertial(self._below(joint)).mass)
@@ -76,10 +91,6 @@ class LinkTree:
         (name,) = set(self._links) - {_end(joint, "child") for joint in self._joints}
         return self._links[name]
 
-    def _fixed(self, wanted: Callable[[ElementTree.Element], bool]) -> list[ElementTree.Element]:
-        """The fixed joints to links that are wanted."""
-        return [j for j in self._joints if j.get("type") == "fixed" and wanted(self._below(j))]
-
     def _above(self, joint: ElementTree.Element) -> ElementTree.Element:
         return self._links[_end(joint, "parent")]
 
@@ -92,6 +103,8 @@ class LinkTree:
         self._robot.remove(joint)
         self._robot.remove(below)
         self._joints.remove(joint)
+        for inertial in below.findall("inertial") if read_inertial(below).is_nothing else ():
+            below.remove(inertial)
         del self._links[below.get("name", "")]
         for part in below:
             if part.tag in _POSED:
@@ -104,7 +117,6 @@ class LinkTree:
                 parent.set("link", above.get("name", ""))
 
 
-_FIXED = ElementTree.Element("joint", type="fixed")
 _POSED = ("inertial", "visual", "collision")
 
 

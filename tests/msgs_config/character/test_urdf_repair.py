@@ -5,10 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from controller_node.model_check import check_agreement
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
+from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
+from msgs_config.messages.probe import DynamicsSample
 from sim_node.physics.probe import probe_engine
 from tests.support.urdf import joint, link, refusal, robot, write_character
 
@@ -95,6 +98,22 @@ def test_frames_add_no_mass_and_need_no_room_in_the_engine(tmp_path: Path) -> No
     assert any("frame0 of arm" in warning for warning in character.warnings)
 
 
+def test_links_without_mass_by_number_are_frames_where_the_engine_needs_the_room(
+    tmp_path: Path,
+) -> None:
+    """Otherwise they stay: the tools of some arms, whose recordings have them."""
+    arms = [link(f"arm{n}", ARM) for n in range(101)]
+    hinges = [hinge(f"arm{n}", f"arm{n + 1}") for n in range(100)]
+    tools = [link(f"tool{n}", body(0.0, "0 0 0")) for n in range(28)]
+    mounts = [fixed("arm100", f"tool{n}") for n in range(28)]
+
+    few = loaded(tmp_path, *arms, *hinges, *tools[:27], *mounts[:27])
+    many = loaded(tmp_path, *arms, *hinges, *tools, *mounts)
+
+    assert (len(few.links), few.mass) == (128, 101.0)
+    assert (len(many.links), many.mass) == (101, 101.0)
+
+
 def test_what_is_fixed_to_a_frame_moves_to_the_link_above_it(tmp_path: Path) -> None:
     """A shape of a frame, and a joint from it, are where they were."""
     ball = f'<collision>{at("0 0 1")}<geometry><sphere radius="0.1"/></geometry></collision>'
@@ -130,6 +149,25 @@ def test_links_without_mass_between_hinges_are_no_obstacle(tmp_path: Path) -> No
     assert character.layout.size == 8
     assert character.mass == 3.0
     assert_engines_agree(character)
+
+
+def test_a_point_at_the_crossing_of_three_axes_is_refused(tmp_path: Path) -> None:
+    """The head of some humanoids: it can turn about the line from the crossing to the point."""
+    character = loaded(
+        tmp_path,
+        link("base", TRUNK),
+        link("one", ""),
+        link("two", ""),
+        link("head", body(1.0, "0 0 0")),
+        hinge("base", "one"),
+        joint("roll", "one", "two", "continuous", '<axis xyz="1 0 0"/>'),
+        joint("yaw", "two", "head", "continuous", '<axis xyz="0 0 1"/>'),
+    )
+    nothing = np.zeros(character.layout.size)
+    sample = DynamicsSample(nothing, nothing, nothing, 1.0, nothing)
+
+    with pytest.raises(CharacterError, match="a mass but without inertia"):
+        check_agreement(DynamicsModel(character), character.layout, sample)
 
 
 def test_a_link_may_be_called_world(tmp_path: Path) -> None:
