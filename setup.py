@@ -44,6 +44,7 @@ setup(
         "mujoco-core==4.0.1",  # exactly: another engine may have other last bits
         "numpy>=1.26,<3",
         "pybullet==3.2.7",  # exactly, likewise
+        "pycollada>=0.9,<0.10",  # meshes of every eighth robot (1.7 MB, BSD-3, pure Python)
         "PyYAML>=6.0,<7",
         "rich>=13.7,<16",
         "rosbags>=0.11.9,<0.12",
@@ -86,6 +87,7 @@ setup(
             "ruff>=0.17.5,<0.18",
             "setuptools>=65,<80",  # an environment of Python 3.12 has none; colcon's limit
             "sphinx>=8,<9",
+            "trimesh>=4.5,<6",  # reads meshes for tests to compare with
             "types-PyYAML>=6.0.12",
             "urdfdom-py>=1.2.1.post1,<2",
         ],

@@ -7,6 +7,7 @@ MuJoCo's, which is not the simulator's, and so what is foreseen is not quite wha
 
 from collections.abc import Iterator
 from itertools import product
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -19,6 +20,7 @@ from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
 from controller_node.planner.compiled.soft_limits import SoftLimits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import add_links, compile_exactly, quaternion_starts
+from msgs_config.character.mesh_triangles import is_converted, read_vertices
 from msgs_config.character.model import Character, Link, Shape, ShapeType
 from msgs_config.geometry import rotations
 
@@ -190,7 +192,11 @@ def _geometry(spec: mujoco.MjSpec, shape: Shape) -> dict[str, object]:
     place: dict[str, object] = {"type": _GEOMETRIES[shape.type], "pos": shape.pose.position}
     place["quat"] = turn
     if shape.type is ShapeType.MESH:
-        mesh = spec.add_mesh(file=shape.mesh, scale=shape.size)
+        mesh = spec.add_mesh(scale=shape.size)
+        if is_converted(Path(shape.mesh)):
+            mesh.uservert = read_vertices(Path(shape.mesh)).ravel()
+        else:
+            mesh.file = shape.mesh
         mesh.name = f"mesh {len(spec.meshes)}"
         return {**place, "meshname": mesh.name}
     if shape.type is ShapeType.BOX:

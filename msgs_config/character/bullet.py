@@ -52,7 +52,6 @@ def load_urdf(client: int, loading: UrdfOptions) -> int:
     Raises:
         CharacterError: the engine refuses the file, or one of its meshes does not exist.
     """
-    text = write_engine_urdf(loading)
     # not URDF_MAINTAIN_LINK_ORDER: it crashes where a file lists a link before its parent
     flags = 0
     if loading.self_collision:
@@ -62,7 +61,7 @@ def load_urdf(client: int, loading: UrdfOptions) -> int:
         flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
     with tempfile.TemporaryDirectory() as directory, captured_output() as output:
         copy = Path(directory) / "model.urdf"
-        copy.write_text(text, encoding="utf-8")
+        copy.write_text(write_engine_urdf(loading, Path(directory)), encoding="utf-8")
         # an engine that caches files would read an old version of a file that was edited
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
         try:

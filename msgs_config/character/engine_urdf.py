@@ -3,7 +3,7 @@
 from pathlib import Path
 from xml.etree import ElementTree
 
-from msgs_config.character.mesh_check import check_mesh
+from msgs_config.character.mesh_triangles import file_for_engine
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf_check import NUMBERS
@@ -14,11 +14,12 @@ MAX_LINE_BYTES = 8000
 """The engine reads lines of up to 8191 bytes, and breaks a longer one in two."""
 
 
-def write_engine_urdf(loading: UrdfOptions) -> str:
+def write_engine_urdf(loading: UrdfOptions, directory: Path) -> str:
     """A URDF's text for the engine: what moves and collides, in short lines, its meshes absolute.
 
     The engine would look for a mesh in the working directory first, take a tab between two
-    numbers for an end, and read what is only seen, for nothing.
+    numbers for an end, and read what is only seen, for nothing. Meshes that it cannot read are
+    converted into files in the directory.
 
     Raises:
         CharacterError: a mesh does not exist or cannot be used, or an element is too long.
@@ -32,11 +33,7 @@ def write_engine_urdf(loading: UrdfOptions) -> str:
         for attribute in NUMBERS.get(element.tag, {}):
             if attribute in element.attrib:
                 element.set(attribute, " ".join(element.attrib[attribute].split()))
-    for path in {mesh.get("filename", "") for mesh in robot.iterfind("link//mesh")}:
-        try:
-            check_mesh(Path(path))
-        except CharacterError as error:
-            raise CharacterError(f"{loading.urdf_path}: {error}") from error
+    _convert_meshes(robot, loading.urdf_path, directory)
     for joint in robot.findall("joint[@type='continuous']"):
         for limit in joint.findall("limit"):  # has no bounds, but the engine would report some
             limit.attrib.pop("lower", None)
@@ -49,3 +46,16 @@ def write_engine_urdf(loading: UrdfOptions) -> str:
             "the engine cannot read it"
         )
     return text
+
+
+def _convert_meshes(robot: ElementTree.Element, urdf: Path, directory: Path) -> None:
+    """Name files that the engine reads, each of which is checked or converted once."""
+    files: dict[str, Path] = {}
+    for mesh in robot.iterfind("link//mesh"):
+        name = mesh.get("filename", "")
+        try:
+            if name not in files:
+                files[name] = file_for_engine(Path(name), directory, f"mesh_{len(files)}")
+        except CharacterError as error:
+            raise CharacterError(f"{urdf}: {error}") from error
+        mesh.set("filename", str(files[name]))

@@ -1,8 +1,4 @@
-"""Meshes to collide with, checked before the engine reads them: it trusts every number in them.
-
-It reads COLLADA too, but follows missing parts of a file into a crash and leaves out what is not
-made of triangles, so that a link would collide with nothing.
-"""
+"""Meshes checked before the engine reads them: it trusts every number in them."""
 
 import re
 from hashlib import sha256
@@ -27,7 +23,9 @@ def check_mesh(path: Path) -> None:
     """
     suffix = path.suffix.lower()
     if suffix not in (".obj", ".stl"):
-        raise CharacterError(f"mesh {path} is to collide with; it must be an .obj or .stl file")
+        raise CharacterError(
+            f"mesh {path} is to collide with; it must be an .obj, .stl or .dae file"
+        )
     try:
         if suffix == ".obj":
             _check_obj_once(path.read_bytes())
@@ -37,12 +35,24 @@ def check_mesh(path: Path) -> None:
         raise CharacterError(f"mesh {path} cannot be used: {str(error)[:200]}") from error
 
 
+def is_stl_of_text(path: Path) -> bool:
+    """Whether a mesh is an .stl file that has a text, and not the binary form."""
+    if path.suffix.lower() != ".stl":
+        return False
+    try:
+        with path.open("rb") as file:
+            start = file.read(512)
+        return start.lstrip()[:5].lower() == b"solid" and b"\0" not in start
+    except OSError:
+        return False  # `check_mesh` gives the reason
+
+
 def _check_stl(path: Path) -> None:
     """The header of 80 bytes, the number of triangles, and 50 bytes for each."""
     with path.open("rb") as file:
         count = int.from_bytes(file.read(84)[80:], "little")
     if count == 0 or path.stat().st_size != 84 + 50 * count:
-        raise ValueError("it is no whole binary STL file; the engine reads no text")
+        raise ValueError("it is no whole STL file")
 
 
 def _check_obj_once(raw: bytes) -> None:

@@ -4,6 +4,8 @@ The engine's software renderer draws them: no window, no GPU, the same picture e
 """
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +16,7 @@ from actuated_characters.render.engine.posed_characters import Frames
 from actuated_characters.render.engine.surfaces import Surface, arrow_surface, round_surface
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
+from msgs_config.character.mesh_triangles import file_for_engine
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
@@ -157,9 +160,17 @@ class RenderScene:
         if shape.type is ShapeType.BOX:
             measures = {"halfExtents": [0.5 * edge for edge in shape.size]}
         elif shape.type is ShapeType.MESH:
-            measures = {"fileName": shape.mesh, "meshScale": shape.size}
+            return self._add_mesh(shape)
         else:
             measures = _triangles(round_surface(shape))
+        return self._add_drawn(shape, measures)
+
+    def _add_mesh(self, shape: Shape) -> int:
+        with TemporaryDirectory() as directory:
+            file = file_for_engine(Path(shape.mesh), Path(directory), "mesh")
+            return self._add_drawn(shape, {"fileName": str(file), "meshScale": shape.size})
+
+    def _add_drawn(self, shape: Shape, measures: dict[str, object]) -> int:
         measures["visualFramePosition"] = shape.pose.position
         measures["visualFrameOrientation"] = shape.pose.orientation_xyzw
         try:

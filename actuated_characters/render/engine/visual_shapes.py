@@ -1,7 +1,7 @@
 """How a character looks: the shapes that the renderer can draw, their extents and colours.
 
-What is seen of a link may be a mesh in a format that the engine does not read; then the shapes
-that it collides with are drawn in its place.
+What is seen of a link may be a mesh in a format that is not read here; then the shapes that it
+collides with are drawn in its place.
 """
 
 from dataclasses import replace
@@ -13,7 +13,7 @@ import numpy as np
 from actuated_characters.render.engine.camera_pose import Spheres
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
-from msgs_config.character.mesh_check import check_mesh
+from msgs_config.character.mesh_triangles import check_readable, read_vertices
 from msgs_config.character.model import Character, Quadruple, Shape, ShapeType
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
@@ -97,20 +97,9 @@ def _own_outline(shape: Shape) -> tuple[FloatArray, float]:
     if shape.type is ShapeType.BOX:
         bounds = np.outer((-0.5, 0.5), shape.size)
     else:
-        vertices = _vertices(Path(shape.mesh)) * np.array(shape.size)
+        vertices = read_vertices(Path(shape.mesh)) * np.array(shape.size)
         bounds = np.array([vertices.min(axis=0), vertices.max(axis=0)])
     return np.array(list(product(*bounds.T))), 0.0
-
-
-def _vertices(mesh: Path) -> FloatArray:
-    """The vertices (m, 3) of a mesh that was checked."""
-    if mesh.suffix.lower() == ".stl":  # 80 bytes, a count, and a normal, 3 vertices, 2 bytes each
-        triangle = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
-        corners = np.fromfile(mesh, triangle, offset=84)["corners"]
-        return corners.reshape(-1, 3).astype(float)
-    lines = mesh.read_text(encoding="latin-1").split("\n")
-    rows = [line.split() for line in lines if line.lstrip().startswith("v")]
-    return np.array([row[1:4] for row in rows if row[0] == "v"], dtype=float)
 
 
 def _solid(shapes: tuple[Shape, ...]) -> list[Shape]:
@@ -119,11 +108,11 @@ def _solid(shapes: tuple[Shape, ...]) -> list[Shape]:
 
 
 def _is_readable(shapes: tuple[Shape, ...]) -> bool:
-    """Whether the engine reads all the meshes."""
+    """Whether all the meshes can be read."""
     try:
         for shape in shapes:
             if shape.type is ShapeType.MESH:
-                check_mesh(Path(shape.mesh))
+                check_readable(Path(shape.mesh))
     except CharacterError:
         return False
     return True
