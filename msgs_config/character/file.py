@@ -15,18 +15,23 @@ from msgs_config.mappings import LARGEST, MappingReader
 CHARACTERS_DIRECTORY = Path(__file__).parent / "data"
 
 _LEAST_SIGMA = 1e-6  # rad or m
+_LARGEST_FREQUENCY = 50.0  # Hz; at 240 ticks a second stable PD is stable below it
+AUTOMATIC_GAINS_HZ = 5.0
+"""Of a URDF alone: a joint sags by g / (length w^2), which for 0.5 m is 0.02 rad."""
 _NO_GAINS = Gains()
 _GAIN_KEYS = ("stiffness", "damping", "integral")
 _JOINT_KEYS = (*_GAIN_KEYS, "effort_limit", "lower", "upper", "passive_damping", "soft_limit")
 _CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets")
 _URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision")
-_POSE_KEYS = ("joint_damping", "rest_pose", "joints", "root_assistance")
-_KEYS = (*_URDF_KEYS, *_POSE_KEYS, "clips", "feet", "planner")
+_POSE_KEYS = ("joint_damping", "rest_pose", "on_ground", "joints", "automatic_gains")
+_KEYS = (*_URDF_KEYS, *_POSE_KEYS, "root_assistance", "clips", "feet", "planner")
+ALONE: dict[str, Any] = {"on_ground": True, "automatic_gains": AUTOMATIC_GAINS_HZ}
+"""The keys of a URDF alone; all others have their defaults."""
 
 
 @dataclass(frozen=True)
 class CharacterFile:
-    """The content of a character's YAML file; of a URDF alone, all keys at their defaults."""
+    """The content of a character's YAML file; of a URDF alone, that of `ALONE`."""
 
     name: str
     path: Path
@@ -34,6 +39,8 @@ class CharacterFile:
     loading: UrdfOptions
     up_axis: str
     rest_pose: dict[str, float]  # DoF name -> m or rad
+    on_ground: bool  # whether a floating base is put so high that the lowest point is at z = 0
+    automatic_gains: float  # Hz at which joints without gains are damped critically; 0: limp
     gains: dict[str, Gains]  # joint name -> gains; `force` and `torque` of the root assistance
     effort_limits: dict[str, float]  # joint name -> N m or N
     urdf_damping: bool  # whether the URDF's passive damping of hinges and sliders counts
@@ -92,7 +99,7 @@ def read_character_texts(path: Path, text: str, urdf: Path, urdf_text: str) -> C
 
 
 def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFile:
-    content: dict[str, Any] = {"urdf": path.name}
+    content: dict[str, Any] = {"urdf": path.name, **ALONE}
     if text or path.suffix != ".urdf":
         content = files.parse_yaml_mapping(path, text, CharacterError)
     reader = MappingReader(path, content, CharacterError)
@@ -108,6 +115,8 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
         loading=_read_urdf(path, reader, joints, urdf),
         up_axis=reader.choice("up_axis", ["z", "y"]),
         rest_pose={name: rest_pose.number(name) for name in rest_pose.content},
+        on_ground=reader.flag("on_ground"),
+        automatic_gains=_read_frequency(reader),
         gains={name: _read_gains(joint) for name, joint in joints.items()},
         effort_limits=_read_numbers(joints, "effort_limit"),
         urdf_damping=reader.choice("joint_damping", ["file", "none"]) == "file",
@@ -184,6 +193,16 @@ def _read_gains(reader: MappingReader, default: Gains = _NO_GAINS) -> Gains:
         damping=reader.number("damping", default.damping, minimum=0.0),
         integral=reader.number("integral", default.integral, minimum=0.0),
     )
+
+
+def _read_frequency(reader: MappingReader) -> float:
+    """The frequency of automatic gains, Hz; 0 without them."""
+    frequency = reader.number("automatic_gains", default=0.0, minimum=0.0)
+    if frequency > _LARGEST_FREQUENCY:
+        raise reader.wrong(
+            "automatic_gains", frequency, f"a frequency of at most {_LARGEST_FREQUENCY:g} Hz"
+        )
+    return frequency
 
 
 def _read_angles(reader: MappingReader, key: str, default: list[float] | None = None) -> Vector:

@@ -15,6 +15,7 @@ import numpy as np
 
 from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
+from msgs_config.character.file_defaults import add_defaults
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.model import (
     ROOT_TORQUE,
@@ -74,19 +75,20 @@ def build_character(file: CharacterFile) -> Character:
         raise CharacterError(f"{urdf}: {error}") from error
     _check_names(file, layout)
     _check_rest_pose(file, links)
-    return Character(
+    character = Character(
         name=file.name,
         file=file.path,
         file_text=file.text,
         loading=file.loading,
         links=tuple(links),
         gains=_merge_gains(file, layout),
-        rest_position=_place_rest_pose(file, layout),
+        rest_position=_place_rest_pose(file, layout, links),
         clips=file.clips,
         feet=file.feet,
         planning=file.planning,
         warnings=(*_collect_warnings(file, layout, links), *repairs),
     )
+    return add_defaults(character, file)
 
 
 def _read_links(client: int, body: int, file: CharacterFile) -> list[Link]:
@@ -236,11 +238,24 @@ def _collect_warnings(
 ) -> tuple[str, ...]:
     limp = [name for name in layout.actuated_joint_names if name not in file.gains]
     warnings = []
-    if limp:
+    if limp and not file.automatic_gains:
         warnings.append(f"joints without gains in {file.path.name} are limp: {', '.join(limp)}")
     if file.loading.fixed_base and "fixed_base" not in file.text and links[0].name != "world":
         warnings.append(f"base link '{links[0].name}' has no mass, so that it is fixed")
+    moved = _nearest_to_zero(file, links)
+    if moved:
+        places = ", ".join(f"{name} at {value:.4g}" for name, value in moved.items())
+        warnings.append(f"0 is beyond the limits, so it rests there: {places}")
     return tuple(warnings)
+
+
+def _nearest_to_zero(file: CharacterFile, links: list[Link]) -> dict[str, float]:
+    """Where hinges and sliders rest, rad or m, that have no rest pose, and no 0 in their limits."""
+    return {
+        joint.name: min(max(0.0, joint.lower), joint.upper)
+        for joint in (link.joint for link in links)
+        if joint.name not in file.rest_pose and not joint.lower <= 0.0 <= joint.upper
+    }
 
 
 def _merge_gains(file: CharacterFile, layout: JointLayout) -> dict[str, Gains]:
@@ -258,12 +273,14 @@ def _pose_fixed_base(file: CharacterFile) -> Pose:
     return Pose()
 
 
-def _place_rest_pose(file: CharacterFile, layout: JointLayout) -> tuple[float, ...]:
+def _place_rest_pose(
+    file: CharacterFile, layout: JointLayout, links: list[Link]
+) -> tuple[float, ...]:
     """The rest pose (n,), message form; a y-up model is turned to stand in the z-up world."""
     position = np.zeros(layout.size)
     if layout.has_floating_base and file.up_axis == "y":
         turned = rotations.log(rotations.ABOUT_X_QUARTER_TURN_XYZW)
         position[layout.joint(ROOT).vectors[1]] = turned
-    for name, value in file.rest_pose.items():
+    for name, value in (_nearest_to_zero(file, links) | file.rest_pose).items():
         position[layout.dof_names.index(name)] = value
     return tuple(position.tolist())

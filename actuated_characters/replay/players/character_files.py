@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 import yaml
 
 from msgs_config import files
+from msgs_config.character.file import ALONE
 from msgs_config.character.layout import JointType
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import Character, UrdfOptions
@@ -47,9 +48,9 @@ def write_urdf(file: Path, loading: UrdfOptions) -> Path:
 
 
 def _content(character: Character) -> dict[str, Any]:
-    """The content of the character's file; nothing if it is a URDF alone."""
+    """The content of the character's file, or what a URDF alone stands for."""
     if not character.file_text:
-        return {}
+        return dict(ALONE)
     content = files.parse_yaml_mapping(character.file, character.file_text, CharacterError)
     if character.clips.pattern:
         content["clips"] = {**content["clips"], "files": character.clips.pattern}

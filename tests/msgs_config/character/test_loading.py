@@ -1,4 +1,4 @@
-"""A character may be a URDF alone, its keys at their defaults; what seems overlooked is named."""
+"""A character may be a URDF alone, which then stands and holds; what seems overlooked is named."""
 
 from pathlib import Path
 
@@ -16,7 +16,8 @@ ARM = robot(link("trunk"), link("arm"), HINGE)
 
 
 def test_it_is_the_character_of_a_file_that_only_names_it(tmp_path: Path) -> None:
-    named = load_character(str(write_character(tmp_path, ARM)))
+    yaml = "on_ground: true\nautomatic_gains: 5\n"
+    named = load_character(str(write_character(tmp_path, ARM, yaml)))
     urdf = tmp_path / "robot.urdf"
 
     alone = load_character(str(urdf))
@@ -25,11 +26,20 @@ def test_it_is_the_character_of_a_file_that_only_names_it(tmp_path: Path) -> Non
     assert alone.loading == named.loading
     assert alone.links == named.links
     assert alone.gains == named.gains
-    assert alone.gains["hinge"] == Gains()
+    assert alone.gains["hinge"] != Gains()
     assert alone.rest_position == named.rest_position
     assert alone.layout.has_floating_base
     assert not np.any(alone.rest_position)
-    assert alone.warnings == ("joints without gains in robot.urdf are limp: hinge",)
+    assert alone.warnings == named.warnings
+    assert any("critically damped at 5 Hz" in line for line in alone.warnings)
+
+
+def test_joints_without_gains_in_a_file_are_limp_and_named(tmp_path: Path) -> None:
+    named = load_character(str(write_character(tmp_path, ARM)))
+
+    assert named.gains["hinge"] == Gains()
+    assert not np.any(named.rest_position)
+    assert named.warnings == ("joints without gains in robot.yaml are limp: hinge",)
 
 
 @pytest.mark.parametrize(
