@@ -27,8 +27,9 @@ def write_engine_urdf(loading: UrdfOptions, directory: Path) -> str:
     robot = resolve_meshes(loading)
     repair_urdf(robot, loading)
     for link in robot.findall("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
+        unused = link.findall("visual")
+        for part in unused if loading.collisions else unused + link.findall("collision"):
+            link.remove(part)
     for element in robot.iter():
         for attribute in NUMBERS.get(element.tag, {}):
             if attribute in element.attrib:

@@ -22,7 +22,7 @@ _NO_GAINS = Gains()
 _GAIN_KEYS = ("stiffness", "damping", "integral")
 _JOINT_KEYS = (*_GAIN_KEYS, "effort_limit", "lower", "upper", "passive_damping", "soft_limit")
 _CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets")
-_URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision")
+_URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision", "collision")
 _POSE_KEYS = ("joint_damping", "rest_pose", "on_ground", "joints", "automatic_gains")
 _KEYS = (*_URDF_KEYS, *_POSE_KEYS, "root_assistance", "clips", "feet", "planner")
 ALONE: dict[str, Any] = {"on_ground": True, "automatic_gains": AUTOMATIC_GAINS_HZ}
@@ -159,6 +159,7 @@ def _read_urdf(
         fixed_base=reader.flag("fixed_base", default=has_massless_base(robot)),
         inertia_from_file=reader.choice("inertia", ["file", "shapes"]) == "file",
         self_collision=reader.flag("self_collision"),
+        collisions=reader.choice("collision", ["file", "none"]) == "file",
     )
 
 

@@ -19,16 +19,21 @@ MAX_MESH_BYTES = 64 * 1024 * 1024
 def resolve_meshes(loading: UrdfOptions) -> ElementTree.Element:
     """A copy of a URDF's root, in which the meshes of its links have absolute paths.
 
+    Where nothing collides, shapes whose meshes do not exist are left out.
+
     Raises:
         CharacterError: a mesh does not exist or is too large; names the file, link and path.
     """
     robot, urdf = deepcopy(loading.robot), loading.urdf_path
     for link in robot.findall("link"):
-        for mesh in link.iter("mesh"):
+        for part in (*link.findall("visual"), *link.findall("collision")):
             try:
-                mesh.set("filename", str(_find(mesh.get("filename", ""), urdf)))
+                for mesh in part.iter("mesh"):
+                    mesh.set("filename", str(_find(mesh.get("filename", ""), urdf)))
             except CharacterError as error:
-                raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
+                if loading.collisions:
+                    raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
+                link.remove(part)
     return robot
 
 
@@ -38,6 +43,8 @@ def collision_meshes(loading: UrdfOptions) -> dict[str, str]:
     Raises:
         CharacterError: a mesh does not exist or cannot be read.
     """
+    if not loading.collisions:
+        return {}
     names = {mesh.get("filename", "") for mesh in loading.robot.iterfind("link/collision//mesh")}
     return {name: _hash_of(_find(name, loading.urdf_path)) for name in sorted(names)}
 
@@ -93,6 +100,6 @@ def _candidates(name: str, urdf: Path) -> Iterator[Path]:
             yield files.resolve(name, urdf.parent, CharacterError)
         # as PyBullet does, and as packages lie in a workspace that is not installed
         for folder in urdf.absolute().parents:
-            yield folder / name.removeprefix("package://")
+            yield folder / name.removeprefix("package://").lstrip("/")
     else:
         yield urdf.parent / name

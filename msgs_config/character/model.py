@@ -165,6 +165,7 @@ class UrdfOptions:
     fixed_base: bool = False
     inertia_from_file: bool = False
     self_collision: bool = False
+    collisions: bool = True  # else nothing of it collides, and meshes may be missing
 
     @cached_property
     def robot(self) -> ElementTree.Element:

@@ -43,7 +43,7 @@ def read_shapes(loading: UrdfOptions) -> dict[str, tuple[Shapes, Shapes]]:
         except CharacterError as error:
             place = f"{loading.urdf_path}: link {link.get('name')!r}"
             raise CharacterError(f"{place}: {error}") from error
-        shapes[link.get("name", "")] = (seen or collided, collided)
+        shapes[link.get("name", "")] = (seen or collided, collided if loading.collisions else ())
     return shapes
 
 

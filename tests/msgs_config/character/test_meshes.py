@@ -63,6 +63,10 @@ PLACES = {  # how a mesh is named, and where it lies below the folder of `robot/
         "package://robot/meshes/cube.obj",
         "robot/meshes/cube.obj",
     ),
+    "in a package whose name is a slash": (
+        "package:///robot/meshes/cube.obj",
+        "robot/meshes/cube.obj",
+    ),
     "in a package of no name": ("package://meshes/cube.obj", "robot/urdf/meshes/cube.obj"),
 }
 
@@ -135,6 +139,29 @@ def test_a_mesh_that_does_not_exist_is_refused_by_file_link_and_path(
     for words in (str(urdf), "'body'", "mesh", name):
         assert words in line
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("part", ["visual", "collision"])
+def test_without_collisions_a_mesh_may_be_missing(tmp_path: Path, part: str) -> None:
+    """The rest is loaded: what is seen, and mass and inertia to the last bit."""
+    shapes = [
+        f"<{kind}><geometry>{shape}</geometry></{kind}>"
+        for kind in (part, "collision")
+        for shape in ('<mesh filename="gone.obj"/>', '<sphere radius="0.1"/>')
+    ]
+    path = write_character(
+        tmp_path, robot(link("body", inertial() + "".join(shapes))), "collision: none\n"
+    )
+
+    (body,) = load_character(str(path)).links
+
+    assert (body.mass, body.inertia_diagonal) == (1.0, (1.0, 1.0, 1.0))
+    assert body.collision_shapes == ()
+    assert {shape.type.value for shape in body.shapes} == {"sphere"}
+    client = connect()
+    engine_body = load_urdf(client, read_character_file(str(path)).loading)
+    assert not pybullet.getCollisionShapeData(engine_body, -1, physicsClientId=client)
+    pybullet.disconnect(client)
 
 
 def test_a_mesh_that_is_too_large_is_refused(
