@@ -37,7 +37,7 @@ from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
-from msgs_config.shared_parameters import DEFAULT_CHARACTER, placed
+from msgs_config.shared_parameters import DEFAULT_CHARACTER, collides, placed
 
 _FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge the last messages
 
@@ -55,7 +55,7 @@ class ControllerNode(ComposableNode):
         """
         super().__init__(topics.CONTROLLER_NODE, **options)
         given = given_parameters(self)
-        loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)))
+        loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)), collides(given))
         self._character = placed(loaded, given)
         self._layout = self._character.layout
         declared = PARAMETERS + character_parameters(self._character, given)

@@ -21,12 +21,20 @@ from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE, Character
 from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter, Values
-from msgs_config.shared_parameters import CHARACTER, COMMAND_DELAY, GRAVITY, PLACEMENT, RATE
+from msgs_config.shared_parameters import (
+    CHARACTER,
+    COLLISION,
+    COMMAND_DELAY,
+    GRAVITY,
+    PLACEMENT,
+    RATE,
+)
 
 _ROOT_VECTORS = (ROOT, ROOT_TORQUE)
 
 PARAMETERS = [
     CHARACTER,
+    COLLISION,
     PLACEMENT,
     RATE,
     GRAVITY,

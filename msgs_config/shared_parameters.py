@@ -12,6 +12,14 @@ PLANE, NO_GROUND = "plane", "none"  # of a simulator's `terrain`; else it is a U
 CHARACTER = Parameter(
     "character", DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml or .urdf file"
 )
+FROM_FILE, NO_COLLISIONS = "file", "none"
+COLLISION = Parameter(
+    "collision",
+    FROM_FILE,
+    "what the character collides with: as its file has it, or nothing, in which case meshes may be "
+    "missing",
+    choices=(FROM_FILE, NO_COLLISIONS),
+)
 RATE = Parameter("rate", 240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000)
 GRAVITY = Parameter("gravity", 9.81, "gravity along -z", unit="m/s^2", maximum=1000.0)
 COMMAND_DELAY = Parameter(
@@ -27,6 +35,15 @@ PLACEMENT = Parameter(
     unit="m, m, m, rad",
     minimum=-1e12,
 )
+
+
+def collides(given: Mapping[str, object]) -> bool:
+    """Whether the parameters given let a character collide, as far as its file does.
+
+    Raises:
+        ConfigurationError: the parameter has another value.
+    """
+    return COLLISION.checked(given.get(COLLISION.name, COLLISION.default)) == FROM_FILE
 
 
 def placed(character: Character, given: Mapping[str, object]) -> Character:

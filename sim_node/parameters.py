@@ -11,11 +11,13 @@ from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter, Value, Values, resolve
 from msgs_config.shared_parameters import (
     CHARACTER,
+    COLLISION,
     COMMAND_DELAY,
     GRAVITY,
     PLACEMENT,
     PLANE,
     RATE,
+    collides,
     placed,
 )
 from sim_node.initial_state import (
@@ -27,7 +29,7 @@ from sim_node.initial_state import (
 )
 
 _LARGEST_COUNT = 2**62
-_FIRST = (CHARACTER, PLACEMENT)  # the others depend on them
+_FIRST = (CHARACTER, COLLISION, PLACEMENT)  # the others depend on them
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
 CONTACT_BREAKING_THRESHOLD = "contact_breaking_threshold"
@@ -139,7 +141,7 @@ CHARACTERS = Parameter(
     "parameters of a character are set below its name",
     texts=True,
 )
-PARAMETERS = [CHARACTER, PLACEMENT, *WORLD_PARAMETERS]
+PARAMETERS = [CHARACTER, COLLISION, PLACEMENT, *WORLD_PARAMETERS]
 """Those of a simulator of one character, beside `character_parameters`."""
 
 
@@ -249,7 +251,7 @@ def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
     try:
         first = {p.name: given[p.name] for p in _FIRST if p.name in given}
         alone = resolve(_FIRST, first)
-        character = placed(load_character(alone.text(CHARACTER.name)), alone)
+        character = placed(load_character(alone.text(CHARACTER.name), collides(alone)), alone)
         values = resolve(PARAMETERS + character_parameters(character), given)
         check_given(values, given)
         character.layout.mask(values.texts("commanded_joints"))  # they exist

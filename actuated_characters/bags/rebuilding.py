@@ -22,7 +22,7 @@ from msgs_config.messages.configuration import (
     parse,
     parse_world,
 )
-from msgs_config.shared_parameters import CHARACTER, placed
+from msgs_config.shared_parameters import CHARACTER, collides, placed
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,10 @@ def _character(known: RunConfiguration, copy: WorldCopy) -> Character:
     if path is None or urdf_path is None:
         path, urdf_path = _paths_of_today(known, copy)
     file = read_character_texts(path, copy.character_text, urdf_path, copy.urdf.text)
-    check_collision_meshes(file.loading, copy.urdf.meshes)
-    return build_character(file)
+    loaded = collides(known.parameters)
+    if loaded:
+        check_collision_meshes(file.loading, copy.urdf.meshes)
+    return build_character(file, loaded)
 
 
 def _paths_of_today(known: RunConfiguration, copy: WorldCopy) -> tuple[Path, Path]:

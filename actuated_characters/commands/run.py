@@ -111,6 +111,12 @@ def _add_tracked(run: argparse.ArgumentParser) -> None:
         "get up; or react to hits",
     )
     run.add_argument(
+        "--collision",
+        choices=["file", "none"],
+        help="what the character collides with: as its file has it (file, the default), or nothing "
+        "(none), in which case meshes may be missing",
+    )
+    run.add_argument(
         "--planner",
         choices=["none", "predictive"],
         help="keep the motion by joint torques alone, planned ahead (predictive: without root "
@@ -184,12 +190,13 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
     from actuated_characters.runs.plan import make_plan
     from actuated_characters.runs.planned_throws import plan_throws
     from msgs_config.character.loading import load_character
+    from msgs_config.shared_parameters import collides
 
     settings = node_settings(options.set, NODES)
     simulator, controller = settings["sim_node"], settings["controller_node"]
-    for name in ("behaviour", "planner"):
+    for name in ("behaviour", "planner", "collision"):
         _set_option(name, getattr(options, name), controller)
-    character = load_character(options.character)
+    character = load_character(options.character, collides(simulator | controller))
     found_in = bring_parameters(character, options.clip, simulator, controller)
     duration = options.duration
     if duration is None:

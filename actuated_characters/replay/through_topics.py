@@ -26,11 +26,24 @@ from actuated_characters.runs.processes import Child
 from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
-from msgs_config.shared_parameters import CHARACTER, PLACEMENT
+from msgs_config.shared_parameters import CHARACTER, COLLISION, PLACEMENT
 from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
 
-_OF_A_CHARACTER = (PLACEMENT.name, "commanded_joints", "initial_position", "initial_velocity")
-_NOT_TO_BE_SET = (CHARACTER.name, PLACEMENT.name, SESSION.name, "rate", "wait_for_subscribers")
+_OF_A_CHARACTER = (
+    COLLISION.name,
+    PLACEMENT.name,
+    "commanded_joints",
+    "initial_position",
+    "initial_velocity",
+)
+_NOT_TO_BE_SET = (
+    CHARACTER.name,
+    COLLISION.name,
+    PLACEMENT.name,
+    SESSION.name,
+    "rate",
+    "wait_for_subscribers",
+)
 _APPLIED = (
     "not every tick has its commands in the bag, so the efforts that were really applied were "
     "sent, to a simulator in lockstep without effort limits and without delay"

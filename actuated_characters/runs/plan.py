@@ -19,12 +19,12 @@ from msgs_config.character.lowest_points import describe_start_below_ground
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values, resolve
-from msgs_config.shared_parameters import PLANE, placed
+from msgs_config.shared_parameters import PLANE, collides, placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, POSITION, as_values
 from sim_node.physics.probe import measure_probe
 
-SHARED = ("rate", "gravity", "placement", "command_delay_ticks")
+SHARED = ("rate", "gravity", "placement", "collision", "command_delay_ticks")
 """The same on both sides; set on one, they count on both."""
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
@@ -82,7 +82,9 @@ def make_plan(
             raise ConfigurationError(f"parameter '{name}' is set by {option}")
     simulator_given["character"] = character_name
     controller_given = {**_with_reference(reference, controller_given), "character": character_name}
-    character = placed(loaded or load_character(character_name), simulator_given)
+    character = placed(
+        loaded or load_character(character_name, collides(simulator_given)), simulator_given
+    )
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller, motion = _controller_values(character, controller_given)
     commanded = controller_parameters.commanded_joints(character, controller)

@@ -39,21 +39,25 @@ _JOINT_TYPES = {
 }
 
 
-def load_character(name_or_path: str) -> Character:
+def load_character(name_or_path: str, collides: bool = True) -> Character:
     """Load a shipped character by name, or any by the path of its YAML file or of its URDF alone.
+
+    Without `collides` nothing of it collides, as `collision: none` in its file has it.
 
     Raises:
         CharacterError: no such character, or its file or URDF cannot be used; says why.
     """
-    return build_character(read_character_file(name_or_path))
+    return build_character(read_character_file(name_or_path), collides)
 
 
-def build_character(file: CharacterFile) -> Character:
-    """The character that a file and its URDF describe.
+def build_character(file: CharacterFile, collides: bool = True) -> Character:
+    """The character that a file and its URDF describe; see `load_character`.
 
     Raises:
         CharacterError: the two do not fit each other, or a mesh cannot be used; says why.
     """
+    if not collides:
+        file = replace(file, loading=replace(file.loading, collisions=False))
     urdf = file.loading.urdf_path
     shapes = read_shapes(file.loading)
     client = connect()

@@ -88,7 +88,11 @@ def _find(name: str, urdf: Path) -> Path:
                 return path.absolute()
         except OSError:  # such as a name that is too long
             continue
-    raise CharacterError(f"mesh {name!r} does not exist; looked for {candidates[0]}")
+    above = f", and so on up to {candidates[-1]}" if len(candidates) > 1 else ""
+    raise CharacterError(
+        f"mesh {name!r} does not exist; looked for {candidates[0]}{above} ('collision: none' does "
+        "without)"
+    )
 
 
 def _candidates(name: str, urdf: Path) -> Iterator[Path]:

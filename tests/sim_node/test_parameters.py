@@ -26,6 +26,7 @@ from tests.support.physics import (
 
 OWN = [
     "character",
+    "collision",
     "placement",
     "commanded_joints",
     "initial_state",

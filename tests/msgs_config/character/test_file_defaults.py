@@ -138,6 +138,19 @@ def test_where_nought_is_beyond_the_limits_it_rests_at_the_nearest_one(tmp_path:
     assert any("rests there: knee at 0.2" in line for line in character.warnings)
 
 
+def test_a_run_without_collisions_needs_no_meshes_and_repeats(tmp_path: Path) -> None:
+    parts = body("base", '<mesh filename="gone.dae"/>'), link("arm"), joint("j", "base", "arm")
+    path = write_character(tmp_path, robot(*parts), "fixed_base: true\nautomatic_gains: 5\n")
+
+    plan = make_plan(str(path), 0.1, {"reference": "hold"}, {}, {"collision": "none"})
+
+    assert plan.simulator.text("collision") == "none"  # set on one side, it counts on both
+    (moved,) = moved_at_end(plan)
+    assert moved == pytest.approx(0.0, abs=1e-12)
+    line = refusal(path)
+    assert f"looked for {tmp_path / 'gone.dae'}" in line and "collision: none" in line
+
+
 # Its gains
 
 
