@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.session import given_session
 from msgs_config.parameters import Values
+from sim_node.frames import FrameNames
 
 
 @dataclass(frozen=True)
@@ -22,14 +23,15 @@ class NodeSettings:
     on_fault: str
     command_timeout_ns: int  # of simulated time
     push_ticks: int  # that a push lasts
-    display_ticks: int  # from markers to markers
+    display_ticks: int  # from what viewers show to the next
+    frames: FrameNames
 
 
 def make_node_settings(values: Values) -> NodeSettings:
     """The settings of the node that the parameters' values say.
 
     Raises:
-        ConfigurationError: the session is no session id.
+        ConfigurationError: the session is no session id, or a frame's name cannot be one.
     """
     rate = values.integer("rate")
     is_realtime = values.text("mode") == "realtime"
@@ -47,4 +49,5 @@ def make_node_settings(values: Values) -> NodeSettings:
         command_timeout_ns=round(values.number("command_timeout") * NANOSECONDS_PER_SECOND),
         push_ticks=max(round(values.number("wrench_duration") * rate), 1),
         display_ticks=max(round(rate / values.number("display_rate")), 1),
+        frames=FrameNames.of(values),
     )

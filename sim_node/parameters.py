@@ -20,6 +20,7 @@ from msgs_config.shared_parameters import (
     collides,
     placed,
 )
+from sim_node.frames import BASE_FRAME_PARAMETER, ODOM_FRAME, FrameNames
 from sim_node.initial_state import (
     POSITION,
     VELOCITY,
@@ -127,11 +128,14 @@ WORLD_PARAMETERS = [
     Parameter(
         "display_rate",
         30.0,
-        "visualization markers a second of simulated time",
+        "`visualization`, `/tf`, `description_joint_states` and `contact_wrenches` a second of "
+        "simulated time",
         unit="Hz",
         minimum=0.001,
         maximum=1000.0,
     ),
+    ODOM_FRAME,
+    BASE_FRAME_PARAMETER,
     SESSION,
 ]
 CHARACTERS = Parameter(
@@ -254,6 +258,7 @@ def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
         character = placed(load_character(alone.text(CHARACTER.name), collides(alone)), alone)
         values = resolve(PARAMETERS + character_parameters(character), given)
         check_given(values, given)
+        FrameNames.of(values).check(character)
         character.layout.mask(values.texts("commanded_joints"))  # they exist
     except (ConfigurationError, LayoutError) as error:
         raise ConfigurationError(f"character '{name}': {error}" if name else str(error)) from error

@@ -30,6 +30,7 @@ _OF_ALL = [
     topics.THROW,
     topics.APPLIED_THROW,
     topics.THROWN,
+    *topics.TRANSFORMS,
 ]
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
 _OF_EACH = [
@@ -43,6 +44,7 @@ _OF_EACH = [
     topics.APPLIED_WRENCH,
     topics.ODOM,
     topics.VISUALIZATION,
+    topics.DESCRIPTION_JOINT_STATES,
     topics.REFERENCE.of(topics.CONTROLLER_NODE),
     topics.NET_WRENCH.of(topics.CONTROLLER_NODE),
     topics.JOINT_TORQUES,

@@ -6,8 +6,8 @@ import numpy as np
 from sensor_msgs.msg import PointCloud2, PointField
 
 from controller_node.planner.outlook import Outlook
+from msgs_config.character.described_joints import WORLD
 from msgs_config.messages.cdr import split_stamp
-from msgs_config.messages.wrenches import WORLD
 
 FIELDS = ("x", "y", "z", "time", "cost", "alternative", "anchor_x", "anchor_y", "anchor_yaw")
 """Of each point: m; s after the state; costs; m and rad, where the reference's world is."""

@@ -16,6 +16,7 @@ from controller_node.interface.plan_message import plan_message
 from controller_node.planner.outlook import Outlook
 from controller_node.strength import Strengths
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.character.described_joints import WORLD
 from msgs_config.character.layout import JointLayout
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder, split_stamp
@@ -23,7 +24,6 @@ from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.topics import Outgoing
-from msgs_config.messages.wrenches import WORLD
 
 
 class Reply(NamedTuple):

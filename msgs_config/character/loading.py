@@ -91,6 +91,7 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         feet=file.feet,
         planning=file.planning,
         warnings=(*_collect_warnings(file, layout, links), *repairs),
+        up_axis=file.up_axis,
     )
     return add_defaults(character, file)
 

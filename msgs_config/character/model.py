@@ -211,6 +211,8 @@ class Character:
     planning: Planning = Planning()
     warnings: tuple[str, ...] = ()  # of likely mistakes in its files
     placement: Placement = Placement()
+    up_axis: str = "z"
+    """The axis of the base link that points up where the character stands; y or z."""
 
     @cached_property
     def layout(self) -> JointLayout:

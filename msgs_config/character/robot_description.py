@@ -1,25 +1,44 @@
 """A character's URDF as other programs of ROS can read it (RViz, robot_state_publisher)."""
 
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
+
+from msgs_config.character.described_joints import (
+    BASE_FRAME,
+    DescribedJoint,
+    DescribedJoints,
+    yaw_pitch_roll,
+)
+from msgs_config.character.layout import JointType
 from msgs_config.character.meshes import resolve_meshes
-from msgs_config.character.model import Character
+from msgs_config.character.model import Character, Link, Pose, Quadruple, Shape, ShapeType
 
 _JOINT_TYPES = {"revolute", "continuous", "prismatic", "fixed"}
 _SHAPES = {"box", "sphere", "cylinder", "mesh"}
+_UNLIMITED = 1e9  # m, N, N m or their rates: URDF's limits must be numbers
 
 
-def robot_description(character: Character) -> str | None:
-    """The text of a character's URDF, its meshes as `file://` URIs; None where it has no legal one.
+def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str:
+    """The text of a URDF of a character, its meshes as `file://` URIs.
 
-    Ball joints, capsules and a scale are the engine's own and no part of URDF.
+    It is the character's own where that is a legal one. Ball joints, capsules and a scale are the
+    engine's own and no part of URDF; a character that has any is described by hinges, cylinders
+    and spheres. The root is `base_frame`, see `DescribedJoints`.
     """
-    if character.loading.scale != 1.0 or not _is_legal(character.loading.robot):
-        return None
-    robot = resolve_meshes(character.loading)
-    for mesh in robot.iterfind("link//mesh"):
-        mesh.set("filename", Path(mesh.get("filename", "")).as_uri())
+    joints = DescribedJoints(character, base_frame)
+    if character.loading.scale == 1.0 and _is_legal(character.loading.robot):
+        robot = resolve_meshes(character.loading)
+        for mesh in robot.iterfind("link//mesh"):
+            mesh.set("filename", Path(mesh.get("filename", "")).as_uri())
+        if joints.has_own_base:
+            robot.insert(0, ElementTree.Element("link", name=joints.root))
+            robot.insert(1, _joint(joints.joints[0]))
+    else:
+        robot = _describe(character, joints)
     return ElementTree.tostring(robot, encoding="unicode")
 
 
@@ -32,3 +51,86 @@ def _is_legal(robot: ElementTree.Element) -> bool:
     whole = all({"effort", "velocity"} <= set(limit.attrib) for limit in limits)
     named = robot.tag == "robot" and bool(robot.get("name"))
     return named and types <= _JOINT_TYPES and shapes <= _SHAPES and whole
+
+
+def _describe(character: Character, joints: DescribedJoints) -> ElementTree.Element:
+    """A URDF made of the character's links and of the joints of its description."""
+    robot = ElementTree.Element("robot", name=character.name)
+    colors = sorted({shape.color_rgba for link in character.links for shape in link.shapes})
+    materials = {color: f"color_{number}" for number, color in enumerate(colors)}
+    for color, name in materials.items():
+        material = ElementTree.SubElement(robot, "material", name=name)
+        ElementTree.SubElement(material, "color", rgba=_text(color))
+    links = {link.name: link for link in character.links}
+    for name in (joints.root, *(joint.child for joint in joints.joints)):
+        element = ElementTree.SubElement(robot, "link", name=name)
+        if name in links:
+            element.extend(_parts(links[name], materials))
+    robot.extend(_joint(joint) for joint in joints.joints)
+    return robot
+
+
+def _parts(link: Link, materials: dict[Quadruple, str]) -> Iterator[ElementTree.Element]:
+    """Mass and shapes of a link."""
+    if link.mass > 0.0:
+        inertial = ElementTree.Element("inertial")
+        inertial.append(_origin(link.inertial_pose))
+        ElementTree.SubElement(inertial, "mass", value=repr(float(link.mass)))
+        moments = zip(("ixx", "iyy", "izz"), link.inertia_diagonal, strict=True)
+        tensor = {name: repr(float(moment)) for name, moment in moments}
+        ElementTree.SubElement(inertial, "inertia", tensor | {"ixy": "0", "ixz": "0", "iyz": "0"})
+        yield inertial
+    for shape in _without_capsules(link.shapes):
+        visual = _shape("visual", shape)
+        ElementTree.SubElement(visual, "material", name=materials[shape.color_rgba])
+        yield visual
+    for shape in _without_capsules(link.collision_shapes):
+        yield _shape("collision", shape)
+
+
+def _without_capsules(shapes: Sequence[Shape]) -> Iterator[Shape]:
+    for shape in shapes:
+        yield from shape.without_capsule()
+
+
+def _shape(tag: str, shape: Shape) -> ElementTree.Element:
+    """A shape that is seen or touched, of any type but a capsule."""
+    element = ElementTree.Element(tag)
+    element.append(_origin(shape.pose))
+    attributes = {"size": _text(shape.size)}
+    if shape.type is ShapeType.MESH:
+        attributes = {"filename": Path(shape.mesh).as_uri(), "scale": _text(shape.size)}
+    elif shape.type is not ShapeType.BOX:
+        names = ("radius", "length")[: len(shape.size)]
+        attributes = {n: repr(float(v)) for n, v in zip(names, shape.size, strict=True)}
+    geometry = ElementTree.SubElement(element, "geometry")
+    ElementTree.SubElement(geometry, shape.type.value, attributes)
+    return element
+
+
+def _joint(joint: DescribedJoint) -> ElementTree.Element:
+    is_endless = joint.type is JointType.REVOLUTE and math.isinf(joint.upper - joint.lower)
+    element = ElementTree.Element(
+        "joint", name=joint.name, type="continuous" if is_endless else joint.type.value
+    )
+    ElementTree.SubElement(element, "parent", link=joint.parent)
+    ElementTree.SubElement(element, "child", link=joint.child)
+    element.append(_origin(joint.pose))
+    if joint.type is not JointType.FIXED:
+        ElementTree.SubElement(element, "axis", xyz=_text(joint.axis))
+        limits = {"effort": joint.effort_limit, "velocity": math.inf}
+        if not is_endless:
+            limits |= {"lower": joint.lower, "upper": joint.upper}
+        bounded = {n: max(min(value, _UNLIMITED), -_UNLIMITED) for n, value in limits.items()}
+        ElementTree.SubElement(element, "limit", {n: repr(v) for n, v in bounded.items()})
+    return element
+
+
+def _origin(pose: Pose) -> ElementTree.Element:
+    yaw, pitch, roll = yaw_pitch_roll(np.array(pose.orientation_xyzw)).tolist()
+    rpy = _text((roll, pitch, yaw))
+    return ElementTree.Element("origin", xyz=_text(pose.position), rpy=rpy)
+
+
+def _text(numbers: Sequence[float]) -> str:
+    return " ".join(repr(float(number) + 0.0) for number in numbers)  # -0.0 becomes 0.0

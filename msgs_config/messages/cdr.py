@@ -72,7 +72,7 @@ def read_frame_id(raw: bytes) -> str:
     return raw[_FRAME_START : _FRAME_START + length].rstrip(b"\0").decode(errors="replace")
 
 
-def _padding(length: int, alignment: int) -> int:
+def padding(length: int, alignment: int) -> int:
     """How many bytes a serialised item of this alignment is preceded by, after `length` bytes."""
     return -length % alignment
 
@@ -80,13 +80,13 @@ def _padding(length: int, alignment: int) -> int:
 def encode_names(names: Sequence[str], frame_id: str) -> bytes:
     """The bytes from after the stamp to the end of the names."""
     count = struct.pack("<I", len(names))
-    return _cdr_text(frame_id) + count + b"".join(map(_cdr_text, names))
+    return encode_text(frame_id) + count + b"".join(map(encode_text, names))
 
 
-def _cdr_text(text: str) -> bytes:
+def encode_text(text: str) -> bytes:
     """A text with its length, padded for the next item, which is never a double."""
     content = text.encode() + b"\0"
-    return struct.pack("<I", len(content)) + content + bytes(_padding(len(content), 4))
+    return struct.pack("<I", len(content)) + content + bytes(padding(len(content), 4))
 
 
 def decode(raw: bytes, message_type: type) -> Any:
@@ -141,7 +141,7 @@ def _read_stamp(raw: bytes, order: _ByteOrder) -> int:
 
 def _read_count(raw: bytes, offset: int, order: _ByteOrder) -> tuple[int, int]:
     """A length, and the offset behind it."""
-    offset += _padding(offset, 4)  # the encapsulation header has four bytes as well
+    offset += padding(offset, 4)  # the encapsulation header has four bytes as well
     (count,) = order.length.unpack_from(raw, offset)
     return count, offset + 4
 
@@ -164,7 +164,7 @@ def _read_lists(
         count, offset = _read_count(raw, offset, order)
         values = _EMPTY
         if count:
-            offset += _padding(offset - 4, 8)
+            offset += padding(offset - 4, 8)
             values = np.frombuffer(raw, order.double, count * width, offset).astype(np.float64)
         lists.append(values)
         offset += values.nbytes
@@ -182,7 +182,7 @@ def gaps_before(length: int, lists: Iterable[FloatArray]) -> list[bytes]:
     for values in lists:
         gap = LITTLE_ENDIAN.length.pack(len(values))
         if len(values):
-            gap += bytes(_padding(length + len(gap) - 4, 8))
+            gap += bytes(padding(length + len(gap) - 4, 8))
         gaps.append(gap)
         length += len(gap) + values.nbytes
     return gaps
@@ -206,8 +206,8 @@ class DoublesEncoder:
 
     def __init__(self, *texts: str) -> None:
         """The texts in the message's order, its `frame_id` first."""
-        head = CDR_LITTLE_ENDIAN + bytes(8) + b"".join(_cdr_text(text) for text in texts)
-        self._head = head + bytes(_padding(len(head) - 4, 8))
+        head = CDR_LITTLE_ENDIAN + bytes(8) + b"".join(encode_text(text) for text in texts)
+        self._head = head + bytes(padding(len(head) - 4, 8))
 
     def encode(self, stamp_ns: int, values: FloatArray) -> bytes:
         """The serialised message with all its doubles (m,), in the message's order."""

@@ -1,5 +1,6 @@
 """Names, message types and quality of service of every topic."""
 
+import re
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -18,6 +19,11 @@ from sensor_msgs.msg import JointState, MultiDOFJointState, PointCloud2
 from std_msgs.msg import Header, String
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
+
+try:  # a full ROS install has it, the wheels have not
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    TFMessage = None
 
 Outgoing: TypeAlias = tuple[Publisher, bytes]
 """A serialised message and its publisher."""
@@ -116,6 +122,7 @@ APPLIED_THROW = Topic("applied_throw", JointState, STREAM_QOS)
 THROWN = Topic("thrown", MultiDOFJointState, STREAM_QOS)
 ODOM = Topic("odom", Odometry, STREAM_QOS)
 ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED_QOS)
+DESCRIPTION_JOINT_STATES = Topic("description_joint_states", JointState, DISPLAY_QOS)
 VISUALIZATION = Topic("visualization", MarkerArray, DISPLAY_QOS)
 INITIAL_STATE = Topic("~/initial_state", JointState, LATCHED_QOS)
 REFERENCE = Topic("~/reference", JointState, STREAM_QOS)
@@ -130,6 +137,22 @@ CLOCK = Topic("/clock", Clock, STREAM_QOS)
 EPISODE = Topic("episode", Header, LATCHED_QOS)
 CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS)
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, STREAM_QOS)
+TRANSFORMS = (
+    []
+    if TFMessage is None
+    else [
+        Topic("/tf", TFMessage, DISPLAY_QOS),
+        Topic("/tf_static", TFMessage, LATCHED_QOS),
+    ]
+)
+"""`/tf` and `/tf_static`, where their type is installed."""
+
+
+def contact_wrench(link: str) -> Topic:
+    """The topic of the contact wrench on a link; what no topic's name can have becomes `_`."""
+    name = re.sub(r"\W|^(?=\d)", "_", link, flags=re.ASCII)
+    return Topic(f"contact_wrenches/{name}", WrenchStamped, DISPLAY_QOS)
+
 
 SIM_NODE = "sim_node"
 CONTROLLER_NODE = "controller_node"

@@ -12,11 +12,9 @@ import numpy as np
 from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.character.described_joints import WORLD
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 from msgs_config.messages.cdr import encode_arrays, encode_head, read_message, with_stamp
-
-WORLD = "world"
-"""The frame of everything that is given in the world."""
 
 NO_ROWS = np.zeros((0, 6))
 _MAX_KEPT_HEADS = 256

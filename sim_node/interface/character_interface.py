@@ -47,7 +47,7 @@ class CharacterInterface:
         self._once_logger = logger
         for warning in character.warnings:
             node.get_logger().warning(f"{character.setup.prefix}{warning}")
-        self.publishers = Publishers(node, character, settings.display_ticks, own_session.session)
+        self.publishers = Publishers(node, character, settings, own_session.session)
         self.commands: LockstepBarrier | ZeroOrderHold
         names, commanded = character.layout.dof_names, character.commanded
         if settings.is_realtime:

@@ -3,61 +3,38 @@
 import time
 from collections.abc import Iterator, Sequence
 
-import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import Header, String
 
-from msgs_config.arrays import FloatArray
 from msgs_config.character.model import UrdfOptions
-from msgs_config.character.robot_description import robot_description
-from msgs_config.geometry import frames
 from msgs_config.messages import configuration, topics
-from msgs_config.messages.cdr import DoublesEncoder, split_stamp, with_stamp
+from msgs_config.messages.cdr import split_stamp, with_stamp
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Outgoing, Topic
-from msgs_config.messages.wrenches import (
-    WORLD,
-    SelectionEncoder,
-    WrenchArrays,
-    encode_wrenches,
-)
+from msgs_config.messages.wrenches import SelectionEncoder, WrenchArrays, encode_wrenches
 from msgs_config.parameters import Values
 from msgs_config.runtime.composition import UNTIL_A_MESSAGE, Turns
 from msgs_config.runtime.process import StopSignal
-from sim_node.interface.markers import MarkerEncoder
+from sim_node.interface.display import DisplayPublishers
+from sim_node.node_settings import NodeSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
-
-try:  # a full ROS install has it, the wheels have not
-    from tf2_msgs.msg import TFMessage
-except ImportError:
-    TFMessage = None
-
-_ODOMETRY_DOUBLES = 85  # position, orientation, 36 of a covariance, twist, 36 of a covariance
-_POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
-_LINEAR, _ANGULAR = slice(43, 46), slice(46, 49)
 
 
 class Publishers:
     """The publishers of one character. A topic without subscribers costs nothing."""
 
     def __init__(
-        self, node: Node, character: SimulatedCharacter, display_ticks: int, session: str
+        self, node: Node, character: SimulatedCharacter, settings: NodeSettings, session: str
     ) -> None:
-        """Offer the topics, below the character's name; markers come every `display_ticks`.
-
-        `session` is the simulator's, which messages name.
-        """
+        """Offer the topics, below the character's name; messages name the simulator's `session`."""
         self._character = character
         self._session = session
-        self._display_ticks = display_ticks
         self._links = [link.name for link in character.character.links]
-        self._base = character.setup.prefix + self._links[0]
         self._last_state = b""
         self._last_episode: Header | None = None
         self._make_encoders()
@@ -70,25 +47,13 @@ class Publishers:
         self._states = create(topics.JOINT_STATES)
         self._contacts = create(topics.CONTACTS)
         self._wrenches = create(topics.APPLIED_WRENCH)
-        self._odometry = create(topics.ODOM)
-        self._visualization = create(topics.VISUALIZATION)
-        self._transforms = None
-        if TFMessage is not None:
-            self._transforms = node.create_publisher(TFMessage, "/tf", topics.STREAM_QOS)
-        description = robot_description(character.character)
-        if description is not None:
-            self._description = create(topics.ROBOT_DESCRIPTION)
-            self._description.publish(String(data=description))
+        self._display = DisplayPublishers(node, character, settings)
 
     def _make_encoders(self) -> None:
         session = self._session
         self._state_encoder = JointStateEncoder(self._character.layout.dof_names, session)
         self._no_wrenches = encode_wrenches(WrenchArrays.of_rows(0, [], [], [], session))
         self._contacts_encoder = SelectionEncoder(self._links, session)
-        self._odometry_encoder = DoublesEncoder(WORLD, self._base)
-        # the covariances stay zero, which means unknown
-        self._odometry_doubles = np.zeros(_ODOMETRY_DOUBLES)
-        self._markers = MarkerEncoder(self._character.character)
 
     @property
     def state_subscribers(self) -> int:
@@ -97,8 +62,8 @@ class Publishers:
 
     @property
     def wants_contacts(self) -> bool:
-        """Whether the contacts have subscribers."""
-        return topics.has_subscribers(self._contacts)
+        """Whether the contacts have subscribers, or their wrenches for viewers have."""
+        return topics.has_subscribers(self._contacts) or self._display.wants_contacts
 
     def publish_configuration(
         self,
@@ -133,7 +98,7 @@ class Publishers:
 
     def before_state(self) -> Iterator[Outgoing]:
         """The messages that a controller may wait for beside a tick's state, which follows them."""
-        if self._character.contacts is not None and self.wants_contacts:
+        if self._character.contacts is not None and topics.has_subscribers(self._contacts):
             yield self._contacts, self._encode_contacts()
         if topics.has_subscribers(self._wrenches):
             yield self._wrenches, self._encode_applied()
@@ -149,36 +114,26 @@ class Publishers:
 
     def publish_display(self, tick: int) -> None:
         """Publish what shows a tick's state, while the controller works on that state."""
-        self._publish_base()
-        if tick % self._display_ticks == 0 or self._character.state.effort is None:
-            self._publish_markers()
+        self._display.publish(tick)
 
     def republish(self, *, with_state: bool, with_episode: bool) -> None:
-        """Publish the markers again, and the last state, the same bytes, for late subscribers.
+        """Publish what is shown again, and the last state, the same bytes, for late subscribers.
 
         A controller that needs the contacts waits for those as well. The episode shows that a
         simulator that is paused or held back is still there.
         """
-        self._publish_markers()
+        self._display.republish()
         if with_episode and self._last_episode is not None:
             self._episode.publish(self._last_episode)
         if with_state:
-            if self.wants_contacts:
+            if topics.has_subscribers(self._contacts):
                 self._contacts.publish(self._encode_contacts())
             self._states.publish(self._last_state)
 
     @property
     def of_ticks(self) -> list[Publisher]:
         """The publishers of what comes again at each tick."""
-        every = (
-            self._states,
-            self._contacts,
-            self._wrenches,
-            self._odometry,
-            self._visualization,
-            self._transforms,
-        )
-        return [publisher for publisher in every if publisher is not None]
+        return [self._states, self._contacts, self._wrenches, *self._display.streams]
 
     def _encode_contacts(self) -> bytes:
         """The contacts; none if the topic had no subscriber while they happened."""
@@ -201,44 +156,6 @@ class Publishers:
                 self._session,
             )
         )
-
-    def _publish_base(self) -> None:
-        """Publish the base link's pose and twist, if there are subscribers."""
-        odometry = topics.has_subscribers(self._odometry)
-        transforms = self._transforms and topics.has_subscribers(self._transforms)
-        if not (odometry or transforms):
-            return
-        origin, turn = self._character.base_frame()
-        if odometry:
-            self._odometry.publish(self._encode_odometry(origin, turn))
-        if self._transforms and transforms:
-            header = _header(self._character.state.stamp_ns, WORLD)
-            transform = TransformStamped(header=header, child_frame_id=self._base)
-            transform.transform.translation = Vector3(**dict(zip("xyz", origin, strict=True)))
-            transform.transform.rotation = Quaternion(**dict(zip("xyzw", turn, strict=True)))
-            self._transforms.publish(TFMessage(transforms=[transform]))
-
-    def _encode_odometry(self, origin: FloatArray, turn: FloatArray) -> bytes:
-        """The serialised message."""
-        values = self._odometry_doubles
-        values[_POSITION], values[_ORIENTATION] = origin, turn
-        if self._character.layout.has_floating_base:
-            velocity = self._character.state.velocity
-            into_base = frames.axes(frames.conjugate(turn.tolist()))
-            values[_LINEAR] = frames.to_parent(into_base, velocity[:3].tolist())
-            values[_ANGULAR] = velocity[3:6]
-        return self._odometry_encoder.encode(self._character.state.stamp_ns, values)
-
-    def _publish_markers(self) -> None:
-        """Publish the shapes and the world's balls where they are, if there are subscribers."""
-        if topics.has_subscribers(self._visualization):
-            balls = self._character.balls
-            origins, turns = self._character.link_frames()
-            self._visualization.publish(
-                self._markers.encode(
-                    self._character.state.stamp_ns, origins, turns, balls.throws, balls.motion()
-                )
-            )
 
 
 def wait_for_subscribers(

@@ -20,7 +20,12 @@ Report = Callable[[str, float], None]
 """Called with a run's label and the share of it that is done."""
 
 _DIVERGED = "diverged at tick"
-_UNREAD = ["odom", "visualization", "controller_node/net_wrench"]  # topics, at a cost each tick
+_UNREAD = [  # topics, at a cost each tick
+    "odom",
+    "visualization",
+    "description_joint_states",
+    "controller_node/net_wrench",
+]
 
 
 class TopicRunner:

@@ -14,6 +14,7 @@ from msgs_config.character.model import ShapeType
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from tests.sim_node.conftest import Join
+from tests.support.description import parse
 from tests.support.physics import FLOATING_TURNED_FRAMES, character, simulation
 from tests.support.ros import (
     Processes,
@@ -84,7 +85,7 @@ def test_odometry_is_the_base_link_its_twist_in_its_own_frame(
     assert set(odometry.ticks()) >= set(range(10, 32))
     for message in odometry.messages:
         state = states[tick_of(message)]
-        assert (message.header.frame_id, message.child_frame_id) == ("world", whole.links[0].name)
+        assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
         turn = turn_matrix(np.array(state.position[3:6]))
         pose, twist = message.pose.pose, message.twist.twist
         np.testing.assert_allclose(vector(pose.position), state.position[:3], atol=STEADY)
@@ -111,6 +112,39 @@ def test_odometry_of_a_fixed_base_stands_still_where_it_was_placed(
     quarter = (0.0, 0.0, np.sin(0.25), np.cos(0.25))
     np.testing.assert_allclose(orientation(pose.orientation), quarter, atol=STEADY)
     assert not any((*vector(twist.linear), *vector(twist.angular)))
+
+
+def test_odometry_of_a_y_up_model_is_of_a_base_that_is_z_up_and_looks_along_x(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    odometry = client.listen(topics.ODOM)
+    velocity = [1.0, 2.0, 3.0, *(0.0,) * 31]
+    velocity[3:6] = 0.1, 0.2, 0.3  # about the model's x, y and z, which point forward, up, right
+    processes.simulator("humanoid", initial_velocity=velocity, wait_for_subscribers=1)
+
+    client.first_state()
+    first = client.spin_until(lambda: odometry.messages and odometry.messages[0], "odometry")
+
+    assert (first.header.frame_id, first.child_frame_id) == ("odom", "base_link")
+    np.testing.assert_allclose(orientation(first.pose.pose.orientation), (0, 0, 0, 1), atol=1e-9)
+    np.testing.assert_allclose(vector(first.twist.twist.linear), (1.0, 2.0, 3.0), atol=1e-9)
+    np.testing.assert_allclose(vector(first.twist.twist.angular), (0.1, -0.3, 0.2), atol=1e-9)
+    for covariance in (first.pose.covariance, first.twist.covariance):
+        matrix = np.array(covariance).reshape(6, 6)
+        assert (np.diag(matrix) > 0.0).all() and (np.diag(matrix) < 1e-6).all()
+        assert not matrix[~np.eye(6, dtype=bool)].any()
+
+
+def test_the_frames_of_the_odometry_have_the_names_that_are_given(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    odometry = client.listen(topics.ODOM)
+    processes.simulator(odom_frame="map", base_frame="torso", wait_for_subscribers=1)
+
+    client.first_state()
+    message = client.spin_until(lambda: odometry.messages and odometry.last, "odometry")
+
+    assert (message.header.frame_id, message.child_frame_id) == ("map", "torso")
 
 
 # Contacts, and what a tick consists of
@@ -199,22 +233,22 @@ def test_a_tick_is_published_in_the_order_clock_contacts_pushes_state(
 # What is shown
 
 
-@pytest.mark.parametrize("name", ["pendulum", "humanoid"])
-def test_the_robot_description_is_latched_where_the_urdf_is_a_legal_one(
-    processes: Processes, client: SimulatorClient, name: str
+@pytest.mark.parametrize(("name", "joint"), [("pendulum", "hinge"), ("humanoid", "chest_pitch")])
+def test_the_robot_description_is_latched_and_has_joint_states(
+    processes: Processes, client: SimulatorClient, name: str, joint: str
 ) -> None:
-    processes.simulator(name)
+    positions = client.listen(topics.DESCRIPTION_JOINT_STATES)
+    processes.simulator(name, wait_for_subscribers=1)
     client.first_state()
     descriptions = client.listen(topics.ROBOT_DESCRIPTION)
 
-    client.spin_until(lambda: client.configuration.messages, "what else is latched")
-    if name == "humanoid":  # it has ball joints
-        assert not client.node.get_publishers_info_by_topic("/robot_description")
-        return
+    client.spin_until(lambda: descriptions.messages and positions.messages, "the description")
 
-    client.spin_until(lambda: descriptions.messages, "the description")
-    assert descriptions.last.data.startswith("<robot")
-    assert 'name="hinge"' in descriptions.last.data
+    robot = parse(descriptions.last.data)
+    moving = {name for name, each in robot.joint_map.items() if each.type != "fixed"}
+    assert joint in moving
+    assert set(positions.last.name) == moving
+    assert len(positions.last.position) == len(moving)
 
 
 TYPES = {
@@ -387,7 +421,7 @@ def test_each_of_several_characters_is_pushed_shown_and_driven_by_its_own(
     right.spin_until(lambda: odometry.messages, "odometry")
     assert [tick_of(m) for m in applied.messages if m.joint_names] == [61]
     assert not any(m.joint_names for m in others.messages)
-    assert odometry.last.child_frame_id == f"right/{character('pendulum').links[0].name}"
+    assert odometry.last.child_frame_id == "right/base_link"
     assert odometry.last.pose.pose.position.x == pytest.approx(2.0)
 
 
@@ -402,6 +436,8 @@ def test_the_states_are_the_same_whether_all_or_nothing_else_is_listened_to(
         topics.APPLIED_WRENCH,
         topics.ODOM,
         topics.VISUALIZATION,
+        topics.DESCRIPTION_JOINT_STATES,
+        topics.contact_wrench("left_ankle"),
     ):
         client.listen(topic)
     processes.simulator("humanoid", display_rate=240.0, substeps=2, wait_for_subscribers=1)

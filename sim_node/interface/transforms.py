@@ -1,0 +1,80 @@
+"""`/tf` and `/tf_static` of one character: world, odom, base, and each link of its description."""
+
+from collections.abc import Callable
+
+import numpy as np
+from rclpy.node import Node
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.described_joints import (
+    WORLD,
+    DescribedJoint,
+    DescribedJoints,
+    pose_rows,
+)
+from msgs_config.geometry import rotations
+from msgs_config.messages import topics
+from msgs_config.messages.transforms import TransformsEncoder
+from sim_node.frames import FrameNames
+from sim_node.physics.simulated_character import SimulatedCharacter
+
+_NO_MOTION = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+class TransformPublisher:
+    """Publishes what moves on `/tf`, and the rest once on `/tf_static`."""
+
+    def __init__(
+        self,
+        node: Node,
+        character: SimulatedCharacter,
+        joints: DescribedJoints,
+        frames: FrameNames,
+    ) -> None:
+        """Offer both topics, and publish the static frames."""
+        self._character, self._joints = character, joints
+        self._prefix = character.setup.prefix
+        moving_topic, static_topic = topics.TRANSFORMS
+        self.publisher = topics.create_publisher(node, moving_topic)
+        self._static = topics.create_publisher(node, static_topic)
+        self._subscribers = 0  # when it was published last
+        self._floats = character.layout.has_floating_base
+        base = (self._prefix + frames.odom, self._prefix + joints.root)
+        moving = [base] if self._floats else []
+        self._encoder = TransformsEncoder(moving + [self._names(each) for each in joints.moving])
+        static = [self._names(each) for each in joints.fixed]
+        poses = [pose_rows(joints.fixed)]
+        if not self._floats:
+            static.append(base)
+            poses.append(self._base_pose())
+        links = {self._prefix + link.name for link in character.character.links}
+        if base[0] != WORLD and WORLD not in links:
+            static.append((WORLD, base[0]))
+            poses.append(_NO_MOTION[np.newaxis])
+        self._static.publish(TransformsEncoder(static).encode(0, np.concatenate(poses)))
+
+    def _names(self, joint: DescribedJoint) -> tuple[str, str]:
+        return self._prefix + joint.parent, self._prefix + joint.child
+
+    def _base_pose(self) -> FloatArray:
+        """Pose (1, 7) of the base in the world, which is the frame of `odom`."""
+        origin, turn = self._character.base_frame()
+        turned = rotations.multiply(turn, rotations.conjugate(self._joints.turn_xyzw))
+        return np.concatenate((origin, turned))[np.newaxis]
+
+    def publish(self, stamp_ns: int, positions: Callable[[], FloatArray]) -> None:
+        """Publish the frames that move, if there are subscribers.
+
+        `positions` gives those (m,) of the description's joints.
+        """
+        self._subscribers = self.publisher.handle.get_subscription_count()
+        if self._subscribers:
+            poses = self._joints.poses(positions())
+            if self._floats:
+                poses = np.concatenate((self._base_pose(), poses))
+            self.publisher.publish(self._encoder.encode(stamp_ns, poses))
+
+    def publish_to_new(self, stamp_ns: int, positions: Callable[[], FloatArray]) -> None:
+        """Publish again if subscribers have come; tf2 warns of a stamp that comes twice."""
+        if self.publisher.handle.get_subscription_count() > self._subscribers:
+            self.publish(stamp_ns, positions)
