@@ -282,7 +282,8 @@ class ControllerNode(ComposableNode):
                     **self._stamped_topics.refused,
                     UNLOGGED: self._once_logger.unlogged,
                     **self._answer_times.percentiles_us("answer", (50, 99)),
-                }
+                },
+                hardware_id=self._character.name,
             )
 
     def _check_parameters(self, values: Values) -> None:

@@ -293,5 +293,7 @@ class SimNode(ComposableNode):
             UNLOGGED: self._once_logger.unlogged,
         }
         values |= self._rate_limiter.summary() | self._world.report()
+        fault, warning = self._control.fault, self._rate_limiter.take_warning()
         for each in self._characters:
-            self._diagnostics.publish(values | each.report(), self._control.fault, below=each.name)
+            report = values | each.report()
+            self._diagnostics.publish(report, fault, warning, each.hardware_id, below=each.name)

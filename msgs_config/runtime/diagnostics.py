@@ -11,7 +11,7 @@ DIAGNOSTICS_PERIOD = 1.0  # s of wall time
 
 
 class DiagnosticsPublisher:
-    """Publishes a node's counts, and its fault if it has one."""
+    """Publishes a node's counts, and its fault or a warning if it has one."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -23,17 +23,26 @@ class DiagnosticsPublisher:
         return bool(self._publisher.get_subscription_count())
 
     def publish(
-        self, values: Mapping[str, object], fault: str | None = None, below: str = ""
+        self,
+        values: Mapping[str, object],
+        fault: str | None = None,
+        warning: str | None = None,
+        hardware_id: str = "",
+        *,
+        below: str = "",
     ) -> None:
-        """Publish the values by name; with a fault the level is ERROR and its text the message.
+        """Publish the values by name, about the character `hardware_id`.
 
+        With a fault the level is ERROR and its text the message; with a warning alone it is WARN.
         The status has the node's name, that in a namespace `below` its own if there is one.
         """
         namespace = "/".join(filter(None, (self._node.get_namespace().strip("/"), below)))
+        level = DiagnosticStatus.OK if warning is None else DiagnosticStatus.WARN
         status = DiagnosticStatus(
-            level=DiagnosticStatus.OK if fault is None else DiagnosticStatus.ERROR,
+            level=level if fault is None else DiagnosticStatus.ERROR,
             name=f"{namespace}/{self._node.get_name()}".lstrip("/"),
-            message=fault or "running",
+            message=fault or warning or "running",
+            hardware_id=hardware_id,
             values=[KeyValue(key=name, value=str(value)) for name, value in values.items()],
         )
         message = DiagnosticArray(status=[status])

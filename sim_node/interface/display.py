@@ -99,7 +99,7 @@ class DisplayPublishers:
         """Publish the markers again, and the rest for those who are new."""
         self._publish_markers()
         if self._transforms is not None:
-            self._transforms.publish_to_new(self._character.state.stamp_ns, self._positions)
+            self._transforms.repeat(self._character.state.stamp_ns, self._positions)
 
     @property
     def streams(self) -> Sequence[Publisher]:

@@ -18,6 +18,7 @@ from msgs_config.messages.transforms import TransformsEncoder
 from sim_node.frames import FrameNames
 from sim_node.physics.simulated_character import SimulatedCharacter
 
+_REPETITIONS = 3  # of a state that is published again and again, for a new subscriber
 _NO_MOTION = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
@@ -38,6 +39,7 @@ class TransformPublisher:
         self.publisher = topics.create_publisher(node, moving_topic)
         self._static = topics.create_publisher(node, static_topic)
         self._subscribers = 0  # when it was published last
+        self._repetitions = 0  # still to come
         self._floats = character.layout.has_floating_base
         base = (self._prefix + frames.odom, self._prefix + joints.root)
         moving = [base] if self._floats else []
@@ -67,14 +69,23 @@ class TransformPublisher:
 
         `positions` gives those (m,) of the description's joints.
         """
-        self._subscribers = self.publisher.handle.get_subscription_count()
+        before, self._subscribers = self._subscribers, self._count_subscribers()
+        if self._subscribers > before:
+            self._repetitions = _REPETITIONS
         if self._subscribers:
             poses = self._joints.poses(positions())
             if self._floats:
                 poses = np.concatenate((self._base_pose(), poses))
             self.publisher.publish(self._encoder.encode(stamp_ns, poses))
 
-    def publish_to_new(self, stamp_ns: int, positions: Callable[[], FloatArray]) -> None:
-        """Publish again if subscribers have come; tf2 warns of a stamp that comes twice."""
-        if self.publisher.handle.get_subscription_count() > self._subscribers:
+    def repeat(self, stamp_ns: int, positions: Callable[[], FloatArray]) -> None:
+        """Publish again if subscribers have just come, which may have missed it.
+
+        Only then: tf2 warns of a stamp that comes twice.
+        """
+        if self._repetitions or self._count_subscribers() > self._subscribers:
             self.publish(stamp_ns, positions)
+            self._repetitions = max(self._repetitions - 1, 0)
+
+    def _count_subscribers(self) -> int:
+        return int(self.publisher.handle.get_subscription_count())

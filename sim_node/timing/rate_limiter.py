@@ -5,6 +5,7 @@ import math
 from msgs_config.runtime.durations import Durations
 
 _LONGEST_BACKLOG = 0.1  # s that is caught up with; beyond it the schedule starts over
+_TOLERATED_SHARE = 0.01  # of deadlines that may be missed
 
 
 class RateLimiter:
@@ -13,6 +14,8 @@ class RateLimiter:
     def __init__(self, period: float) -> None:
         self.period = period
         self.missed = 0  # ticks that began after the next one was due
+        self._scheduled = 0  # ticks that were due by the wall clock
+        self._warned_of = (0, 0)  # of the two, when `take_warning` was called last
         self._due_at = -math.inf
         self._last: float | None = None  # when the last tick began
         self._lateness = Durations()
@@ -40,11 +43,22 @@ class RateLimiter:
         if self.period == 0.0:
             return
         late = now - self._due_at
+        self._scheduled += 1
         self.missed += late > self.period
         self._lateness.add(late)
         self._due_at += self.period
         if late > max(_LONGEST_BACKLOG, self.period):
             self._due_at = now + self.period
+
+    def take_warning(self) -> str | None:
+        """A sentence if more than 1 % of the deadlines since the last call were missed."""
+        missed, ticks = self.missed - self._warned_of[0], self._scheduled - self._warned_of[1]
+        self._warned_of = self.missed, self._scheduled
+        if missed <= _TOLERATED_SHARE * ticks:
+            return None
+        return (
+            f"{missed} of the last {ticks} deadlines missed; rate or real_time_factor is too high"
+        )
 
     def summary(self) -> dict[str, float | int]:
         """Ticks a second, missed deadlines, and percentiles of durations and lateness in µs."""

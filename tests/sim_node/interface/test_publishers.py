@@ -322,7 +322,8 @@ def test_markers_come_at_their_own_rate_of_simulated_time(
 
 
 def test_the_diagnostics_say_how_it_goes(processes: Processes, client: SimulatorClient) -> None:
-    processes.simulator("humanoid", max_ticks=30, real_time_factor=1.0, wait_for_subscribers=1)
+    slowly = 0.1  # so that no deadline is missed
+    processes.simulator("humanoid", max_ticks=30, real_time_factor=slowly, wait_for_subscribers=1)
     state = client.first_state()
     client.wrenches.publish(wrench_message(CLOCK.stamp_ns(20), [("chest", [1.0] * 6)]))
     for _ in range(30):
@@ -332,6 +333,7 @@ def test_the_diagnostics_say_how_it_goes(processes: Processes, client: Simulator
 
     values = {item.key: item.value for item in status.values}
     assert (status.name, status.level, status.message) == ("sim_node", status.OK, "running")
+    assert status.hardware_id == "humanoid"
     assert (values["episode"], values["paused"], values["timeouts"]) == ("1", "False", "0")
     assert values["saturated_ticks"] == "60"
     assert set(values["saturated"].split()) == {"chest", "right_knee"}
@@ -340,6 +342,19 @@ def test_the_diagnostics_say_how_it_goes(processes: Processes, client: Simulator
     for name in ("ticks_per_s", "tick_us_p50", "tick_us_p99", "late_us_p50", "late_us_p99"):
         assert float(values[name]) >= 0.0
     assert int(values["missed_deadlines"]) >= 0
+
+
+def test_the_diagnostics_warn_of_missed_deadlines(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    processes.simulator("humanoid", mode="realtime", rate=100_000)  # no machine keeps it
+
+    def warned() -> object:
+        statuses = [status for m in client.diagnostics.messages for status in m.status]
+        return next((s for s in statuses if s.level == s.WARN), None)
+
+    status = client.spin_until(warned, "a warning")
+    assert "deadlines missed" in status.message
 
 
 # Several characters
@@ -390,6 +405,7 @@ def test_several_characters_have_topics_of_their_own_and_one_barrier_and_clock(
         assert stamp_ns(one.episodes.last) == CLOCK.stamp_ns(1)
         status = one.spin_until(lambda one=one, name=name: _status(one, name), "its report")
         assert status.level == status.OK
+        assert status.hardware_id == f"{name}/{whole}"
 
 
 def _status(client: SimulatorClient, name: str) -> object:

@@ -180,3 +180,30 @@ def test_another_period_counts_from_now(before: float, after: float) -> None:
     pace.tick(START + 50.0 + after)
     assert pace.wait(START + 50.0 + after) == after
     assert pace.missed == 0
+
+
+@pytest.mark.parametrize(("missed", "warns"), [(0, False), (2, False), (3, True)])
+def test_more_than_a_hundredth_of_missed_deadlines_is_a_warning_once(
+    missed: int, warns: bool
+) -> None:
+    pace, ticks = started(), 200
+
+    now = START
+    for number in range(ticks):
+        now += pace.wait(now)
+        # late by a period and a half, which the ticks after it catch up with
+        pace.tick(now + (1.5 * PERIOD if number % 60 == 30 and number // 60 < missed else 0.0))
+
+    warning = pace.take_warning()
+    assert pace.missed == missed
+    assert (warning is not None) is warns
+    assert not warns or (warning is not None and f"{missed} of the last {ticks}" in warning)
+    assert pace.take_warning() is None  # of what came since
+
+
+def test_without_a_schedule_no_deadline_is_missed() -> None:
+    pace = started(period=0.0)
+
+    pace.tick(START + 100.0)
+
+    assert pace.take_warning() is None
