@@ -8,7 +8,7 @@ PACKAGE = "actuated_characters"
 ROOTS = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
 SHARED = {
     "launch": "*.launch.py",
-    "config": "*.yaml",
+    "config": "*.*",
     "examples": "*.py",
     "examples/without_rclpy": "*",
 }

@@ -46,6 +46,7 @@ NODES = {  # full names of the nodes that each file is for
     "pendulum.yaml": [SIMULATOR, CONTROLLER],
     "two_humanoids.yaml": [SIMULATOR, *(f"/{side}{CONTROLLER}" for side in SIDES)],
 }
+LAYOUTS = ("actuated_characters.rviz", "foxglove.json")  # see test_layouts.py
 SHARED = (
     "character",
     "rate",
@@ -96,7 +97,7 @@ def controllers(file: str) -> list[str]:
 
 
 def test_no_file_is_forgotten_here() -> None:
-    assert {path.name for path in CONFIG.iterdir()} == set(NODES)
+    assert {path.name for path in CONFIG.iterdir()} == {*NODES, *LAYOUTS}
 
 
 @pytest.mark.parametrize("file", NODES)

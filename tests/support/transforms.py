@@ -28,8 +28,8 @@ def environment_with_tf2() -> dict[str, str]:
 class Frames:
     """All frames that a node hears of, by the child's name."""
 
-    def __init__(self, node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.syspath_prepend(str(TF2))
+    def __init__(self, node: Node) -> None:
+        """Subscribe; `TF2` must be among the paths of Python."""
         from tf2_msgs.msg import TFMessage
 
         self.static: dict[str, Any] = {}

@@ -19,17 +19,24 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from tests.sim_node.conftest import Join
 from tests.support.description import link_frames, parse
+from tests.support.description_picture import draw_description, draw_position, view_at
 from tests.support.physics import FLOATING_TURNED_FRAMES, character
 from tests.support.ros import Process, Processes, SimulatorClient, stamp_ns, tick_of
-from tests.support.transforms import Frames, environment_with_tf2
+from tests.support.transforms import TF2, Frames, environment_with_tf2
 
 CLOCK = TickClock(240)
 Simulator = Callable[..., Process]
 
 
+@pytest.fixture(autouse=True)
+def tf2(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package `tf2_msgs`, for what imports it from now on."""
+    monkeypatch.syspath_prepend(str(TF2))
+
+
 @pytest.fixture
-def frames(client: SimulatorClient, monkeypatch: pytest.MonkeyPatch) -> Frames:
-    return Frames(client.node, monkeypatch)
+def frames(client: SimulatorClient, tf2: None) -> Frames:
+    return Frames(client.node)
 
 
 @pytest.fixture
@@ -62,7 +69,7 @@ def test_the_frames_of_the_links_are_where_the_other_engine_has_them(
     state = client.drive(client.first_state(), 40, np.random.default_rng(1))
     stamp = stamp_ns(state)
     client.spin_until(lambda: stamp in frames.moving and frames.static, "frames")
-    client.spin_until(lambda: positions.of_stamp(stamp), "positions of the description")
+    client.spin_until(lambda: positions.of_stamp(stamp) and descriptions.messages, "description")
 
     model = DynamicsModel(whole)
     model.update(np.array(state.position), np.array(state.velocity))
@@ -125,10 +132,10 @@ def test_frames_come_at_the_display_rate(
 
 
 def test_frames_of_several_characters_begin_with_their_names(
-    simulator: Simulator, join: Join, monkeypatch: pytest.MonkeyPatch
+    simulator: Simulator, join: Join
 ) -> None:
     left = join("at_left", "left")
-    frames = Frames(left.node, monkeypatch)
+    frames = Frames(left.node)
     simulator(
         **{
             "wait_for_subscribers": 0,
@@ -149,12 +156,12 @@ def test_frames_of_several_characters_begin_with_their_names(
 
 
 def test_who_looks_later_at_a_waiting_simulator_gets_the_frames(
-    simulator: Simulator, client: SimulatorClient, monkeypatch: pytest.MonkeyPatch
+    simulator: Simulator, client: SimulatorClient
 ) -> None:
     simulator(character="humanoid", republish_period=0.05)
     stamp = stamp_ns(client.first_state())
 
-    frames = Frames(client.node, monkeypatch)
+    frames = Frames(client.node)
 
     client.spin_until(lambda: stamp in frames.moving and frames.static, "frames")
 
@@ -182,6 +189,31 @@ def test_a_bag_has_the_frames_where_their_type_is_installed(
     whole = character("pendulum")
     assert found["/tf"] == {link.name for link in whole.links[1:]}
     assert found["/tf_static"] == {"odom", "base_link", whole.links[0].name}
+
+
+@pytest.mark.parametrize("name", ["humanoid", "laikago"])
+def test_the_description_and_the_frames_alone_look_like_the_renderers_picture(
+    simulator: Simulator, client: SimulatorClient, frames: Frames, name: str
+) -> None:
+    descriptions = client.listen(topics.ROBOT_DESCRIPTION)
+    simulator(character=name, display_rate=240.0)
+
+    state = client.drive(client.first_state(), 60, np.random.default_rng(1))
+    stamp, position = stamp_ns(state), np.array(state.position)
+    client.spin_until(lambda: stamp in frames.moving and frames.static, "frames")
+    client.spin_until(lambda: descriptions.messages, "the description")
+
+    robot = parse(descriptions.last.data)
+    placed = {link.name: frames.in_frame(link.name, "world", stamp) for link in robot.links}
+    view, size = view_at(position[:3]), (320, 400)
+    _, found = draw_description(robot, placed, view, size)
+    _, expected = draw_position(name, position, view, size)
+    assert np.count_nonzero(expected) > 1000
+    _, elsewhere = draw_position(name, np.array(character(name).rest_position), view, size)
+    differing, moved = (np.count_nonzero(each != expected) for each in (found, elsewhere))
+    # a sphere of the engine's has few corners: its edge differs from the renderer's
+    share = np.count_nonzero(expected)
+    assert differing < 0.04 * share < 0.1 * moved
 
 
 # Contact wrenches
