@@ -283,7 +283,7 @@ class ControllerNode(ComposableNode):
                     UNLOGGED: self._once_logger.unlogged,
                     **self._answer_times.percentiles_us("answer", (50, 99)),
                 },
-                hardware_id=self._character.name,
+                character=self._character.name,
             )
 
     def _check_parameters(self, values: Values) -> None:

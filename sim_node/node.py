@@ -295,5 +295,5 @@ class SimNode(ComposableNode):
         values |= self._rate_limiter.summary() | self._world.report()
         fault, warning = self._control.fault, self._rate_limiter.take_warning()
         for each in self._characters:
-            report = values | each.report()
-            self._diagnostics.publish(report, fault, warning, each.hardware_id, below=each.name)
+            report, name = values | each.report(), each.character.character.name
+            self._diagnostics.publish(report, fault, warning, name, below=each.name)

@@ -27,14 +27,15 @@ class DiagnosticsPublisher:
         values: Mapping[str, object],
         fault: str | None = None,
         warning: str | None = None,
-        hardware_id: str = "",
+        character: str = "",
         *,
         below: str = "",
     ) -> None:
-        """Publish the values by name, about the character `hardware_id`.
+        """Publish the values by name.
 
         With a fault the level is ERROR and its text the message; with a warning alone it is WARN.
-        The status has the node's name, that in a namespace `below` its own if there is one.
+        The status has the node's name, that in a namespace `below` its own if there is one, and
+        the character's as its `hardware_id`: in one namespace, so both nodes have the same.
         """
         namespace = "/".join(filter(None, (self._node.get_namespace().strip("/"), below)))
         level = DiagnosticStatus.OK if warning is None else DiagnosticStatus.WARN
@@ -42,7 +43,7 @@ class DiagnosticsPublisher:
             level=level if fault is None else DiagnosticStatus.ERROR,
             name=f"{namespace}/{self._node.get_name()}".lstrip("/"),
             message=fault or warning or "running",
-            hardware_id=hardware_id,
+            hardware_id=f"{namespace}/{character}".lstrip("/"),
             values=[KeyValue(key=name, value=str(value)) for name, value in values.items()],
         )
         message = DiagnosticArray(status=[status])

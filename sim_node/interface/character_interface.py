@@ -38,7 +38,6 @@ class CharacterInterface:
         """Offer the character's topics, below its name."""
         self.name = character.setup.name
         self.character = character
-        self.hardware_id = character.setup.prefix + character.character.name
         self.settings = settings
         self.states = topics.JOINT_STATES.under(self.name)
         self.torques = topics.JOINT_TORQUES.under(self.name)
