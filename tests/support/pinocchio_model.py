@@ -1,7 +1,7 @@
 """Pinocchio's mass matrix and bias force of a URDF's text, in the coordinates of our layout.
 
 It reads the text with urdfdom and computes with Featherstone's algorithms: nothing of it goes
-through Bullet or MuJoCo. Install it by `pip install pin` (BSD-2, 150 MB with what it needs).
+through Bullet or MuJoCo. Install it by `pip install pin` (BSD-2, 380 MB with what it needs).
 """
 
 import numpy as np

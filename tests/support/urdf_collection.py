@@ -117,7 +117,7 @@ def _without_shapes(file: Path, directory: Path) -> Path:
 
 
 def describe(result: TrialResult) -> str:
-    """An result in one line."""
+    """A result in one line."""
     line = result.label
     if result.size or result.mass:
         line += f", {result.size} degrees of freedom, {result.mass:.4g} kg"

@@ -1,7 +1,9 @@
 """One URDF of other makers: its character held for some seconds, its dynamics compared."""
 
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -9,10 +11,10 @@ from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.engine_urdf import write_engine_urdf
 from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
+from msgs_config.character.urdf_repair import repair_urdf
 from msgs_config.errors import ActuatedCharactersError, SimulationError
 
 HOLDS = 0.1  # rad or m, from the rest pose in the end
@@ -96,7 +98,11 @@ def compare_with_pinocchio(character: Character) -> dict[str, float]:
 def counting_text(character: Character) -> str:
     """The URDF's own text; where that had to be altered, the repaired one."""
     altered = any(warning.startswith(_ALTERED) for warning in character.warnings)
-    return write_engine_urdf(character.loading) if altered else character.loading.urdf_text
+    if not altered:
+        return character.loading.urdf_text
+    robot = deepcopy(character.loading.robot)
+    repair_urdf(robot, character.loading)
+    return ElementTree.tostring(robot, encoding="unicode")
 
 
 def _difference(own: FloatArray, other: FloatArray) -> float:
