@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from msgs_config.character.described_joints import BASE_FRAME, WORLD
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
+from msgs_config.frame_names import BASE_FRAME, WORLD
 from msgs_config.parameters import Parameter, Values
 
 ODOM_FRAME = Parameter(

@@ -6,7 +6,7 @@ import numpy as np
 from sensor_msgs.msg import PointCloud2, PointField
 
 from controller_node.planner.outlook import Outlook
-from msgs_config.character.described_joints import WORLD
+from msgs_config.frame_names import WORLD
 from msgs_config.messages.cdr import split_stamp
 
 FIELDS = ("x", "y", "z", "time", "cost", "alternative", "anchor_x", "anchor_y", "anchor_yaw")

@@ -16,8 +16,8 @@ from controller_node.interface.plan_message import plan_message
 from controller_node.planner.outlook import Outlook
 from controller_node.strength import Strengths
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character.described_joints import WORLD
 from msgs_config.character.layout import JointLayout
+from msgs_config.frame_names import WORLD
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder, split_stamp
 from msgs_config.messages.joint_state import JointStateEncoder

@@ -14,13 +14,8 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Joint, Link, Pose, Vector
+from msgs_config.frame_names import BASE_FRAME
 from msgs_config.geometry import elementary, rotations
-
-WORLD = "world"
-"""The frame of everything that is given in the world."""
-
-BASE_FRAME = "base_link"
-"""REP 105's name of the frame that is fixed to a robot's base."""
 
 _AT_PARENT = Pose()
 _BALL_AXES: dict[str, tuple[Vector, float]] = {  # axis, and the largest angle, rad
@@ -121,7 +116,8 @@ class DescribedJoints:
 
     def _ball_angles(self, position: FloatArray) -> FloatArray:
         """Yaw, pitch and roll (3 b,) of the ball joints, rad."""
-        return yaw_pitch_roll(rotations.exp(position[self._ball_entries])).ravel()
+        turns = rotations.matrix(rotations.exp(position[self._ball_entries]))
+        return rotations.yaw_pitch_roll(turns).ravel()
 
     @cached_property
     def _ball_entries(self) -> IntArray:
@@ -158,24 +154,6 @@ def pose_rows(joints: tuple[DescribedJoint, ...]) -> FloatArray:
     """Positions and orientations xyzw (m, 7) of joints' children in their parents at position 0."""
     rows = [(*joint.pose.position, *joint.pose.orientation_xyzw) for joint in joints]
     return np.array(rows).reshape(-1, 7)
-
-
-def yaw_pitch_roll(q_xyzw: FloatArray) -> FloatArray:
-    """The angles (..., 3) in rad whose turns about z, y and x, in this order, are a rotation.
-
-    Pitch is within a quarter turn. Where it is one, yaw and roll turn about one axis; they are
-    chosen so that the three are still the rotation.
-    """
-    m = rotations.matrix(q_xyzw)
-    yaw = elementary.arctan2(m[..., 1, 0], m[..., 0, 0])
-    sine, cosine = elementary.sin(yaw), elementary.cos(yaw)
-    level = cosine * m[..., 0, 0] + sine * m[..., 1, 0]
-    pitch = elementary.arctan2(-m[..., 2, 0], level)
-    # what remains once the yaw is taken off has the roll in its second row
-    roll = elementary.arctan2(
-        sine * m[..., 0, 2] - cosine * m[..., 1, 2], cosine * m[..., 1, 1] - sine * m[..., 0, 1]
-    )
-    return np.stack((yaw, pitch, roll), axis=-1)
 
 
 def _as_it_is(joint: Joint, parent: str, child: str) -> DescribedJoint:

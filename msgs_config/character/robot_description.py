@@ -7,15 +7,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from msgs_config.character.described_joints import (
-    BASE_FRAME,
-    DescribedJoint,
-    DescribedJoints,
-    yaw_pitch_roll,
-)
+from msgs_config.character.described_joints import DescribedJoint, DescribedJoints
 from msgs_config.character.layout import JointType
 from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import Character, Link, Pose, Quadruple, Shape, ShapeType
+from msgs_config.character.urdf_origin import write_numbers, write_origin
+from msgs_config.frame_names import BASE_FRAME
+from msgs_config.geometry import rotations
 
 _JOINT_TYPES = {"revolute", "continuous", "prismatic", "fixed"}
 _SHAPES = {"box", "sphere", "cylinder", "mesh"}
@@ -60,7 +58,7 @@ def _describe(character: Character, joints: DescribedJoints) -> ElementTree.Elem
     materials = {color: f"color_{number}" for number, color in enumerate(colors)}
     for color, name in materials.items():
         material = ElementTree.SubElement(robot, "material", name=name)
-        ElementTree.SubElement(material, "color", rgba=_text(color))
+        ElementTree.SubElement(material, "color", rgba=write_numbers(color))
     links = {link.name: link for link in character.links}
     for name in (joints.root, *(joint.child for joint in joints.joints)):
         element = ElementTree.SubElement(robot, "link", name=name)
@@ -74,7 +72,7 @@ def _parts(link: Link, materials: dict[Quadruple, str]) -> Iterator[ElementTree.
     """Mass and shapes of a link."""
     if link.mass > 0.0:
         inertial = ElementTree.Element("inertial")
-        inertial.append(_origin(link.inertial_pose))
+        _place(inertial, link.inertial_pose)
         ElementTree.SubElement(inertial, "mass", value=repr(float(link.mass)))
         moments = zip(("ixx", "iyy", "izz"), link.inertia_diagonal, strict=True)
         tensor = {name: repr(float(moment)) for name, moment in moments}
@@ -96,10 +94,10 @@ def _without_capsules(shapes: Sequence[Shape]) -> Iterator[Shape]:
 def _shape(tag: str, shape: Shape) -> ElementTree.Element:
     """A shape that is seen or touched, of any type but a capsule."""
     element = ElementTree.Element(tag)
-    element.append(_origin(shape.pose))
-    attributes = {"size": _text(shape.size)}
+    _place(element, shape.pose)
+    attributes = {"size": write_numbers(shape.size)}
     if shape.type is ShapeType.MESH:
-        attributes = {"filename": Path(shape.mesh).as_uri(), "scale": _text(shape.size)}
+        attributes = {"filename": Path(shape.mesh).as_uri(), "scale": write_numbers(shape.size)}
     elif shape.type is not ShapeType.BOX:
         names = ("radius", "length")[: len(shape.size)]
         attributes = {n: repr(float(v)) for n, v in zip(names, shape.size, strict=True)}
@@ -115,9 +113,9 @@ def _joint(joint: DescribedJoint) -> ElementTree.Element:
     )
     ElementTree.SubElement(element, "parent", link=joint.parent)
     ElementTree.SubElement(element, "child", link=joint.child)
-    element.append(_origin(joint.pose))
+    _place(element, joint.pose)
     if joint.type is not JointType.FIXED:
-        ElementTree.SubElement(element, "axis", xyz=_text(joint.axis))
+        ElementTree.SubElement(element, "axis", xyz=write_numbers(joint.axis))
         limits = {"effort": joint.effort_limit, "velocity": math.inf}
         if not is_endless:
             limits |= {"lower": joint.lower, "upper": joint.upper}
@@ -126,11 +124,7 @@ def _joint(joint: DescribedJoint) -> ElementTree.Element:
     return element
 
 
-def _origin(pose: Pose) -> ElementTree.Element:
-    yaw, pitch, roll = yaw_pitch_roll(np.array(pose.orientation_xyzw)).tolist()
-    rpy = _text((roll, pitch, yaw))
-    return ElementTree.Element("origin", xyz=_text(pose.position), rpy=rpy)
-
-
-def _text(numbers: Sequence[float]) -> str:
-    return " ".join(repr(float(number) + 0.0) for number in numbers)  # -0.0 becomes 0.0
+def _place(element: ElementTree.Element, pose: Pose) -> None:
+    """Give an element its `<origin>`."""
+    axes = rotations.matrix(np.array(pose.orientation_xyzw))
+    write_origin(element, np.array(pose.position), axes)

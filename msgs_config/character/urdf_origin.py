@@ -1,6 +1,6 @@
 """Poses in a URDF: `<origin>` elements, read, written and composed."""
 
-import math
+from collections.abc import Iterable
 from xml.etree import ElementTree
 
 import numpy as np
@@ -44,8 +44,14 @@ def write_origin(element: ElementTree.Element, position: FloatArray, axes: Float
     origin = element.find("origin")
     if origin is None:
         origin = ElementTree.SubElement(element, "origin")
-    origin.set("xyz", " ".join(map(repr, position.tolist())))
-    origin.set("rpy", " ".join(map(repr, _roll_pitch_yaw(axes))))
+    yaw, pitch, roll = rotations.yaw_pitch_roll(axes).tolist()
+    origin.set("xyz", write_numbers(position.tolist()))
+    origin.set("rpy", write_numbers((roll, pitch, yaw)))
+
+
+def write_numbers(numbers: Iterable[float]) -> str:
+    """A text of numbers, of which none loses a digit."""
+    return " ".join(repr(float(number) + 0.0) for number in numbers)  # -0.0 becomes 0.0
 
 
 def move_origin(element: ElementTree.Element, frame: Pose) -> None:
@@ -59,18 +65,3 @@ def move_origin(element: ElementTree.Element, frame: Pose) -> None:
         np.array(frame.position) + rotations.rotate(turn, np.array(pose.position)),
         rotations.matrix(rotations.multiply(turn, np.array(pose.orientation_xyzw))),
     )
-
-
-def _roll_pitch_yaw(axes: FloatArray) -> tuple[float, float, float]:
-    """The angles of `axes = Rz(yaw) Ry(pitch) Rx(roll)`, rad.
-
-    Where the pitch is a quarter turn any yaw will do: pitch and roll are those that remain of the
-    axes when this yaw is taken off them.
-    """
-    (xx, yx, zx), (xy, yy, zy), (xz, yz, zz) = axes.T.tolist()
-    del zy, zz
-    yaw = math.atan2(yx, xx)
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    pitch = math.atan2(-zx, cosine * xx + sine * yx)
-    roll = math.atan2(sine * xz - cosine * yz, cosine * yy - sine * xy)
-    return roll, pitch, yaw

@@ -211,6 +211,24 @@ def yaw(q_xyzw: FloatArray) -> FloatArray:
     return angle
 
 
+def yaw_pitch_roll(axes: FloatArray) -> FloatArray:
+    """The angles (..., 3) in rad whose turns about z, y and x, in this order, are axes (..., 3, 3).
+
+    So `axes = Rz(yaw) Ry(pitch) Rx(roll)`; URDF's `rpy` has them the other way round. Pitch is
+    within a quarter turn. Where it is one, any yaw will do: pitch and roll are what remains of the
+    axes when this yaw is taken off them.
+    """
+    yaw = elementary.arctan2(axes[..., 1, 0], axes[..., 0, 0])
+    sine, cosine = elementary.sin(yaw), elementary.cos(yaw)
+    level = cosine * axes[..., 0, 0] + sine * axes[..., 1, 0]
+    pitch = elementary.arctan2(-axes[..., 2, 0], level)
+    roll = elementary.arctan2(
+        sine * axes[..., 0, 2] - cosine * axes[..., 1, 2],
+        cosine * axes[..., 1, 1] - sine * axes[..., 0, 1],
+    )
+    return np.stack((yaw, pitch, roll), axis=-1)
+
+
 def about_z(angle: float) -> FloatArray:
     """The quaternion xyzw (4,) of a turn by `angle` rad about z."""
     return np.array([0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle)])

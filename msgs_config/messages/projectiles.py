@@ -11,7 +11,7 @@ import numpy as np
 from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.described_joints import WORLD
+from msgs_config.frame_names import WORLD
 from msgs_config.messages.cdr import encode_arrays, encode_head, read_message, with_stamp
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, parse_throw

@@ -12,7 +12,7 @@ import numpy as np
 from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.described_joints import WORLD
+from msgs_config.frame_names import WORLD
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 from msgs_config.messages.cdr import encode_arrays, encode_head, read_message, with_stamp
 

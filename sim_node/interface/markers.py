@@ -14,8 +14,8 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.described_joints import WORLD
 from msgs_config.character.model import Character, Shape, ShapeType
+from msgs_config.frame_names import WORLD
 from msgs_config.geometry import rotations
 from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.throw import ProjectileThrow

@@ -6,12 +6,8 @@ import numpy as np
 from rclpy.node import Node
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.described_joints import (
-    WORLD,
-    DescribedJoint,
-    DescribedJoints,
-    pose_rows,
-)
+from msgs_config.character.described_joints import DescribedJoint, DescribedJoints, pose_rows
+from msgs_config.frame_names import WORLD
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.transforms import TransformsEncoder

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import yaml
 
-from msgs_config.character.described_joints import BASE_FRAME
 from msgs_config.character.loading import load_character
+from msgs_config.frame_names import BASE_FRAME
 from msgs_config.messages import topics
 from msgs_config.messages.topics import Topic
 from sim_node.frames import ODOM_FRAME
