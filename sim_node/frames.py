@@ -48,7 +48,7 @@ class FrameNames:
 
     def check(self, character: Character) -> None:
         """Raise ConfigurationError if the frame of `odom` is one of the character's links."""
-        if self.odom in {link.name for link in character.links}:
+        if self.odom in character.frame_names:
             raise ConfigurationError(
                 f"parameter '{ODOM_FRAME.name}' is '{self.odom}', which is a link of character "
                 f"'{character.name}'; it must be no link's name"

@@ -46,8 +46,9 @@ class DescribedJoints:
     def __init__(self, character: Character, base_frame: str = BASE_FRAME) -> None:
         """`base_frame` becomes the root, z up and x forward, unless a link has that name."""
         self._layout = character.layout
-        self._links = {link.name for link in character.links}
+        self._links = character.frame_names
         self._names = {link.joint.name for link in character.links[1:]}
+        self._names |= {frame.joint for frame in character.frames}
         root = character.links[0].name
         self.has_own_base = base_frame not in self._links
         self.root = base_frame if self.has_own_base else root
@@ -61,6 +62,10 @@ class DescribedJoints:
             joints.append(DescribedJoint(name, JointType.FIXED, base_frame, root, pose))
         for link in character.links[1:]:
             joints += self._describe(link, character.links[link.parent].name)
+        for frame in character.frames:
+            joints.append(
+                DescribedJoint(frame.joint, JointType.FIXED, frame.parent, frame.name, frame.pose)
+            )
         self.joints = tuple(joints)
 
     def _describe(self, link: Link, parent: str) -> Iterator[DescribedJoint]:

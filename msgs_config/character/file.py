@@ -8,7 +8,8 @@ from typing import Any
 from msgs_config import files
 from msgs_config.character.joint_bounds import write_bounds
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
-from msgs_config.character.urdf_check import check_urdf, has_massless_base
+from msgs_config.character.urdf_check import check_urdf
+from msgs_config.character.urdf_frames import has_massless_base
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.mappings import LARGEST, MappingReader
 

@@ -6,7 +6,6 @@ the controller's model of the dynamics are built from the same ones.
 
 import math
 from collections.abc import Iterable
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
 from msgs_config.character.file_defaults import add_defaults
 from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.character.meshes import resolve_meshes
 from msgs_config.character.model import (
     ROOT_TORQUE,
     Character,
@@ -59,16 +59,16 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
     if not collides:
         file = replace(file, loading=replace(file.loading, collisions=False))
     urdf = file.loading.urdf_path
-    shapes = read_shapes(file.loading)
+    robot = resolve_meshes(file.loading)
+    repairs = repair_urdf(robot, file.loading)
+    shapes = read_shapes(robot, file.loading)
     client = connect()
     try:
         links = _read_links(client, load_urdf(client, file.loading), file)
     finally:
         pybullet.disconnect(client)
     _check_links(urdf, links)
-    repaired = deepcopy(file.loading.robot)
-    repairs = repair_urdf(repaired, file.loading)
-    check_links(links, repaired, file.loading)
+    check_links(links, robot, file.loading)
     links = _sort_depth_first(links)
     for index, link in enumerate(links):
         seen, collided = shapes[link.name]
@@ -90,8 +90,9 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         clips=file.clips,
         feet=file.feet,
         planning=file.planning,
-        warnings=(*_collect_warnings(file, layout, links), *repairs),
+        warnings=(*_collect_warnings(file, layout, links), *repairs.warnings),
         up_axis=file.up_axis,
+        frames=repairs.frames,
     )
     return add_defaults(character, file)
 

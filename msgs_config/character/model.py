@@ -45,6 +45,11 @@ class Pose:
         qx, qy, qz, qw = orientation_xyzw.tolist()
         return cls((x, y, z), (qx, qy, qz, qw))
 
+    def scaled(self, scale: float) -> "Pose":
+        """The pose with all lengths multiplied."""
+        x, y, z = self.position
+        return replace(self, position=(scale * x, scale * y, scale * z))
+
 
 class ShapeType(Enum):
     """Kind of a shape, and the meaning of its `size`; axes of symmetry are z."""
@@ -156,6 +161,16 @@ class ClipFormat:
 
 
 @dataclass(frozen=True)
+class Frame:
+    """A link of the URDF that has no mass and is fixed to another, of which it is a part here."""
+
+    name: str
+    parent: str  # a link, or another frame
+    joint: str  # the URDF's, between the two
+    pose: Pose  # in the parent
+
+
+@dataclass(frozen=True)
 class UrdfOptions:
     """How the URDF is to be read: what the simulator needs to load the same body."""
 
@@ -213,11 +228,18 @@ class Character:
     placement: Placement = Placement()
     up_axis: str = "z"
     """The axis of the base link that points up where the character stands; y or z."""
+    frames: tuple[Frame, ...] = ()
+    """Links of the URDF that are parts of others here; a frame that others are in comes first."""
 
     @cached_property
     def layout(self) -> JointLayout:
         """The order of the character's degrees of freedom."""
         return JointLayout((link.joint.name, link.joint.type) for link in self.links)
+
+    @property
+    def frame_names(self) -> set[str]:
+        """The names of all links of the URDF, with those that are parts of others."""
+        return {link.name for link in self.links} | {frame.name for frame in self.frames}
 
     def placed(self, placement: Placement) -> "Character":
         """The character as it was loaded, with its fixed base or its rest pose's root moved."""

@@ -32,6 +32,10 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
         robot = resolve_meshes(character.loading)
         for mesh in robot.iterfind("link//mesh"):
             mesh.set("filename", Path(mesh.get("filename", "")).as_uri())
+        fixed = {joint.name for joint in joints.fixed}  # also what moves no mass
+        for joint in robot.findall("joint"):
+            if joint.get("name") in fixed:
+                joint.set("type", "fixed")
         if joints.has_own_base:
             robot.insert(0, ElementTree.Element("link", name=joints.root))
             robot.insert(1, _joint(joints.joints[0]))

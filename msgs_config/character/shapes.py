@@ -1,13 +1,10 @@
 """The shapes of each link, those that are seen and those that collide, read from its URDF."""
 
-from dataclasses import replace
 from typing import TypeAlias
 from xml.etree import ElementTree
 
-from msgs_config.character.meshes import resolve_meshes
-from msgs_config.character.model import GREY, Pose, Quadruple, Shape, ShapeType, UrdfOptions
+from msgs_config.character.model import GREY, Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.character.urdf_origin import read_numbers, read_origin
-from msgs_config.character.urdf_repair import repair_urdf
 from msgs_config.errors import CharacterError
 
 Shapes: TypeAlias = tuple[Shape, ...]
@@ -22,16 +19,20 @@ _SIZES = {  # the attributes that make up `Shape.size`, and what stands for one 
 _NAMES = ", ".join(type.value for type in ShapeType)
 
 
-def read_shapes(loading: UrdfOptions) -> dict[str, tuple[Shapes, Shapes]]:
+def read_shapes(
+    robot: ElementTree.Element, loading: UrdfOptions
+) -> dict[str, tuple[Shapes, Shapes]]:
     """The shapes of each link that are seen, and those that collide, by the link's name.
 
     Where there are no visual shapes, those that collide are seen.
 
+    Args:
+        robot: The root of the repaired URDF, its meshes with absolute paths.
+        loading: How the URDF is to be read.
+
     Raises:
-        CharacterError: a shape is malformed, or a mesh does not exist; names the file and the link.
+        CharacterError: a shape is malformed; names the file and the link.
     """
-    robot = resolve_meshes(loading)
-    repair_urdf(robot, loading)
     colors = _named_colors(robot)
     shapes = {}
     for link in robot.findall("link"):
@@ -77,7 +78,7 @@ def _shape(part: ElementTree.Element, colors: dict[str, Quadruple], scale: float
     return Shape(
         type=shape_type,
         size=tuple(scale * length for length in size),
-        pose=_pose(part, scale),
+        pose=read_origin(part).scaled(scale),
         color_rgba=_color_of(part, colors),
         mesh=element.get("filename", "") if shape_type is ShapeType.MESH else "",
     )
@@ -90,9 +91,3 @@ def _color_of(part: ElementTree.Element, colors: dict[str, Quadruple]) -> Quadru
         return GREY
     color = material.find("color")
     return colors.get(material.get("name", ""), GREY) if color is None else _color(color)
-
-
-def _pose(part: ElementTree.Element, scale: float) -> Pose:
-    pose = read_origin(part)
-    x, y, z = (scale * length for length in pose.position)
-    return replace(pose, position=(x, y, z))

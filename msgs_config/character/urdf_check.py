@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from msgs_config import files
-from msgs_config.character.urdf_frames import MAX_JOINTS, find_frames
+from msgs_config.character.urdf_frames import MAX_JOINTS, find_frames, joint_end
 from msgs_config.character.urdf_inertia import LEAST_MOMENT, ROUNDING
 from msgs_config.errors import CharacterError
 
@@ -66,7 +66,7 @@ def check_urdf(path: Path, text: str) -> ElementTree.Element:
     robot = files.parse_xml(path, text, CharacterError)
     links, joints = robot.findall("link"), robot.findall("joint")
     names = [link.get("name", "") for link in links]
-    ends = [(_end(joint, "parent"), _end(joint, "child")) for joint in joints]
+    ends = [(joint_end(joint, "parent"), joint_end(joint, "child")) for joint in joints]
     for element in links + joints:
         _check_name(path, element)
     _check_unique(path, "links are named", names)
@@ -81,31 +81,6 @@ def check_urdf(path: Path, text: str) -> ElementTree.Element:
     for element in [*links, *joints, *robot.findall("material")]:
         _check_numbers(path, element)
     return robot
-
-
-def has_massless_base(robot: ElementTree.Element) -> bool:
-    """Whether the base is fixed for ROS: called `world` and without inertial, or without any mass.
-
-    Its mass is also that of the links which are fixed to it.
-    """
-    joints = robot.findall("joint")
-    links = {link.get("name", ""): link for link in robot.findall("link")}
-    (base,) = set(links) - {_end(joint, "child") for joint in joints}
-    if base == "world" and links[base].find("inertial") is None:
-        return True
-    group = [base]
-    for name in group:
-        group += [
-            _end(joint, "child")
-            for joint in joints
-            if joint.get("type") == "fixed" and _end(joint, "parent") == name
-        ]
-    return all(_has_no_mass(links[name]) for name in group)
-
-
-def _has_no_mass(link: ElementTree.Element) -> bool:
-    mass = link.find("inertial/mass")
-    return mass is None or not float(mass.get("value", "0"))
 
 
 def _check_name(path: Path, element: ElementTree.Element) -> None:
@@ -184,11 +159,6 @@ def _are_numbers(text: str, count: int, minimum: float) -> bool:
     return len(pieces) == count and all(
         _NUMBER.fullmatch(piece) and minimum <= float(piece) <= _LARGEST for piece in pieces
     )
-
-
-def _end(joint: ElementTree.Element, which: str) -> str:
-    element = joint.find(which)
-    return "" if element is None else element.get("link", "")
 
 
 def _check_unique(path: Path, what: str, names: Iterable[str]) -> None:

@@ -2,11 +2,35 @@
 
 from xml.etree import ElementTree
 
+from msgs_config.character.model import Frame
 from msgs_config.character.urdf_inertia import read_inertial
 from msgs_config.character.urdf_origin import move_origin, read_origin
 
 MAX_JOINTS = 127
 """That the engine can hold, without those of mere frames, which are merged before it reads them."""
+
+_POSED = ("inertial", "visual", "collision")
+
+
+def joint_end(joint: ElementTree.Element, which: str) -> str:
+    """The name of a joint's `parent` or `child`; empty where it has none."""
+    element = joint.find(which)
+    return "" if element is None else element.get("link", "")
+
+
+def has_massless_base(robot: ElementTree.Element) -> bool:
+    """Whether the base is fixed for ROS: called `world` and without inertial, or without any mass.
+
+    Its mass is also that of the links which are fixed to it.
+    """
+    tree = LinkTree(robot)
+    base = tree.base()
+    if base.get("name") == "world" and base.find("inertial") is None:
+        return True
+    group = [base]
+    for link in group:
+        group += [tree.below(joint) for joint in tree.fixed_to(link)]
+    return all(read_inertial(link).mass == 0.0 for link in group)
 
 
 def find_frames(robot: ElementTree.Element) -> list[ElementTree.Element]:
@@ -17,9 +41,9 @@ def find_frames(robot: ElementTree.Element) -> list[ElementTree.Element]:
     links = {link.get("name", ""): link for link in robot.findall("link")}
     joints = robot.findall("joint")
     fixed = [joint for joint in joints if joint.get("type") == "fixed"]
-    frames = [joint for joint in fixed if links[_end(joint, "child")].find("inertial") is None]
+    frames = [joint for joint in fixed if links[joint_end(joint, "child")].find("inertial") is None]
     if len(joints) - len(frames) > MAX_JOINTS:
-        return [j for j in fixed if read_inertial(links[_end(j, "child")]).is_nothing]
+        return [j for j in fixed if read_inertial(links[joint_end(j, "child")]).is_nothing]
     return frames
 
 
@@ -27,6 +51,8 @@ class LinkTree:
     """The links of a URDF, of which some are merged into those above them; changes the URDF."""
 
     def __init__(self, robot: ElementTree.Element) -> None:
+        self.frames: list[Frame] = []
+        """The links that were merged; a frame that others are in comes after them."""
         self._robot = robot
         self._links = {link.get("name", ""): link for link in robot.findall("link")}
         self._joints = robot.findall("joint")
@@ -39,30 +65,27 @@ class LinkTree:
         moving = {name for name, link in self._links.items() if not read_inertial(link).is_nothing}
         if not moving:
             return []
-        above = {_end(joint, "child"): joint for joint in self._joints}
+        above = {joint_end(joint, "child"): joint for joint in self._joints}
         needed = set[str]()
         for name in moving:
             while name in above and name not in needed:
                 needed.add(name)
-                name = _end(above[name], "parent")
+                name = joint_end(above[name], "parent")
         fixed = []
         for joint in self._joints:
-            if joint.get("type") != "fixed" and _end(joint, "child") not in needed:
+            if joint.get("type") != "fixed" and joint_end(joint, "child") not in needed:
                 joint.set("type", "fixed")
                 fixed.append(joint.get("name", ""))
         return fixed
 
     def merge_frames(self) -> dict[str, str]:
         """Merge all frames; returns the name of each, with that of the link it is merged into."""
-        merged: dict[str, str] = {}
         for joint in find_frames(self._robot):
-            parent, child = _end(joint, "parent"), _end(joint, "child")
             self._merge(joint)
-            merged[child] = parent
-        for name in merged:
-            while merged[name] in merged:
-                merged[name] = merged[merged[name]]
-        return merged
+        merged: dict[str, str] = {}
+        for frame in reversed(self.frames):
+            merged[frame.name] = merged.get(frame.parent, frame.parent)
+        return dict(reversed(merged.items()))
 
     def give_base_mass(self) -> list[str]:
         """Merge links that are fixed to a base without mass into it, the heaviest first.
@@ -72,54 +95,48 @@ class LinkTree:
         base = self.base()
         merged = []
         while read_inertial(base).is_nothing:
-            fixed = [
-                joint
-                for joint in self._joints
-                if joint.get("type") == "fixed" and self._above(joint) is base
-            ]
+            fixed = self.fixed_to(base)
             if not fixed:
                 break
-            joint = max(fixed, key=lambda joint: read_inertial(self._below(joint)).mass)
+            joint = max(fixed, key=lambda joint: read_inertial(self.below(joint)).mass)
             for inertial in base.findall("inertial"):
                 base.remove(inertial)
-            merged.append(_end(joint, "child"))
             self._merge(joint)
+            merged.append(self.frames[-1].name)
         return merged
 
     def base(self) -> ElementTree.Element:
         """The link above all others."""
-        (name,) = set(self._links) - {_end(joint, "child") for joint in self._joints}
+        (name,) = set(self._links) - {joint_end(joint, "child") for joint in self._joints}
         return self._links[name]
 
-    def _above(self, joint: ElementTree.Element) -> ElementTree.Element:
-        return self._links[_end(joint, "parent")]
+    def below(self, joint: ElementTree.Element) -> ElementTree.Element:
+        """The link that a joint leads to."""
+        return self._links[joint_end(joint, "child")]
 
-    def _below(self, joint: ElementTree.Element) -> ElementTree.Element:
-        return self._links[_end(joint, "child")]
+    def fixed_to(self, link: ElementTree.Element) -> list[ElementTree.Element]:
+        """The fixed joints whose parent a link is."""
+        name = link.get("name")
+        fixed = [joint for joint in self._joints if joint.get("type") == "fixed"]
+        return [joint for joint in fixed if joint_end(joint, "parent") == name]
 
     def _merge(self, joint: ElementTree.Element) -> None:
         """Give a link all that the link below a fixed joint has: shapes, inertia, joints."""
-        above, below, pose = self._above(joint), self._below(joint), read_origin(joint)
+        parent, child, pose = joint_end(joint, "parent"), self.below(joint), read_origin(joint)
+        name = child.get("name", "")
+        self.frames.append(Frame(name, parent, joint.get("name", ""), pose))
         self._robot.remove(joint)
-        self._robot.remove(below)
+        self._robot.remove(child)
         self._joints.remove(joint)
-        for inertial in below.findall("inertial") if read_inertial(below).is_nothing else ():
-            below.remove(inertial)
-        del self._links[below.get("name", "")]
-        for part in below:
+        for inertial in child.findall("inertial") if read_inertial(child).is_nothing else ():
+            child.remove(inertial)
+        del self._links[name]
+        for part in child:
             if part.tag in _POSED:
                 move_origin(part, pose)
-                above.append(part)
+                self._links[parent].append(part)
         for other in self._joints:
-            parent = other.find("parent")
-            if parent is not None and parent.get("link") == below.get("name"):
+            end = other.find("parent")
+            if end is not None and end.get("link") == name:
                 move_origin(other, pose)
-                parent.set("link", above.get("name", ""))
-
-
-_POSED = ("inertial", "visual", "collision")
-
-
-def _end(joint: ElementTree.Element, which: str) -> str:
-    element = joint.find(which)
-    return "" if element is None else element.get("link", "")
+                end.set("link", parent)

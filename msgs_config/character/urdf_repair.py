@@ -1,11 +1,13 @@
 """A URDF as ROS means it: links without mass are frames, and every inertia is a body's."""
 
+from dataclasses import replace
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.model import UrdfOptions
+from msgs_config.character.model import Frame, UrdfOptions
 from msgs_config.character.urdf_frames import LinkTree
 from msgs_config.character.urdf_inertia import (
     ENTRIES,
@@ -23,8 +25,17 @@ _CHANGED = 1e-6  # of the largest moment of inertia: what is more than a file's 
 _NAMED = 5  # names in a warning
 
 
-def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]:
-    """Change a URDF's root to what it means; returns a warning of each kind of change.
+class Repairs(NamedTuple):
+    """What was changed in a URDF."""
+
+    frames: tuple[Frame, ...]
+    """The links that were merged into others; a frame that others are in comes first."""
+    warnings: tuple[str, ...]
+    """One of each kind of change."""
+
+
+def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
+    """Change a URDF's root to what it means.
 
     Joints that move no mass are fixed. Links without `<inertial>` that are fixed to others are
     merged into those; others have no mass. A floating base without mass takes that of a link which
@@ -58,7 +69,8 @@ def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]:
             "links whose inertia no body can have, with the nearest principal moments that one "
             f"can (kg m^2): {'; '.join(changed)}"
         )
-    return warnings
+    scaled_frames = [replace(each, pose=each.pose.scaled(loading.scale)) for each in tree.frames]
+    return Repairs(tuple(reversed(scaled_frames)), tuple(warnings))
 
 
 def _listed(names: list[str]) -> str:

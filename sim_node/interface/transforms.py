@@ -45,8 +45,8 @@ class TransformPublisher:
         if not self._floats:
             static.append(base)
             poses.append(self._base_pose())
-        links = {self._prefix + link.name for link in character.character.links}
-        if base[0] != WORLD and WORLD not in links:
+        names = {base[1], *(self._prefix + each.child for each in joints.joints)}
+        if base[0] != WORLD and WORLD not in names:
             static.append((WORLD, base[0]))
             poses.append(_NO_MOTION[np.newaxis])
         self._static.publish(TransformsEncoder(static).encode(0, np.concatenate(poses)))

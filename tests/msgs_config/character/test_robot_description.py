@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from urdf_parser_py import urdf as ros
 
-from msgs_config.character.described_joints import DescribedJoints
+from msgs_config.character.described_joints import DescribedJoints, pose_rows
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
@@ -130,6 +130,7 @@ def test_a_path_with_blanks_is_escaped(tmp_path: Path) -> None:
 
 
 LINKS = urdf.link("a") + urdf.link("b")
+ORIGIN = '<origin xyz="{}" rpy="{}"/>'
 CAPSULE = '<collision><geometry><capsule radius="1" length="3"/></geometry></collision>'
 NO_URDF = {
     "a ball joint": LINKS + urdf.joint("j", "a", "b", "spherical"),
@@ -202,6 +203,52 @@ def test_the_described_joints_put_links_where_the_dynamics_have_them(name: str) 
 
 def _back(turn: np.ndarray) -> np.ndarray:
     return rotations.conjugate(turn)
+
+
+FRAMES = urdf.robot(
+    urdf.link("base", "")
+    + urdf.link("trunk")
+    + urdf.link("camera_mount", "")
+    + urdf.link("camera", "")
+    + urdf.link("arm")
+    + urdf.link("wheel", "")
+    # the frame within a frame comes before it, and both turn and move
+    + urdf.joint("look", "camera_mount", "camera", "fixed", ORIGIN.format("0 0 1", "0.3 0 1"), "")
+    + urdf.joint("mount", "trunk", "camera_mount", "fixed", ORIGIN.format("1 0 0", "1 2 3"), "")
+    + urdf.joint("torso", "base", "trunk", "fixed", ORIGIN.format("0 0.5 0", "0 0 0.7"), "")
+    + urdf.joint("elbow", "trunk", "arm", "continuous", ORIGIN.format("0 2 0", "0 1 0"))
+    + urdf.joint("axle", "arm", "wheel", "continuous", ORIGIN.format("0 0 3", "1 0 0"))
+)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_links_that_are_parts_of_others_are_frames_of_the_description(
+    tmp_path: Path, scale: float
+) -> None:
+    """Of a camera, of a base that takes its trunk's mass, of a wheel that weighs nothing."""
+    whole = load_character(str(urdf.write_character(tmp_path, FRAMES, f"scale: {scale}\n")))
+    assert {link.name for link in whole.links} == {"base", "arm"}
+    joints = DescribedJoints(whole)
+    expected = link_frames(parse(FRAMES), {"elbow": 0.4, "axle": 0.0})
+    robot = parsed(whole)
+
+    described = link_frames(robot, {"elbow": 0.4})
+    frames = {joints.root: np.eye(4)}
+    (pose,) = joints.poses(np.array([0.4]))
+    rows = {
+        joint.child: row for joint, row in zip(joints.fixed, pose_rows(joints.fixed), strict=True)
+    }
+    for joint in joints.joints:  # parents first
+        row = rows.get(joint.child, pose)
+        own = np.eye(4)
+        own[:3, :3], own[:3, 3] = rotations.matrix(row[3:]), row[:3]
+        frames[joint.child] = frames[joint.parent] @ own
+
+    assert frames.keys() == described.keys() == expected.keys() | {"base_link"}
+    for name, matrix in expected.items():
+        matrix[:3, 3] *= scale
+        np.testing.assert_allclose(frames[name], matrix, atol=1e-12, err_msg=name)
+        np.testing.assert_allclose(described[name], matrix, atol=1e-12, err_msg=name)
 
 
 @pytest.mark.parametrize("name", MADE)
