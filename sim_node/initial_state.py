@@ -5,10 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from msgs_config.arrays import BoolArray
+from msgs_config.character.lowest_points import describe_start_below_ground
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Parameter, Value, Values
+from msgs_config.shared_parameters import PLANE
 
 GIVEN, REFERENCE = "given", "reference"
 INITIAL_STATE, POSITION, VELOCITY = "initial_state", "initial_position", "initial_velocity"
@@ -85,6 +87,17 @@ def check_state(character: Character, state: StampedState, speed_limit: float) -
             f"'{names[entry]}' has the velocity {velocity[entry]:g}; the parameter 'speed_limit' "
             f"is {speed_limit:g}"
         )
+
+
+def describe_start(character: Character, values: Values) -> tuple[str, ...]:
+    """A warning if a character begins below the ground where its parameters put it.
+
+    Raises:
+        CharacterError: a mesh cannot be used.
+    """
+    if values.text("terrain") != PLANE:
+        return ()
+    return describe_start_below_ground(character, np.array(values.numbers(POSITION)))
 
 
 def as_values(state: StampedState) -> dict[str, Value]:

@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import choose_behaviour
 from controller_node.model_check import check_agreement
@@ -15,13 +13,12 @@ from controller_node.references.factory import make_motion
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
-from msgs_config.character.lowest_points import describe_start_below_ground
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values, resolve
-from msgs_config.shared_parameters import PLANE, collides, placed
+from msgs_config.shared_parameters import collides, placed
 from sim_node import parameters as simulator_parameters
-from sim_node.initial_state import INITIAL_STATE, POSITION, as_values
+from sim_node.initial_state import INITIAL_STATE, as_values, describe_start
 from sim_node.physics.probe import measure_probe
 
 SHARED = ("rate", "gravity", "placement", "collision", "command_delay_ticks")
@@ -96,8 +93,7 @@ def make_plan(
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings + simulator.warnings + controller.warnings
-    if simulator.text("terrain") == PLANE:
-        warnings += describe_start_below_ground(character, np.array(simulator.numbers(POSITION)))
+    warnings += describe_start(character, simulator)
     return RunPlan(character, motion.reference, simulator, controller, warnings)
 
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.render.engine.visual_shapes import outline
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
@@ -18,8 +17,8 @@ from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
+from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Character
-from msgs_config.geometry import rotations
 
 TITLE = "every clip with root assistance, 10 s each"
 RUNS = 15
@@ -64,26 +63,14 @@ def _named(result: StudyResult, column: str) -> str:
 
 
 def clearances(character: Character, positions: FloatArray) -> Mapping[str, FloatArray]:
-    """Height (t,) in m above z = 0 of each link's lowest point, at positions (t, n).
-
-    Exact for spheres, capsules and boxes, of others that of a hull; only links with a shape.
-    """
+    """Height (t,) in m above z = 0 of each link's lowest point, at positions (t, n)."""
     model, still = DynamicsModel(character), np.zeros(character.layout.size)
-    origins = np.empty((len(positions), len(character.links), 3))
-    turns = np.empty((*origins.shape[:2], 4))
+    heights = np.empty((len(positions), len(character.links)))
     for row, position in enumerate(positions):
         model.update(position, still)
-        origins[row], turns[row] = model.link_poses()
-    lowest: dict[str, FloatArray] = {}
-    for row, link in enumerate(character.links):
-        if not link.shapes:
-            continue
-        outlines = [outline(shape) for shape in link.shapes]
-        centres = np.concatenate([points for points, _ in outlines])
-        radii = np.concatenate([own for _, own in outlines])
-        heights = rotations.rotate(turns[:, row, np.newaxis], centres)[..., 2] - radii
-        lowest[link.name] = origins[:, row, 2] + heights.min(axis=1)
-    return lowest
+        heights[row] = lowest_heights(character, model)
+    touching = np.isfinite(heights[0])  # others have nothing to touch the ground with
+    return {link.name: heights[:, k] for k, link in enumerate(character.links) if touching[k]}
 
 
 def _track(runner: StudyRunner, clip: str) -> RunResult:

@@ -8,8 +8,8 @@ off, which moves as well.
 A joint between the base and a link on the ground moves the rest of the body over that link, whose
 m may be a hundred times as large. Stable PD knows no contacts: it takes the joint for a free one,
 and divides the effort by `1 + kd h / m`, so that gains for the body would weaken themselves. Such
-a joint has those of the body as far as `kp h^2 <= m` and `kd h <= 2 m` with its own m; passive
-damping that is larger already leaves its own.
+a joint has those of the body as far as `kp h^2 <= m` and `kd h <= 2 m` with its own m and an h of
+two ticks; passive damping that is larger already leaves its own.
 """
 
 import math
@@ -23,22 +23,21 @@ from msgs_config.character.model import Character, Gains
 from msgs_config.geometry import fixed_order, rotations
 
 _ROOT_ENTRIES = 6
-_PERIOD = 1.0 / 240.0  # s, a tick's, for which stiffness and damping of supporting joints are bound
+_PERIOD = 1.0 / 120.0  # s, of two ticks: with one, the joints of a finger shake each other apart
 _NEAR_GROUND = 0.01  # m over the lowest point, within which a link stands on the ground
 
 
 def automatic_gains(
-    character: Character, frequency_hz: float, heights: FloatArray
+    character: Character, model: DynamicsModel, frequency_hz: float, heights: FloatArray
 ) -> dict[str, Gains]:
     """The gains of each actuated joint.
 
     Args:
-        character: The character, in whose rest pose the mass matrix is taken.
+        character: The character.
+        model: Its model at rest, whose mass matrix counts.
         frequency_hz: The frequency at which each joint alone is critically damped.
         heights: Height (links,) of each link's lowest point in the rest pose, m.
     """
-    model = DynamicsModel(character)
-    model.update(np.array(character.rest_position), np.zeros(character.layout.size))
     mass_matrix, speed = model.mass_matrix(), 2.0 * math.pi * frequency_hz
     alone = _inertia_alone(character, mass_matrix)
     bearing = _bearing_links(character, heights)
@@ -77,12 +76,10 @@ def _inertia_alone(character: Character, mass_matrix: FloatArray) -> FloatArray:
     return np.diag(freed)
 
 
-def describe_weak_joints(character: Character) -> tuple[str, ...]:
-    """A warning if the effort limits of a fixed character do not hold its rest pose."""
+def describe_weak_joints(character: Character, model: DynamicsModel) -> tuple[str, ...]:
+    """A warning if the effort limits of a fixed character do not hold its model's pose, at rest."""
     if character.layout.has_floating_base:
         return ()
-    model = DynamicsModel(character)
-    model.update(np.array(character.rest_position), np.zeros(character.layout.size))
     needed = character.layout.norms(model.gravity_force())
     weak = [
         f"{name} ({need:.3g} of at most {limit:.3g})"

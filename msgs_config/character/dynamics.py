@@ -206,6 +206,13 @@ class DynamicsModel:
         return jacobian
 
 
+def still_model(character: Character, position: FloatArray) -> DynamicsModel:
+    """The model of a character that is at rest in a position (n,), message form."""
+    model = DynamicsModel(character)
+    model.update(position, np.zeros(character.layout.size))
+    return model
+
+
 def quaternion_starts(model: mujoco.MjModel) -> list[int]:
     """First entry of each quaternion among MuJoCo's positions."""
     before = {int(mujoco.mjtJoint.mjJNT_BALL): 0, int(mujoco.mjtJoint.mjJNT_FREE): 3}

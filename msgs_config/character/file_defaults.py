@@ -6,6 +6,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.automatic_gains import automatic_gains, describe_weak_joints
+from msgs_config.character.dynamics import DynamicsModel, still_model
 from msgs_config.character.file import CharacterFile
 from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Character
@@ -20,11 +21,12 @@ def add_defaults(character: Character, file: CharacterFile) -> Character:
     floating = file.on_ground and character.layout.has_floating_base
     if not floating and not file.automatic_gains:
         return character
-    heights = lowest_heights(character, np.array(character.rest_position))
+    model = still_model(character, np.array(character.rest_position))
+    heights = lowest_heights(character, model)
     if floating:
         character = _put_on_ground(character, float(heights.min()))
     if file.automatic_gains:
-        character = _add_gains(character, file, heights)
+        character = _add_gains(character, file, model, heights)
     return character
 
 
@@ -42,8 +44,11 @@ def _put_on_ground(character: Character, lowest: float) -> Character:
     )
 
 
-def _add_gains(character: Character, file: CharacterFile, heights: FloatArray) -> Character:
-    found = automatic_gains(character, file.automatic_gains, heights)
+def _add_gains(
+    character: Character, file: CharacterFile, model: DynamicsModel, heights: FloatArray
+) -> Character:
+    """The character with gains for joints that have none; `model` is at rest, `heights` are m."""
+    found = automatic_gains(character, model, file.automatic_gains, heights)
     missing = {name: gains for name, gains in found.items() if name not in file.gains}
     if not missing:
         return character
@@ -54,5 +59,5 @@ def _add_gains(character: Character, file: CharacterFile, heights: FloatArray) -
     return replace(
         character,
         gains=character.gains | missing,
-        warnings=(*character.warnings, warning, *describe_weak_joints(character)),
+        warnings=(*character.warnings, warning, *describe_weak_joints(character, model)),
     )

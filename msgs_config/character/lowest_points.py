@@ -5,26 +5,26 @@ from pathlib import Path
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.dynamics import DynamicsModel, still_model
 from msgs_config.character.mesh_triangles import read_vertices
 from msgs_config.character.model import Character, Shape, ShapeType
 from msgs_config.geometry import fixed_order, rotations
 
+_HARMLESS = 0.05  # m; motion capture puts feet that deep into the ground
 
-def lowest_heights(character: Character, position: FloatArray) -> FloatArray:
+
+def lowest_heights(character: Character, model: DynamicsModel) -> FloatArray:
     """Height z (links,) in m of the lowest point that each link collides with.
 
     It is infinite for a link that collides with nothing.
 
     Args:
         character: The character.
-        position: Its position (n,), message form.
+        model: Its model, in the state that is asked about.
 
     Raises:
         CharacterError: a mesh cannot be used.
     """
-    model = DynamicsModel(character)
-    model.update(position, np.zeros(character.layout.size))
     origins, turns_xyzw = model.link_poses()
     return np.array(
         [
@@ -35,10 +35,18 @@ def lowest_heights(character: Character, position: FloatArray) -> FloatArray:
 
 
 def describe_start_below_ground(character: Character, position: FloatArray) -> tuple[str, ...]:
-    """A warning if a floating character begins deeper in the ground than contacts allow."""
+    """A warning if a floating character begins deeper in the ground than contacts allow.
+
+    Args:
+        character: The character.
+        position: The position (n,) that it begins in, message form.
+
+    Raises:
+        CharacterError: a mesh cannot be used.
+    """
     if not character.layout.has_floating_base:
         return ()
-    heights = lowest_heights(character, position)
+    heights = lowest_heights(character, still_model(character, position))
     deepest = int(np.argmin(heights))
     if heights[deepest] >= -_HARMLESS:
         return ()
@@ -47,9 +55,6 @@ def describe_start_below_ground(character: Character, position: FloatArray) -> t
         f"{-heights[deepest]:.3g} m deep, and the engine throws it out; raise 'root_z' in "
         f"'initial_position' or 'rest_pose' by as much, or set 'terrain' to none",
     )
-
-
-_HARMLESS = 0.05  # m; motion capture puts feet that deep into the ground
 
 
 def _lowest(shape: Shape, turn_xyzw: FloatArray) -> float:

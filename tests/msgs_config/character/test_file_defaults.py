@@ -10,6 +10,7 @@ import trimesh
 
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
+from msgs_config.character.dynamics import still_model
 from msgs_config.character.file import AUTOMATIC_GAINS_HZ
 from msgs_config.character.loading import load_character
 from msgs_config.character.lowest_points import lowest_heights
@@ -82,7 +83,7 @@ def test_its_lowest_point_is_on_the_ground(tmp_path: Path, case: str) -> None:
 
     lowest = 0.3 + surface.bounds[0][2]
     assert character.rest_position[2] == pytest.approx(-lowest, abs=2e-4)
-    (height,) = lowest_heights(character, np.array(character.rest_position))
+    (height,) = lowest_heights(character, still_model(character, np.array(character.rest_position)))
     assert height == pytest.approx(0.0, abs=1e-12)
     assert any("lowest point on the ground: 'root_z'" in line for line in character.warnings)
 
@@ -93,7 +94,7 @@ def test_a_turned_base_has_its_lowest_point_elsewhere(tmp_path: Path) -> None:
     position[3:6] = rotations.log(rotations.about_z(0.0))
     position[3] = math.pi / 4
 
-    (height,) = lowest_heights(character, position)
+    (height,) = lowest_heights(character, still_model(character, position))
 
     assert height == pytest.approx(1.0 - math.sqrt(2.0))
 
