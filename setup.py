@@ -69,6 +69,8 @@ setup(
         # Pinocchio, which `make robots` compares masses and forces with (BSD-2, 380 MB with what it
         # needs); the URDF files themselves go to build/robots, without what their packages need.
         "robots": ["pin>=3.7,<5"],
+        # Meshes of .glb and .ply files to collide with (4.8 MB, MIT, pure Python).
+        "meshes": ["trimesh>=4.5,<6"],
         # `colcon test` chooses pytest because this extra, of this name, lists it.
         # The linters are held to one minor version: a new one may have new rules.
         "test": [

@@ -9,7 +9,7 @@ A joint between the base and a link on the ground moves the rest of the body ove
 m may be a hundred times as large. Stable PD knows no contacts: it takes the joint for a free one,
 and divides the effort by `1 + kd h / m`, so that gains for the body would weaken themselves. Such
 a joint has those of the body as far as `kp h^2 <= m` and `kd h <= 2 m` with its own m and an h of
-two ticks; passive damping that is larger already leaves its own.
+1.5 ticks; passive damping that is larger already leaves its own.
 """
 
 import math
@@ -23,7 +23,7 @@ from msgs_config.character.model import Character, Gains
 from msgs_config.geometry import fixed_order, rotations
 
 _ROOT_ENTRIES = 6
-_PERIOD = 1.0 / 120.0  # s, of two ticks: with one, the joints of a finger shake each other apart
+_PERIOD = 1.0 / 160.0  # s, of 1.5 ticks: with one, the joints of a finger shake each other apart
 _NEAR_GROUND = 0.01  # m over the lowest point, within which a link stands on the ground
 
 

@@ -26,7 +26,11 @@ _CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "sign
 _URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision", "collision")
 _POSE_KEYS = ("joint_damping", "rest_pose", "on_ground", "joints", "automatic_gains")
 _KEYS = (*_URDF_KEYS, *_POSE_KEYS, "root_assistance", "clips", "feet", "planner")
-ALONE: dict[str, Any] = {"on_ground": True, "automatic_gains": AUTOMATIC_GAINS_HZ}
+ALONE: dict[str, Any] = {
+    "inertia": "filled",
+    "on_ground": True,
+    "automatic_gains": AUTOMATIC_GAINS_HZ,
+}
 """The keys of a URDF alone; all others have their defaults."""
 
 
@@ -148,6 +152,7 @@ def _read_urdf(
         urdf, text = known
     robot = check_urdf(urdf, text)
     scale = reader.number("scale", default=1.0, minimum=1e-6)
+    inertia = reader.choice("inertia", ["file", "shapes", "filled"])
     bounds = {
         name: (_read_bound(joint, "lower"), _read_bound(joint, "upper"))
         for name, joint in joints.items()
@@ -158,7 +163,8 @@ def _read_urdf(
         urdf_text=text if known or not bounds else write_bounds(robot, bounds, scale, path),
         scale=scale,
         fixed_base=reader.flag("fixed_base", default=has_massless_base(robot)),
-        inertia_from_file=reader.choice("inertia", ["file", "shapes"]) == "file",
+        inertia_from_file=inertia != "shapes",
+        fill_inertia=inertia == "filled",
         self_collision=reader.flag("self_collision"),
         collisions=reader.choice("collision", ["file", "none"]) == "file",
     )

@@ -24,7 +24,7 @@ def check_mesh(path: Path) -> None:
     suffix = path.suffix.lower()
     if suffix not in (".obj", ".stl"):
         raise CharacterError(
-            f"mesh {path} is to collide with; it must be an .obj, .stl or .dae file"
+            f"mesh {path} is to collide with; it must be an .obj, .stl, .dae, .glb or .ply file"
         )
     try:
         if suffix == ".obj":

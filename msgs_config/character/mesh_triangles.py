@@ -1,8 +1,8 @@
 """Triangles of mesh files, and a file of them for what reads fewer formats than URDFs name.
 
 Bullet reads .obj and binary .stl well. It reads no .stl of text, and follows missing parts of a
-COLLADA file into a crash. These two are read here and handed on as binary .stl, of which Bullet
-makes one convex hull, as of any .stl.
+COLLADA file into a crash. These two, .glb and .ply are read here and handed on as binary .stl, of
+which Bullet makes one convex hull, as of any .stl.
 """
 
 import io
@@ -72,7 +72,7 @@ def read_vertices(path: Path) -> FloatArray:
 
 def is_converted(path: Path) -> bool:
     """Whether a mesh has a format that the engines do not read, or not well."""
-    return path.suffix.lower() == ".dae" or is_stl_of_text(path)
+    return path.suffix.lower() in _READERS or is_stl_of_text(path)
 
 
 def _stl_of(path: Path) -> bytes:
@@ -90,7 +90,7 @@ def _stl_of(path: Path) -> bytes:
 def _stl_of_version(path: Path, modified_ns: int, size: int) -> bytes:
     del modified_ns, size
     raw = path.read_bytes()
-    triangles = _read_collada(path, raw) if path.suffix.lower() == ".dae" else _read_text(raw)
+    triangles = _READERS.get(path.suffix.lower(), _read_text)(path, raw)
     # single precision, as the format has it, also makes up for last bits of the file's transforms
     corners = triangles.astype(np.float32)
     if not len(corners) or not np.isfinite(corners).all():
@@ -110,8 +110,9 @@ def _normals(corners: FloatArray) -> FloatArray:
     return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
 
 
-def _read_text(raw: bytes) -> FloatArray:
+def _read_text(path: Path, raw: bytes) -> FloatArray:
     """The triangles (m, 3, 3) of an .stl of text."""
+    del path
     numbers = [match.groups() for match in _VERTEX_OF_TEXT.finditer(raw)]
     if len(numbers) % 3:
         raise ValueError("its text ends within a triangle")
@@ -146,6 +147,20 @@ def _read_collada(path: Path, raw: bytes) -> FloatArray:
     return np.concatenate(parts) * (1.0 if unit is None else float(unit))
 
 
+def _read_by_trimesh(path: Path, raw: bytes) -> FloatArray:
+    """The triangles (m, 3, 3) of a .glb or .ply file, in its own axes and units."""
+    try:
+        import trimesh
+    except ImportError as error:
+        raise CharacterError(
+            f"mesh {path} is a {path.suffix}, which takes trimesh to read: pip install trimesh"
+        ) from error
+    scene = trimesh.load_scene(io.BytesIO(raw), file_type=path.suffix[1:].lower())
+    if sum(len(each.faces) for each in scene.geometry.values()) > _MAX_TRIANGLES:
+        raise ValueError(f"it has more than {_MAX_TRIANGLES} triangles")
+    return np.asarray(scene.to_mesh().triangles, dtype=float)
+
+
 def _walk(nodes: list[Any], above: FloatArray) -> Iterator[tuple[Any, FloatArray]]:
     """The geometries of a scene, each with its pose (4, 4) in it."""
     from collada.scene import GeometryNode, Node, NodeNode
@@ -169,3 +184,7 @@ def _triangles(primitives: list[Any]) -> Iterator[FloatArray]:
         part = primitive.triangleset() if isinstance(primitive, Polylist) else primitive
         if isinstance(part, TriangleSet) and part.vertex is not None and len(part):
             yield np.asarray(part.vertex, dtype=float)[part.vertex_index]
+
+
+_READERS = {".dae": _read_collada, ".glb": _read_by_trimesh, ".ply": _read_by_trimesh}
+"""By the suffixes of meshes that are converted, beside .stl of text."""

@@ -105,5 +105,7 @@ def _candidates(name: str, urdf: Path) -> Iterator[Path]:
         # as PyBullet does, and as packages lie in a workspace that is not installed
         for folder in urdf.absolute().parents:
             yield folder / name.removeprefix("package://").lstrip("/")
+        # in the package that the URDF lies in, whose folder may have another name
+        yield urdf.absolute().parents[1] / "/".join(name.split("/")[3:])
     else:
         yield urdf.parent / name

@@ -180,6 +180,7 @@ class UrdfOptions:
     fixed_base: bool = False
     inertia_from_file: bool = False
     self_collision: bool = False
+    fill_inertia: bool = False  # of links that have a mass but no inertia, see `repair_urdf`
     collisions: bool = True  # else nothing of it collides, and meshes may be missing
 
     @cached_property

@@ -22,8 +22,8 @@ _LARGEST = 1e-9  # of the largest entry
 def check_links(links: Sequence[Link], repaired: ElementTree.Element, loading: UrdfOptions) -> None:
     """Compare each link's mass, centre of mass and inertia with a repaired URDF, mass in all too.
 
-    The mass in all is that of the text before its repair. A fixed base, which cannot move, has no
-    mass in the engine. With `inertia: shapes` there is no inertia to compare.
+    The mass in all is that of the text before its repair, if it has any. A fixed base, which cannot
+    move, has no mass in the engine. With `inertia: shapes` there is no inertia to compare.
 
     Raises:
         CharacterError: they differ; names the link, the quantity and both values.
@@ -41,11 +41,17 @@ def check_links(links: Sequence[Link], repaired: ElementTree.Element, loading: U
             pairs.append(("an inertia in kg m^2", _tensor(link), given.in_link_axes()))
         for what, read, expected in pairs:
             _compare(f"{loading.urdf_path}: link '{link.name}'", what, read, expected)
-    total = math.fsum(read_inertial(link).mass for link in loading.robot.findall("link"))
+    total = _mass(loading.robot)
+    if loading.fill_inertia and total == 0.0:
+        total = _mass(repaired)
     mass = math.fsum(link.mass for link in moving)
     if loading.fixed_base:
         mass += read_inertial(elements[links[0].name]).mass
     _compare(f"{loading.urdf_path}: all links", "a mass in kg", mass, total)
+
+
+def _mass(robot: ElementTree.Element) -> float:
+    return math.fsum(read_inertial(link).mass for link in robot.findall("link"))
 
 
 def _tensor(link: Link) -> FloatArray:

@@ -26,6 +26,7 @@ ENTRIES = (*_DIAGONAL, *(name for name, _, _ in _BESIDE))
 """The attributes of `<inertia>`."""
 _DIGITS = 1e-20  # of the largest entry: what alters no digit of another
 _NO_POSE = Pose()
+_WATER = 1000.0  # kg/m^3
 _SWEEPS = 20  # of Jacobi's method, which doubles its digits with each
 
 
@@ -75,6 +76,19 @@ def write_moments(inertia: ElementTree.Element, moments: Vector) -> None:
         inertia.set(name, "0")
 
 
+def write_inertial(link: ElementTree.Element, mass: float, moment: float) -> None:
+    """Give a link a mass in kg, and one moment in kg m^2 about each axis, at its origin."""
+    inertial = ElementTree.SubElement(link, "inertial")
+    ElementTree.SubElement(inertial, "mass", value=repr(mass))
+    write_moments(ElementTree.SubElement(inertial, "inertia"), (moment, moment, moment))
+
+
+def ball_moment(mass: float) -> float:
+    """Moment of inertia, kg m^2, of a ball of water of a mass, kg."""
+    radius = math.cbrt(0.75 * mass / (math.pi * _WATER))
+    return 0.4 * mass * radius * radius
+
+
 def principal_axes(tensor: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Principal moments (3,) and axes (3, 3), as columns, of a symmetric tensor (3, 3).
 
@@ -109,7 +123,8 @@ def nearest_physical(moments: FloatArray) -> Vector:
     for count in range(4):
         for chosen in combinations(range(3), count):
             found = _sums(_least_squares(moments, chosen))
-            squares = [(f - m) * (f - m) for f, m in zip(found, moments.tolist(), strict=True)]
+            # without the moments' own squares, beside which small differences would vanish
+            squares = [f * (f - 2.0 * m) for f, m in zip(found, moments.tolist(), strict=True)]
             distance = math.fsum(squares)
             if distance < least:
                 best, least = found, distance

@@ -13,9 +13,11 @@ from msgs_config.character.urdf_inertia import (
     ENTRIES,
     LEAST_MOMENT,
     Inertial,
+    ball_moment,
     nearest_physical,
     principal_axes,
     read_inertial,
+    write_inertial,
     write_moments,
 )
 from msgs_config.character.urdf_origin import write_origin
@@ -40,9 +42,15 @@ def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
     Joints that move no mass are fixed. Links without `<inertial>` that are fixed to others are
     merged into those; others have no mass. A floating base without mass takes that of a link which
     is fixed to it. With `inertia_from_file` each inertia is given about its principal axes, and
-    where no body can have it, it is the nearest that one can.
+    where no body can have it, it is the nearest that one can. With `fill_inertia` a link that has
+    a mass but no inertia, as files have for whatever they do not know, has that of a ball of water;
+    where no link has a mass, each with a shape has 1 kg.
     """
-    warnings, tree = [], LinkTree(robot)
+    warnings = _fill_masses(robot) if loading.fill_inertia else []
+    tree = LinkTree(robot)
+    locked = tree.fix_locked_joints()
+    if locked:
+        warnings.append(f"joints whose limits leave no room are fixed at 0: {_listed(locked)}")
     fixed = tree.fix_empty_joints()
     if fixed:
         warnings.append(f"joints that move no mass are fixed at 0: {_listed(fixed)}")
@@ -55,15 +63,21 @@ def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
         if merged:
             base = tree.base().get("name")
             warnings.append(f"base link '{base}' has no mass, and takes that of {merged[-1]}")
-    changed, scaled = list[str](), list[str]()
+    changed, scaled, filled = list[str](), list[str](), list[str]()
     for link in robot.findall("link"):
         if link.find("inertial") is None:
-            _write_no_inertial(link)
+            write_inertial(link, 0.0, 0.0)  # for which the engine would assume 1 kg and 1 kg m^2
         elif loading.inertia_from_file:
             scaled += _scale_inertia(link)
             changed += _repair_inertia(link)
+            filled += _fill_inertia(link) if loading.fill_inertia else []
     if scaled:
         warnings.append(f"<inertia_scaling>, which is Bullet's own, multiplies: {_listed(scaled)}")
+    if filled:
+        warnings.append(
+            "links with a mass but no inertia, with that of a ball of water of their mass "
+            f"(kg m^2): {_listed(filled)}"
+        )
     if changed:
         warnings.append(
             "links whose inertia no body can have, with the nearest principal moments that one "
@@ -78,11 +92,30 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _write_no_inertial(link: ElementTree.Element) -> None:
-    """Say that a link has no mass, for which the engine would assume 1 kg and 1 kg m^2."""
-    inertial = ElementTree.SubElement(link, "inertial")
-    ElementTree.SubElement(inertial, "mass", value="0")
-    write_moments(ElementTree.SubElement(inertial, "inertia"), (0.0, 0.0, 0.0))
+def _fill_masses(robot: ElementTree.Element) -> list[str]:
+    """Give each link with a shape 1 kg if no link has a mass; a warning if so."""
+    links = robot.findall("link")
+    if any(read_inertial(link).mass for link in links):
+        return []
+    filled = []
+    for link in links:
+        if link.find("visual") is None and link.find("collision") is None:
+            continue
+        for inertial in link.findall("inertial"):
+            link.remove(inertial)
+        write_inertial(link, 1.0, ball_moment(1.0))
+        filled.append(link.get("name", ""))
+    return [f"no link has a mass; these have 1 kg each: {_listed(filled)}"] if filled else []
+
+
+def _fill_inertia(link: ElementTree.Element) -> list[str]:
+    """Give a link with a mass but no inertia that of a ball; says which, and its moments."""
+    inertia, given = link.find("inertial/inertia"), read_inertial(link)
+    if inertia is None or not given.mass or np.abs(given.tensor).max() > LEAST_MOMENT:
+        return []
+    moment = ball_moment(given.mass)
+    write_moments(inertia, (moment, moment, moment))
+    return [f"{link.get('name')} ({moment:.4g})"]
 
 
 def _scale_inertia(link: ElementTree.Element) -> list[str]:

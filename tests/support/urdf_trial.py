@@ -18,7 +18,14 @@ from msgs_config.character.urdf_repair import repair_urdf
 from msgs_config.errors import ActuatedCharactersError, SimulationError
 
 HOLDS = 0.1  # rad or m, from the rest pose in the end
-_ALTERED = ("links whose inertia", "joints that move no mass", "<inertia_scaling>")
+_ALTERED = (
+    "links whose inertia",
+    "links with a mass but no inertia",
+    "no link has a mass",
+    "joints that move no mass",
+    "joints whose limits leave no room",
+    "<inertia_scaling>",
+)
 _STATES = 5  # in which the dynamics are compared
 
 

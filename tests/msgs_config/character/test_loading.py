@@ -16,7 +16,7 @@ ARM = robot(link("trunk"), link("arm"), HINGE)
 
 
 def test_it_is_the_character_of_a_file_that_only_names_it(tmp_path: Path) -> None:
-    yaml = "on_ground: true\nautomatic_gains: 5\n"
+    yaml = "inertia: filled\non_ground: true\nautomatic_gains: 5\n"
     named = load_character(str(write_character(tmp_path, ARM, yaml)))
     urdf = tmp_path / "robot.urdf"
 

@@ -132,3 +132,19 @@ def test_without_the_library_one_line_says_how_to_get_it(
 
     with pytest.raises(CharacterError, match="pip install pycollada"):
         read_vertices(path)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".ply"])
+def test_other_formats_are_read_with_the_poses_of_their_parts(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"wedge{suffix}"
+    scene = trimesh.Scene()
+    scene.add_geometry(WEDGE, transform=TURNED if suffix == ".glb" else None)
+    (scene if suffix == ".glb" else WEDGE).export(path)
+
+    found = read_vertices(path)
+
+    expected = WEDGE.vertices
+    if suffix == ".glb":
+        expected = trimesh.transformations.transform_points(expected, TURNED)
+    distances = np.linalg.norm(expected[:, np.newaxis] - found, axis=2)
+    assert distances.min(axis=0).max() < 1e-6 and distances.min(axis=1).max() < 1e-6

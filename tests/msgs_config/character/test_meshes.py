@@ -67,6 +67,10 @@ PLACES = {  # how a mesh is named, and where it lies below the folder of `robot/
         "package:///robot/meshes/cube.obj",
         "robot/meshes/cube.obj",
     ),
+    "in the package of the URDF, whose folder has another name": (
+        "package://robot_of_arms/meshes/cube.obj",
+        "robot/meshes/cube.obj",
+    ),
     "in a package of no name": ("package://meshes/cube.obj", "robot/urdf/meshes/cube.obj"),
 }
 
@@ -197,6 +201,8 @@ UNSOUND = {  # each of those with an index has crashed the engine
         "text": b"solid x\nendsolid x\n",
     },
     "x.dae": {"COLLADA": "<COLLADA/>"},
+    "x.glb": {"another file": "x"},
+    "x.ply": {"another file": "x"},
     "x.fbx": {"another format": "x"},
 }
 UNSOUND_CASES = [(name, case) for name, cases in UNSOUND.items() for case in cases]

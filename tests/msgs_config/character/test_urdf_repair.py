@@ -231,3 +231,43 @@ def test_a_link_that_the_engine_reads_otherwise_is_refused(
     line = refusal(tmp_path / "robot.yaml")
 
     assert "link 'a': the engine has an inertia in kg m^2 of 0 0 0" in line
+
+
+def test_of_a_urdf_alone_a_mass_without_inertia_is_a_ball_of_water(tmp_path: Path) -> None:
+    """4.19 kg are a ball of 0.1 m; with `inertia: file` it stays a point."""
+    mass = 1000.0 * 4.0 / 3.0 * np.pi * 0.1**3
+    parts = link("base", TRUNK), hinge("base", "arm"), link("arm", body(mass, "0 0 0"))
+    yaml = write_character(tmp_path, robot(*parts), "inertia: file\n")
+
+    alone, exact = load_character(str(tmp_path / "robot.urdf")), load_character(str(yaml))
+
+    assert alone.links[1].inertia_diagonal == pytest.approx([0.4 * mass * 0.1**2] * 3, rel=1e-12)
+    assert exact.links[1].inertia_diagonal == (0.0, 0.0, 0.0)
+    assert alone.links[1].mass == exact.links[1].mass == mass
+    assert any("ball of water" in warning and "arm" in warning for warning in alone.warnings)
+    assert_engines_agree(alone)
+
+
+def test_an_arm_of_which_no_link_has_a_mass_can_be_moved(tmp_path: Path) -> None:
+    """As those are that are made for planning alone."""
+    shape = '<visual><geometry><box size="1 1 1"/></geometry></visual>'
+    parts = link("base", shape), hinge("base", "arm"), link("arm", shape)
+    write_character(tmp_path, robot(*parts))
+
+    alone = load_character(str(tmp_path / "robot.urdf"))
+
+    assert alone.links[1].mass == 1.0
+    assert not alone.layout.has_floating_base
+    assert any("no link has a mass" in warning for warning in alone.warnings)
+
+
+@pytest.mark.parametrize(("limit", "size"), [("0", 0), ("0.5", 1)])
+def test_a_hinge_whose_limits_leave_nothing_but_zero_is_fixed(
+    tmp_path: Path, limit: str, size: int
+) -> None:
+    stuck = joint("stuck", "a", "b", limit=f'<limit lower="0" upper="{limit}" effort="1"/>')
+
+    character = loaded(tmp_path, link("a"), link("b"), stuck, yaml="fixed_base: true\n")
+
+    assert character.layout.size == size
+    assert any("stuck" in each and "no room" in each for each in character.warnings) == (size == 0)
