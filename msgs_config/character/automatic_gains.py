@@ -8,8 +8,10 @@ off, which moves as well.
 A joint between the base and a link on the ground moves the rest of the body over that link, whose
 m may be a hundred times as large. Stable PD knows no contacts: it takes the joint for a free one,
 and divides the effort by `1 + kd h / m`, so that gains for the body would weaken themselves. Such
-a joint has those of the body as far as `kp h^2 <= m` and `kd h <= 2 m` with its own m and an h of
-1.5 ticks; passive damping that is larger already leaves its own.
+a joint has those of the body as far as `kp h^2 <= m` and `kd h <= 2 m` with its own m. One
+with a passive damping d above a tenth of `m / h` has its own gains alone: stable PD does not count
+with d, so that at those bounds one joint is unstable from `d h = 0.77 m` on, a chain of them from
+less (the fingers of a hand, at `d h = 0.25 m`).
 """
 
 import math
@@ -23,7 +25,8 @@ from msgs_config.character.model import Character, Gains
 from msgs_config.geometry import fixed_order, rotations
 
 _ROOT_ENTRIES = 6
-_PERIOD = 1.0 / 160.0  # s, of 1.5 ticks: with one, the joints of a finger shake each other apart
+_PERIOD = 1.0 / 240.0  # s, a tick's, for which stiffness and damping of supporting joints are bound
+_PASSIVE_SHARE = 0.1  # of m / h: the largest passive damping of a joint with the gains of the body
 _NEAR_GROUND = 0.01  # m over the lowest point, within which a link stands on the ground
 
 
@@ -55,7 +58,7 @@ def automatic_gains(
             )
             borne = float((whole - np.diag(mass_matrix)[entries]).max())
             most = float(alone[entries].min()) / _PERIOD
-            if link.joint.damping < most:
+            if link.joint.damping < _PASSIVE_SHARE * most:
                 stiffness = max(stiffness, min(borne * speed * speed, most / _PERIOD))
                 damping = max(damping, min(2.0 * borne * speed, 2.0 * most))
         damping = max(damping - link.joint.damping, 0.0)

@@ -51,10 +51,13 @@ class RateLimiter:
             self._due_at = now + self.period
 
     def take_warning(self) -> str | None:
-        """A sentence if more than 1 % of the deadlines since the last call were missed."""
+        """A sentence if more than 1 % of the deadlines since the last call were missed.
+
+        A single one is none: of fewer than a hundred deadlines it would be more than 1 %.
+        """
         missed, ticks = self.missed - self._warned_of[0], self._scheduled - self._warned_of[1]
         self._warned_of = self.missed, self._scheduled
-        if missed <= _TOLERATED_SHARE * ticks:
+        if missed <= max(_TOLERATED_SHARE * ticks, 1):
             return None
         return (
             f"{missed} of the last {ticks} deadlines missed; rate or real_time_factor is too high"

@@ -44,6 +44,25 @@ def test_a_damping_that_is_too_strong_for_the_step_is_a_warning(
     assert "'hinge'" in line and "of 1e+04" in line
 
 
+def test_a_simulator_alone_says_what_was_repaired_and_that_it_begins_below_the_ground(
+    processes: Processes, client: SimulatorClient, tmp_path: Path
+) -> None:
+    """A ball of 0.5 m whose centre is 0.2 m above the ground; a `run` says so by itself."""
+    thin = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="5"/></inertial>'
+    ball = '<collision><geometry><sphere radius="0.5"/></geometry></collision>'
+    file = str(
+        write_character(tmp_path, robot(link("ball", thin + ball)), "rest_pose: {root_z: 0.2}\n")
+    )
+
+    alone = processes.simulator(file)
+    client.first_state()
+
+    (line,) = lines_with(alone, "below the ground")
+    assert "link 'ball' is 0.3 m deep" in line
+    (line,) = lines_with(alone, "no body can have")
+    assert "ball (1, 1, 5) -> (" in line
+
+
 def test_a_name_that_is_unknown_among_very_many_is_answered_in_a_line_that_ends(
     processes: Processes, client: SimulatorClient, tmp_path: Path
 ) -> None:

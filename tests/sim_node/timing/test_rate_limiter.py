@@ -201,6 +201,15 @@ def test_more_than_a_hundredth_of_missed_deadlines_is_a_warning_once(
     assert pace.take_warning() is None  # of what came since
 
 
+def test_a_single_missed_deadline_is_no_warning_however_few_there_were() -> None:
+    pace = started()
+    pace.tick(START + PERIOD)
+    pace.tick(START + 3.5 * PERIOD)
+
+    assert pace.missed == 1
+    assert pace.take_warning() is None
+
+
 def test_without_a_schedule_no_deadline_is_missed() -> None:
     pace = started(period=0.0)
 
