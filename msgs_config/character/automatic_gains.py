@@ -8,10 +8,10 @@ off, which moves as well.
 A joint between the base and a link on the ground moves the rest of the body over that link, whose
 m may be a hundred times as large. Stable PD knows no contacts: it takes the joint for a free one,
 and divides the effort by `1 + kd h / m`, so that gains for the body would weaken themselves. Such
-a joint has those of the body as far as `kp h^2 <= m` and `kd h <= 2 m` with its own m. One
-with a passive damping d above a tenth of `m / h` has its own gains alone: stable PD does not count
-with d, so that at those bounds one joint is unstable from `d h = 0.77 m` on, a chain of them from
-less (the fingers of a hand, at `d h = 0.25 m`).
+a joint has those of the body as far as `kp h^2 <= m` and `kd h <= 2 m` with its own m. Stable
+PD does not count with passive damping d either: at those bounds a joint is unstable from
+`d h = 0.77 m` on, a chain of fingers from less; so h is one and a half ticks where there is any.
+Passive damping that is larger already leaves a joint its own gains.
 """
 
 import math
@@ -26,7 +26,7 @@ from msgs_config.geometry import fixed_order, rotations
 
 _ROOT_ENTRIES = 6
 _PERIOD = 1.0 / 240.0  # s, a tick's, for which stiffness and damping of supporting joints are bound
-_PASSIVE_SHARE = 0.1  # of m / h: the largest passive damping of a joint with the gains of the body
+_DAMPED_PERIOD = 1.5 * _PERIOD  # s, that of joints with passive damping
 _NEAR_GROUND = 0.01  # m over the lowest point, within which a link stands on the ground
 
 
@@ -57,9 +57,10 @@ def automatic_gains(
                 fixed_order.apply(mass_matrix[:_ROOT_ENTRIES, :_ROOT_ENTRIES], motions), motions
             )
             borne = float((whole - np.diag(mass_matrix)[entries]).max())
-            most = float(alone[entries].min()) / _PERIOD
-            if link.joint.damping < _PASSIVE_SHARE * most:
-                stiffness = max(stiffness, min(borne * speed * speed, most / _PERIOD))
+            period = _DAMPED_PERIOD if link.joint.damping else _PERIOD
+            most = float(alone[entries].min()) / period
+            if link.joint.damping < most:
+                stiffness = max(stiffness, min(borne * speed * speed, most / period))
                 damping = max(damping, min(2.0 * borne * speed, 2.0 * most))
         damping = max(damping - link.joint.damping, 0.0)
         gains[link.joint.name] = Gains(stiffness=stiffness, damping=damping)

@@ -46,8 +46,17 @@ def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
     a mass but no inertia, as files have for whatever they do not know, has that of a ball of water;
     where no link has a mass, each with a shape has 1 kg.
     """
-    warnings = _fill_masses(robot) if loading.fill_inertia else []
+    filled = _fill_masses(robot) if loading.fill_inertia else []
     tree = LinkTree(robot)
+    merged = _merge_links(tree, loading)
+    changed = _repair_links(robot, loading)
+    frames = [replace(each, pose=each.pose.scaled(loading.scale)) for each in tree.frames]
+    return Repairs(tuple(reversed(frames)), (*filled, *merged, *changed))
+
+
+def _merge_links(tree: LinkTree, loading: UrdfOptions) -> list[str]:
+    """Fix joints that cannot move, and merge links without mass; a warning of each kind."""
+    warnings = []
     locked = tree.fix_locked_joints()
     if locked:
         warnings.append(f"joints whose limits leave no room are fixed at 0: {_listed(locked)}")
@@ -58,11 +67,15 @@ def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
     if frames:
         pairs = [f"{name} of {link}" for name, link in frames.items()]
         warnings.append(f"links without <inertial> are frames of others: {_listed(pairs)}")
-    if not loading.fixed_base:
-        merged = tree.give_base_mass()
-        if merged:
-            base = tree.base().get("name")
-            warnings.append(f"base link '{base}' has no mass, and takes that of {merged[-1]}")
+    merged = [] if loading.fixed_base else tree.give_base_mass()
+    if merged:
+        base = tree.base().get("name")
+        warnings.append(f"base link '{base}' has no mass, and takes that of {merged[-1]}")
+    return warnings
+
+
+def _repair_links(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]:
+    """Give each link an inertia that a body can have; a warning of each kind of change."""
     changed, scaled, filled = list[str](), list[str](), list[str]()
     for link in robot.findall("link"):
         if link.find("inertial") is None:
@@ -71,6 +84,7 @@ def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
             scaled += _scale_inertia(link)
             changed += _repair_inertia(link)
             filled += _fill_inertia(link) if loading.fill_inertia else []
+    warnings = []
     if scaled:
         warnings.append(f"<inertia_scaling>, which is Bullet's own, multiplies: {_listed(scaled)}")
     if filled:
@@ -83,8 +97,7 @@ def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
             "links whose inertia no body can have, with the nearest principal moments that one "
             f"can (kg m^2): {'; '.join(changed)}"
         )
-    scaled_frames = [replace(each, pose=each.pose.scaled(loading.scale)) for each in tree.frames]
-    return Repairs(tuple(reversed(scaled_frames)), tuple(warnings))
+    return warnings
 
 
 def _listed(names: list[str]) -> str:

@@ -16,6 +16,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.character.urdf_repair import repair_urdf
 from msgs_config.errors import ActuatedCharactersError, SimulationError
+from msgs_config.shared_parameters import FROM_FILE, NO_COLLISIONS
 
 HOLDS = 0.1  # rad or m, from the rest pose in the end
 _ALTERED = (
@@ -26,6 +27,7 @@ _ALTERED = (
     "joints whose limits leave no room",
     "<inertia_scaling>",
 )
+_REMEDY = "'collision: none' does without"  # of what refuses a missing mesh
 _STATES = 5  # in which the dynamics are compared
 
 
@@ -33,7 +35,7 @@ _STATES = 5  # in which the dynamics are compared
 class TrialResult:
     """What became of a URDF."""
 
-    kind: str  # ran, refused, diverged, traceback, crashed or too slow
+    kind: str  # ran, refused or diverged (without collisions or not); traceback, crashed, too slow
     reason: str = ""
     size: int = 0  # degrees of freedom
     mass: float = 0.0  # kg
@@ -49,11 +51,23 @@ class TrialResult:
 
 
 def try_urdf(path: Path, duration: float) -> TrialResult:
-    """Hold the character of a URDF alone; an error that is not ours is raised."""
+    """Hold the character of a URDF alone; an error that is not ours is raised.
+
+    One that lacks meshes is tried again without collisions, as its refusal says.
+    """
+    result = _try(path, duration, collides=True)
+    if result.kind == "refused" and _REMEDY in result.reason:
+        again = _try(path, duration, collides=False)
+        return replace(again, kind=f"{again.kind} without collisions", reason=result.reason)
+    return result
+
+
+def _try(path: Path, duration: float, *, collides: bool) -> TrialResult:
     character, drift = None, 0.0
+    settings = {"collision": FROM_FILE if collides else NO_COLLISIONS}
     try:
-        character = load_character(str(path))
-        plan = make_plan(str(path), duration, {"reference": "hold"}, {}, {}, loaded=character)
+        character = load_character(str(path), collides)
+        plan = make_plan(str(path), duration, {"reference": "hold"}, settings, {}, loaded=character)
         rest = np.array(character.rest_position)
         for tick in ticks_in_process(plan):
             drift = float(np.abs(tick.following.position - rest).max(initial=0.0))
