@@ -103,6 +103,8 @@ class LinkTree:
 
         Until it has mass, or until there are none; returns their names.
         """
+        if not self._links:
+            return []  # a terrain that was not checked, which the engine refuses
         base = self.base()
         merged = []
         while read_inertial(base).is_nothing:

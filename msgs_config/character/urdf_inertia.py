@@ -123,11 +123,9 @@ def nearest_physical(moments: FloatArray) -> Vector:
     for count in range(4):
         for chosen in combinations(range(3), count):
             found = _sums(_least_squares(moments, chosen))
-            # without the moments' own squares, beside which small differences would vanish
-            squares = [f * (f - 2.0 * m) for f, m in zip(found, moments.tolist(), strict=True)]
-            distance = math.fsum(squares)
-            if distance < least:
-                best, least = found, distance
+            error = _optimality_error(moments.tolist(), found)
+            if error < least:
+                best, least = found, error
     x, y, z = best
     # to the last bit, because the engine compares so
     x = min(x, y + z)
@@ -145,6 +143,16 @@ def _least_squares(moments: FloatArray, chosen: tuple[int, ...]) -> list[float]:
     right = (y + z, x + z, x + y)
     shared = math.fsum(right[index] for index in chosen) / (len(chosen) + 1)
     return [max(right[i] - shared, 0.0) if i in chosen else 0.0 for i in range(3)]
+
+
+def _optimality_error(moments: list[float], found: list[float]) -> float:
+    """How far found moments are from the nearest ones; 0 there.
+
+    Distances would differ by rounding alone. What is left must be at right angles to them, and point along no edge of the cone of bodies.
+    """
+    x, y, z = left = [m - f for m, f in zip(moments, found, strict=True)]
+    along = math.fsum(a * b for a, b in zip(left, found, strict=True))
+    return max(y + z, x + z, x + y, abs(along))
 
 
 def _sums(second: list[float]) -> list[float]:

@@ -106,9 +106,10 @@ def _listed(names: list[str]) -> str:
 
 
 def _fill_masses(robot: ElementTree.Element) -> list[str]:
-    """Give each link with a shape 1 kg if no link has a mass; a warning if so."""
+    """Give each link with a shape 1 kg if none has a mass and some joint moves; a warning if so."""
     links = robot.findall("link")
-    if any(read_inertial(link).mass for link in links):
+    has_mass = any(read_inertial(link).mass for link in links)
+    if has_mass or all(joint.get("type") == "fixed" for joint in robot.findall("joint")):
         return []
     filled = []
     for link in links:

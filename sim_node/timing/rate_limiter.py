@@ -15,7 +15,7 @@ class RateLimiter:
         self.period = period
         self.missed = 0  # ticks that began after the next one was due
         self._scheduled = 0  # ticks that were due by the wall clock
-        self._warned_of = (0, 0)  # of the two, when `take_warning` was called last
+        self._warned_of = (0, 0)  # of the two, when `take_warning` judged last
         self._due_at = -math.inf
         self._last: float | None = None  # when the last tick began
         self._lateness = Durations()
@@ -51,13 +51,15 @@ class RateLimiter:
             self._due_at = now + self.period
 
     def take_warning(self) -> str | None:
-        """A sentence if more than 1 % of the deadlines since the last call were missed.
+        """A sentence if more than 1 % of the deadlines since the last judgement were missed.
 
-        A single one is none: of fewer than a hundred deadlines it would be more than 1 %.
+        Fewer than a hundred are not judged: one of them would be more than 1 %.
         """
         missed, ticks = self.missed - self._warned_of[0], self._scheduled - self._warned_of[1]
+        if ticks * _TOLERATED_SHARE < 1.0:
+            return None
         self._warned_of = self.missed, self._scheduled
-        if missed <= max(_TOLERATED_SHARE * ticks, 1):
+        if missed <= _TOLERATED_SHARE * ticks:
             return None
         return (
             f"{missed} of the last {ticks} deadlines missed; rate or real_time_factor is too high"

@@ -201,7 +201,7 @@ def test_more_than_a_hundredth_of_missed_deadlines_is_a_warning_once(
     assert pace.take_warning() is None  # of what came since
 
 
-def test_a_single_missed_deadline_is_no_warning_however_few_there_were() -> None:
+def test_fewer_than_a_hundred_deadlines_are_not_judged() -> None:
     pace = started()
     pace.tick(START + PERIOD)
     pace.tick(START + 3.5 * PERIOD)
