@@ -148,7 +148,8 @@ def _least_squares(moments: FloatArray, chosen: tuple[int, ...]) -> list[float]:
 def _optimality_error(moments: list[float], found: list[float]) -> float:
     """How far found moments are from the nearest ones; 0 there.
 
-    Distances would differ by rounding alone. What is left must be at right angles to them, and point along no edge of the cone of bodies.
+    Distances would differ by rounding alone. What is left must be at right angles to them, and
+    point along no edge of the cone of bodies.
     """
     x, y, z = left = [m - f for m, f in zip(moments, found, strict=True)]
     along = math.fsum(a * b for a, b in zip(left, found, strict=True))
