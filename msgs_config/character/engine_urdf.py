@@ -24,7 +24,7 @@ def write_engine_urdf(loading: UrdfOptions, directory: Path) -> str:
     Raises:
         CharacterError: a mesh does not exist or cannot be used, or an element is too long.
     """
-    robot = resolve_meshes(loading)
+    robot = resolve_meshes(loading).robot
     repair_urdf(robot, loading)
     for link in robot.findall("link"):
         unused = link.findall("visual")

@@ -59,7 +59,7 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
     if not collides:
         file = replace(file, loading=replace(file.loading, collisions=False))
     urdf = file.loading.urdf_path
-    robot = resolve_meshes(file.loading)
+    robot, missing = resolve_meshes(file.loading)
     repairs = repair_urdf(robot, file.loading)
     shapes = read_shapes(robot, file.loading)
     client = connect()
@@ -90,7 +90,7 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         clips=file.clips,
         feet=file.feet,
         planning=file.planning,
-        warnings=(*_collect_warnings(file, layout, links), *repairs.warnings),
+        warnings=(*_collect_warnings(file, layout, links), *missing, *repairs.warnings),
         up_axis=file.up_axis,
         frames=repairs.frames,
     )

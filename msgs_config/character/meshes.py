@@ -6,6 +6,7 @@ from contextlib import suppress
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 
@@ -14,27 +15,44 @@ from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 
 MAX_MESH_BYTES = 64 * 1024 * 1024
+_REMEDY = "'collision: none' does without"
 
 
-def resolve_meshes(loading: UrdfOptions) -> ElementTree.Element:
-    """A copy of a URDF's root, in which the meshes of its links have absolute paths.
+class ResolvedMeshes(NamedTuple):
+    """A URDF whose meshes were found."""
 
-    Where nothing collides, shapes whose meshes do not exist are left out.
+    robot: ElementTree.Element
+    """A copy of its root, in which the meshes of its links have absolute paths."""
+    warnings: tuple[str, ...]
+    """One if shapes that are only seen are left out."""
+
+
+def resolve_meshes(loading: UrdfOptions) -> ResolvedMeshes:
+    """Find the meshes of a URDF. Shapes that are only seen are left out where theirs are missing.
+
+    Where nothing collides that goes for all shapes.
 
     Raises:
-        CharacterError: a mesh does not exist or is too large; names the file, link and path.
+        CharacterError: a mesh to collide with does not exist or is too large; names the file, link
+            and path.
     """
     robot, urdf = deepcopy(loading.robot), loading.urdf_path
+    missing: list[str] = []
     for link in robot.findall("link"):
         for part in (*link.findall("visual"), *link.findall("collision")):
             try:
                 for mesh in part.iter("mesh"):
                     mesh.set("filename", str(_find(mesh.get("filename", ""), urdf)))
             except CharacterError as error:
-                if loading.collisions:
-                    raise CharacterError(f"{urdf}: link {link.get('name')!r}: {error}") from error
+                line = f"link {link.get('name')!r}: {error}"
+                if part.tag == "collision" and loading.collisions:
+                    raise CharacterError(f"{urdf}: {line}; {_REMEDY}") from error
                 link.remove(part)
-    return robot
+                missing += [line] if part.tag == "visual" else []
+    if not missing:
+        return ResolvedMeshes(robot, ())
+    others = f"; and {len(missing) - 1} more" if len(missing) > 1 else ""
+    return ResolvedMeshes(robot, (f"shapes that are only seen are left out: {missing[0]}{others}",))
 
 
 def collision_meshes(loading: UrdfOptions) -> dict[str, str]:
@@ -89,10 +107,7 @@ def _find(name: str, urdf: Path) -> Path:
         except OSError:  # such as a name that is too long
             continue
     above = f", and so on up to {candidates[-1]}" if len(candidates) > 1 else ""
-    raise CharacterError(
-        f"mesh {name!r} does not exist; looked for {candidates[0]}{above} ('collision: none' does "
-        "without)"
-    )
+    raise CharacterError(f"mesh {name!r} does not exist; looked for {candidates[0]}{above}")
 
 
 def _candidates(name: str, urdf: Path) -> Iterator[Path]:

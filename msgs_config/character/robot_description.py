@@ -29,7 +29,7 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
     """
     joints = DescribedJoints(character, base_frame)
     if character.loading.scale == 1.0 and _is_legal(character.loading.robot):
-        robot = resolve_meshes(character.loading)
+        robot = resolve_meshes(character.loading).robot
         for mesh in robot.iterfind("link//mesh"):
             mesh.set("filename", Path(mesh.get("filename", "")).as_uri())
         fixed = {joint.name for joint in joints.fixed}  # also what moves no mass

@@ -137,12 +137,12 @@ def _check_numbers(path: Path, part: ElementTree.Element) -> None:
 
 
 def _check_inertial(path: Path, link: ElementTree.Element, inertial: ElementTree.Element) -> None:
-    """Check that it is whole, and no moment of inertia below 0 by more than a file's rounding."""
+    """Check that it has a mass, and no moment below 0 by more than a file's rounding."""
+    if inertial.find("mass") is None:
+        raise CharacterError(f"{path}: link {link.get('name')!r}: <inertial> must have <mass>")
     inertia = inertial.find("inertia")
-    if inertia is None or inertial.find("mass") is None:
-        raise CharacterError(
-            f"{path}: link {link.get('name')!r}: <inertial> must have <mass> and <inertia>"
-        )
+    if inertia is None:
+        return
     moments = {name: float(inertia.get(name, "0")) for name in MOMENTS}
     rounding = max(LEAST_MOMENT, ROUNDING * max(map(abs, moments.values())))
     for name, moment in moments.items():

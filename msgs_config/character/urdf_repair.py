@@ -78,9 +78,13 @@ def _repair_links(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]
     """Give each link an inertia that a body can have; a warning of each kind of change."""
     changed, scaled, filled = list[str](), list[str](), list[str]()
     for link in robot.findall("link"):
-        if link.find("inertial") is None:
+        inertial = link.find("inertial")
+        if inertial is None:
             write_inertial(link, 0.0, 0.0)  # for which the engine would assume 1 kg and 1 kg m^2
-        elif loading.inertia_from_file:
+            continue
+        if inertial.find("inertia") is None:  # which the engine would refuse
+            write_moments(ElementTree.SubElement(inertial, "inertia"), (0.0, 0.0, 0.0))
+        if loading.inertia_from_file:
             scaled += _scale_inertia(link)
             changed += _repair_inertia(link)
             filled += _fill_inertia(link) if loading.fill_inertia else []

@@ -128,20 +128,35 @@ def test_a_file_in_the_working_directory_is_not_taken_for_the_mesh(
     assert loaded.samefile(mesh)
 
 
-@pytest.mark.parametrize("part", ["visual", "collision"])
-@pytest.mark.parametrize(
+missing_mesh = pytest.mark.parametrize(
     "name",
     ["gone.obj", "/gone.obj", "package://gone/gone.obj", "package://__main__/x", "", "a" * 300],
 )
-def test_a_mesh_that_does_not_exist_is_refused_by_file_link_and_path(
-    write: WriteRobot, name: str, part: str, capfd: pytest.CaptureFixture[str]
+
+
+@missing_mesh
+def test_a_mesh_to_collide_with_that_does_not_exist_is_refused_by_file_link_and_path(
+    write: WriteRobot, name: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    urdf = write(name, part=part)
+    urdf = write(name)
 
     line = refusal(urdf)
 
-    for words in (str(urdf), "'body'", "mesh", name):
+    for words in (str(urdf), "'body'", "mesh", name, "'collision: none' does without"):
         assert words in line
+    assert capfd.readouterr() == ("", "")
+
+
+@missing_mesh
+def test_without_a_mesh_that_is_only_seen_the_rest_is_loaded_with_a_warning(
+    write: WriteRobot, name: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    whole = load_character(str(write(name, part="visual")))
+
+    (warning,) = [each for each in whole.warnings if "only seen" in each]
+    for words in ("'body'", "mesh", name):
+        assert words in warning
+    assert whole.links[0].shapes == ()
     assert capfd.readouterr() == ("", "")
 
 

@@ -271,3 +271,17 @@ def test_a_hinge_whose_limits_leave_nothing_but_zero_is_fixed(
 
     assert character.layout.size == size
     assert any("stuck" in each and "no room" in each for each in character.warnings) == (size == 0)
+
+
+@pytest.mark.parametrize("inertia", ["", '<inertia ixx="0" iyy="0" izz="0"/>'])
+def test_a_mass_without_inertia_has_that_of_a_ball_of_water(tmp_path: Path, inertia: str) -> None:
+    text = f'<inertial><mass value="2"/>{inertia}</inertial>'
+
+    character = loaded(tmp_path, link("body", text), yaml="inertia: filled\n")
+
+    radius = (2.0 / 1000.0 / (4.0 / 3.0 * np.pi)) ** (1.0 / 3.0)  # of 2 litres
+    (whole,) = character.links
+    assert whole.mass == 2.0
+    assert whole.inertia_diagonal == pytest.approx([0.4 * 2.0 * radius**2] * 3, rel=1e-12)
+    (warning,) = [line for line in character.warnings if "ball of water" in line]
+    assert "body (0.0" in warning
