@@ -93,7 +93,7 @@ def _repair_links(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]
         warnings.append(f"<inertia_scaling>, which is Bullet's own, multiplies: {_listed(scaled)}")
     if filled:
         warnings.append(
-            "links with a mass but no inertia, with that of a ball of water of their mass "
+            "links with a mass but no inertia, or none about an axis, with that of a ball of water "
             f"(kg m^2): {_listed(filled)}"
         )
     if changed:
@@ -127,12 +127,20 @@ def _fill_masses(robot: ElementTree.Element) -> list[str]:
 
 
 def _fill_inertia(link: ElementTree.Element) -> list[str]:
-    """Give a link with a mass but no inertia that of a ball; says which, and its moments."""
+    """Give a link with a mass the inertia that it lacks, about all axes or one; says which.
+
+    It is that of a ball of its mass; about one axis, no more than about the others.
+    """
     inertia, given = link.find("inertial/inertia"), read_inertial(link)
-    if inertia is None or not given.mass or np.abs(given.tensor).max() > LEAST_MOMENT:
+    moments = np.diag(given.tensor)  # principal ones by now
+    lacking = moments <= LEAST_MOMENT
+    if inertia is None or not given.mass or not lacking.any():
         return []
     moment = ball_moment(given.mass)
-    write_moments(inertia, (moment, moment, moment))
+    if not lacking.all():
+        moment = min(moment, float(moments[~lacking].min()))
+    x, y, z = np.where(lacking, moment, moments).tolist()
+    write_moments(inertia, (x, y, z))
     return [f"{link.get('name')} ({moment:.4g})"]
 
 

@@ -41,7 +41,7 @@ def write_urdf(file: Path, loading: UrdfOptions) -> Path:
     Raises:
         CharacterError: a mesh does not exist any more.
     """
-    robot = resolve_meshes(loading)
+    robot = resolve_meshes(loading).robot
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(ElementTree.tostring(robot, encoding="utf-8"))
     return file

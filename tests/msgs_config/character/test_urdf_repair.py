@@ -50,6 +50,7 @@ def assert_engines_agree(character: Character) -> None:
     assert np.allclose(force, sample.effort, rtol=1e-4, atol=1e-4 * np.abs(force).max())
 
 
+BALL_OF_2_KG = 0.4 * 2.0 * (2.0 / 1000.0 / (4.0 / 3.0 * np.pi)) ** (2.0 / 3.0)  # of water, kg m^2
 TRUNK, ARM = body(2.0, "0.02 0.03 0.04"), body(1.0, "0.01 0.01 0.005")
 
 
@@ -279,9 +280,20 @@ def test_a_mass_without_inertia_has_that_of_a_ball_of_water(tmp_path: Path, iner
 
     character = loaded(tmp_path, link("body", text), yaml="inertia: filled\n")
 
-    radius = (2.0 / 1000.0 / (4.0 / 3.0 * np.pi)) ** (1.0 / 3.0)  # of 2 litres
     (whole,) = character.links
     assert whole.mass == 2.0
-    assert whole.inertia_diagonal == pytest.approx([0.4 * 2.0 * radius**2] * 3, rel=1e-12)
+    assert whole.inertia_diagonal == pytest.approx([BALL_OF_2_KG] * 3, rel=1e-12)
     (warning,) = [line for line in character.warnings if "ball of water" in line]
     assert "body (0.0" in warning
+
+
+@pytest.mark.parametrize(("across", "along"), [(0.5, BALL_OF_2_KG), (1e-3, 1e-3)])
+def test_a_rod_without_inertia_about_its_axis_has_that_of_a_ball_or_no_more_than_across(
+    tmp_path: Path, across: float, along: float
+) -> None:
+    text = body(2.0, f"{across} 0 {across}")
+
+    character = loaded(tmp_path, link("rod", text), yaml="inertia: filled\n")
+
+    assert character.links[0].inertia_diagonal == pytest.approx([across, along, across], rel=1e-12)
+    assert_engines_agree(character)
