@@ -61,9 +61,9 @@ class SimulationError(ActuatedCharactersError):
     """The simulation cannot go on: it diverged, or a command never came."""
 
 
-def one_of(what: str, value: object, choices: list[str]) -> str:
-    """The sentence for a name that is not among the valid ones."""
+def one_of(what: str, value: object, choices: list[str], prefix: str = "") -> str:
+    """The sentence for a name that is not among the valid ones; `prefix` leads to its place."""
     name = str(value)[:_SHOWN]
     close = get_close_matches(name, choices, n=1)
     hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"unknown {what} {name!r}; {hint}there are: {', '.join(choices)}"
+    return f"unknown {what} {(prefix + name)[:_SHOWN]!r}; {hint}there are: {', '.join(choices)}"

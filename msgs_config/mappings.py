@@ -46,7 +46,7 @@ class MappingReader:
         """Raise the error if there is a key that is not known."""
         for key in self.content:
             if key not in known:
-                sentence = one_of("key", f"{self._prefix}{key}", list(known))
+                sentence = one_of("key", key, list(known), self._prefix)
                 raise self._error(f"{self._place}: {sentence}")
 
     def part(self, key: str) -> "MappingReader":

@@ -47,9 +47,15 @@ class FrameNames:
         return cls(odom, base)
 
     def check(self, character: Character) -> None:
-        """Raise ConfigurationError if the frame of `odom` is one of the character's links."""
-        if self.odom in character.frame_names:
-            raise ConfigurationError(
-                f"parameter '{ODOM_FRAME.name}' is '{self.odom}', which is a link of character "
-                f"'{character.name}'; it must be no link's name"
-            )
+        """Raise ConfigurationError if a frame is one of the character's links or sensors."""
+        links = dict.fromkeys(character.frame_names, "a link")
+        sensors = {sensor.name: "a sensor" for sensor in character.sensors}
+        for parameter, name, taken in (
+            (ODOM_FRAME, self.odom, links | sensors),
+            (BASE_FRAME_PARAMETER, self.base, sensors),  # a link may be the base's frame
+        ):
+            if name in taken:
+                raise ConfigurationError(
+                    f"parameter '{parameter.name}' is '{name}', which is {taken[name]} of "
+                    f"character '{character.name}'; it must be the name of no other frame"
+                )

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.session import given_session
 from msgs_config.parameters import Values
 from sim_node.frames import FrameNames
+from sim_node.physics.sensors import SensingSettings
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class NodeSettings:
     push_ticks: int  # that a push lasts
     display_ticks: int  # from what viewers show to the next
     frames: FrameNames
+    clock: TickClock
+    sensing: SensingSettings
 
 
 def make_node_settings(values: Values) -> NodeSettings:
@@ -50,4 +53,10 @@ def make_node_settings(values: Values) -> NodeSettings:
         push_ticks=max(round(values.number("wrench_duration") * rate), 1),
         display_ticks=max(round(rate / values.number("display_rate")), 1),
         frames=FrameNames.of(values),
+        clock=TickClock(rate),
+        sensing=SensingSettings(
+            tick_s=1.0 / rate,
+            gravity=values.number("gravity"),
+            seed=values.integer("sensor_seed"),
+        ),
     )

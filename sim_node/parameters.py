@@ -134,6 +134,12 @@ WORLD_PARAMETERS = [
         minimum=0.001,
         maximum=1000.0,
     ),
+    Parameter(
+        "sensor_seed",
+        0,
+        "of the noise that a character's file gives its sensors",
+        maximum=_LARGEST_COUNT,
+    ),
     ODOM_FRAME,
     BASE_FRAME_PARAMETER,
     SESSION,

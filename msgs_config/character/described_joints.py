@@ -1,7 +1,8 @@
 """The joints of a character's `robot_description`: those that URDF knows, and where they are.
 
 A ball joint is three hinges between links without mass: yaw, pitch and roll, URDF's own angles
-(about z, then the new y, then the new x).
+(about z, then the new y, then the new x). A sensor is a link without mass, fixed to the link that
+it is on.
 """
 
 import math
@@ -14,6 +15,7 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Joint, Link, Pose, Vector
+from msgs_config.character.sensors import Sensor
 from msgs_config.frame_names import BASE_FRAME
 from msgs_config.geometry import elementary, rotations
 
@@ -46,7 +48,7 @@ class DescribedJoints:
     def __init__(self, character: Character, base_frame: str = BASE_FRAME) -> None:
         """`base_frame` becomes the root, z up and x forward, unless a link has that name."""
         self._layout = character.layout
-        self._links = character.frame_names
+        self._links = character.frame_names | {sensor.name for sensor in character.sensors}
         self._names = {link.joint.name for link in character.links[1:]}
         self._names |= {frame.joint for frame in character.frames}
         root = character.links[0].name
@@ -66,6 +68,7 @@ class DescribedJoints:
             joints.append(
                 DescribedJoint(frame.joint, JointType.FIXED, frame.parent, frame.name, frame.pose)
             )
+        joints += map(self._describe_sensor, character.sensors)
         self.joints = tuple(joints)
 
     def _describe(self, link: Link, parent: str) -> Iterator[DescribedJoint]:
@@ -90,6 +93,11 @@ class DescribedJoints:
                 effort_limit=joint.effort_limit,
             )
             parent, pose = child, _AT_PARENT
+
+    def _describe_sensor(self, sensor: Sensor) -> DescribedJoint:
+        pose = Pose(sensor.position, sensor.orientation_xyzw)
+        name = _unused(f"{sensor.name}_joint", self._names)
+        return DescribedJoint(name, JointType.FIXED, sensor.link, sensor.name, pose)
 
     @cached_property
     def fixed(self) -> tuple[DescribedJoint, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 from msgs_config import files
 from msgs_config.character.joint_bounds import write_bounds
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
+from msgs_config.character.sensors import Sensor, read_sensors
 from msgs_config.character.urdf_check import check_urdf
 from msgs_config.character.urdf_frames import has_massless_base
 from msgs_config.errors import CharacterError, one_of
@@ -25,7 +26,7 @@ _JOINT_KEYS = (*_GAIN_KEYS, "effort_limit", "lower", "upper", "passive_damping",
 _CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets")
 _URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision", "collision")
 _POSE_KEYS = ("joint_damping", "rest_pose", "on_ground", "joints", "automatic_gains")
-_KEYS = (*_URDF_KEYS, *_POSE_KEYS, "root_assistance", "clips", "feet", "planner")
+_KEYS = (*_URDF_KEYS, *_POSE_KEYS, "root_assistance", "clips", "feet", "planner", "sensors")
 ALONE: dict[str, Any] = {
     "inertia": "filled",
     "on_ground": True,
@@ -55,6 +56,7 @@ class CharacterFile:
     clips: ClipFormat
     feet: tuple[str, ...]
     planning: Planning
+    sensors: tuple[Sensor, ...]
 
 
 def shipped_characters() -> list[str]:
@@ -135,6 +137,7 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
         clips=_read_clip_format(path, reader.part("clips")),
         feet=reader.names("feet", "links", default=[]),
         planning=_read_planning(reader.part("planner"), joints),
+        sensors=read_sensors(reader.part("sensors")),
     )
 
 

@@ -25,6 +25,7 @@ from msgs_config.character.model import (
     Link,
     Pose,
 )
+from msgs_config.character.sensors import check_sensors
 from msgs_config.character.shapes import read_shapes
 from msgs_config.character.urdf_agreement import check_links
 from msgs_config.character.urdf_repair import repair_urdf
@@ -79,6 +80,8 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         raise CharacterError(f"{urdf}: {error}") from error
     _check_names(file, layout)
     _check_rest_pose(file, links)
+    has_shapes = {link.name: bool(link.collision_shapes) for link in links}
+    check_sensors(file.path, file.sensors, has_shapes)
     character = Character(
         name=file.name,
         file=file.path,
@@ -91,6 +94,7 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         feet=file.feet,
         planning=file.planning,
         warnings=(*_collect_warnings(file, layout, links), *missing, *repairs.warnings),
+        sensors=file.sensors,
         up_axis=file.up_axis,
         frames=repairs.frames,
     )

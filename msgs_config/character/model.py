@@ -16,6 +16,7 @@ import numpy as np
 from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.character.sensors import Sensor
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.geometry.rotations import IDENTITY_XYZW
@@ -227,6 +228,7 @@ class Character:
     planning: Planning = Planning()
     warnings: tuple[str, ...] = ()  # of likely mistakes in its files
     placement: Placement = Placement()
+    sensors: tuple[Sensor, ...] = ()
     up_axis: str = "z"
     """The axis of the base link that points up where the character stands; y or z."""
     frames: tuple[Frame, ...] = ()

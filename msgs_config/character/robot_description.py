@@ -39,6 +39,10 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
         if joints.has_own_base:
             robot.insert(0, ElementTree.Element("link", name=joints.root))
             robot.insert(1, _joint(joints.joints[0]))
+        sensors = {sensor.name for sensor in character.sensors}
+        for each in joints.joints:
+            if each.child in sensors:
+                robot.extend((ElementTree.Element("link", name=each.child), _joint(each)))
     else:
         robot = _describe(character, joints)
     return ElementTree.tostring(robot, encoding="unicode")

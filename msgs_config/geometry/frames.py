@@ -40,6 +40,13 @@ def quaternion(rotation_vector: Sequence[float]) -> Quaternion:
     return (x * share, y * share, z * share, math.cos(half))
 
 
+def of_roll_pitch_yaw(angles: Sequence[float]) -> Quaternion:
+    """The unit quaternion of URDF's angles in rad: turn about x, then fixed y, then fixed z."""
+    roll, pitch, yaw = angles
+    about_y_and_z = product(quaternion((0.0, 0.0, yaw)), quaternion((0.0, pitch, 0.0)))
+    return product(about_y_and_z, quaternion((roll, 0.0, 0.0)))
+
+
 def conjugate(q_xyzw: Sequence[float]) -> Quaternion:
     """The inverse of a unit quaternion."""
     x, y, z, w = q_xyzw

@@ -15,10 +15,12 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState, MultiDOFJointState, PointCloud2
+from sensor_msgs.msg import Imu, JointState, MultiDOFJointState, PointCloud2
 from std_msgs.msg import Header, String
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
+
+from msgs_config.character.sensors import SensorType
 
 try:  # a full ROS install has it, the wheels have not
     from tf2_msgs.msg import TFMessage
@@ -152,6 +154,14 @@ def contact_wrench(link: str) -> Topic:
     """The topic of the contact wrench on a link; what no topic's name can have becomes `_`."""
     name = re.sub(r"\W|^(?=\d)", "_", link, flags=re.ASCII)
     return Topic(f"contact_wrenches/{name}", WrenchStamped, DISPLAY_QOS)
+
+
+_SENSOR_MESSAGES = {SensorType.IMU: Imu, SensorType.FORCE: WrenchStamped}
+
+
+def sensor_reading(sensor_type: SensorType, name: str) -> Topic:
+    """The topic of a sensor's readings, of its name below that of its type."""
+    return Topic(f"{sensor_type.value}/{name}", _SENSOR_MESSAGES[sensor_type], STREAM_QOS)
 
 
 SIM_NODE = "sim_node"

@@ -1,4 +1,4 @@
-"""The publishers of one character: state, contacts, wrenches, episode, and what ROS tools show."""
+"""The publishers of one character: state, contacts, wrenches, sensors, episode, and displays."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -20,6 +20,7 @@ from msgs_config.parameters import Values
 from msgs_config.runtime.composition import UNTIL_A_MESSAGE, Turns
 from msgs_config.runtime.process import StopSignal
 from sim_node.interface.display import DisplayPublishers
+from sim_node.interface.sensors import SensorPublishers
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
@@ -47,6 +48,7 @@ class Publishers:
         self._states = create(topics.JOINT_STATES)
         self._contacts = create(topics.CONTACTS)
         self._wrenches = create(topics.APPLIED_WRENCH)
+        self._sensors = SensorPublishers(node, character, settings)
         self._display = DisplayPublishers(node, character, settings)
 
     def _make_encoders(self) -> None:
@@ -62,8 +64,12 @@ class Publishers:
 
     @property
     def wants_contacts(self) -> bool:
-        """Whether the contacts have subscribers, or their wrenches for viewers have."""
-        return topics.has_subscribers(self._contacts) or self._display.wants_contacts
+        """Whether the contacts have subscribers, their wrenches for viewers, or force sensors."""
+        return (
+            topics.has_subscribers(self._contacts)
+            or self._display.wants_contacts
+            or self._sensors.wants_contacts
+        )
 
     def publish_configuration(
         self,
@@ -102,6 +108,7 @@ class Publishers:
             yield self._contacts, self._encode_contacts()
         if topics.has_subscribers(self._wrenches):
             yield self._wrenches, self._encode_applied()
+        yield from self._sensors.messages()
 
     def state(self) -> Outgoing:
         """The state of a tick."""
@@ -119,8 +126,8 @@ class Publishers:
     def republish(self, *, with_state: bool, with_episode: bool) -> None:
         """Publish what is shown again, and the last state, the same bytes, for late subscribers.
 
-        A controller that needs the contacts waits for those as well. The episode shows that a
-        simulator that is paused or held back is still there.
+        A controller that needs contacts or sensors waits for those as well. The episode shows that
+        a simulator that is paused or held back is still there.
         """
         self._display.republish()
         if with_episode and self._last_episode is not None:
@@ -128,12 +135,16 @@ class Publishers:
         if with_state:
             if topics.has_subscribers(self._contacts):
                 self._contacts.publish(self._encode_contacts())
+            topics.publish_together(self._sensors.messages())
             self._states.publish(self._last_state)
 
     @property
     def of_ticks(self) -> list[Publisher]:
         """The publishers of what comes again at each tick."""
-        return [self._states, self._contacts, self._wrenches, *self._display.streams]
+        return [
+            *(self._states, self._contacts, self._wrenches),
+            *(*self._sensors.publishers, *self._display.streams),
+        ]
 
     def _encode_contacts(self) -> bytes:
         """The contacts; none if the topic had no subscriber while they happened."""

@@ -50,6 +50,7 @@ class CharacterSnapshot:
     """A simulated character's memory between two ticks, the engine's left aside."""
 
     state: StampedState
+    before: StampedState | None
     contacts: Contacts | None
     pushes: tuple[ExternalWrench, ...]
     delayed: tuple[FloatArray, ...]  # (n,) each, commands on their way
@@ -60,6 +61,7 @@ class SimulatedCharacter:
     """A character in a world."""
 
     state: StampedState
+    before: StampedState | None  # the state a tick earlier; None in an episode's first one
     contacts: Contacts | None  # over the last tick; None if contacts were not watched
     pushes: tuple[ExternalWrench, ...]  # that acted during the last tick
     balls: Projectiles  # of the world that it is in
@@ -106,6 +108,7 @@ class SimulatedCharacter:
         body.set_state(self._position, self._velocity)
         self.contacts = self._no_contacts
         self.pushes = ()
+        self.before = None
         self._read(stamp_ns, effort=None)
 
     def begin_tick(
@@ -145,12 +148,14 @@ class SimulatedCharacter:
 
     def end_tick(self, stamp_ns: int) -> None:
         """Read the state that the tick has led to."""
+        self.before = self.state
         self._read(stamp_ns, self._applied)
 
     def snapshot(self) -> CharacterSnapshot:
         """What `restore` needs, to be taken between two ticks."""
         return CharacterSnapshot(
             self.state,
+            self.before,
             self.contacts,
             self.pushes,
             tuple(self._delayed),
@@ -159,7 +164,8 @@ class SimulatedCharacter:
 
     def restore(self, snapshot: CharacterSnapshot) -> None:
         """Restore a snapshot; the engine's state is restored by the simulation."""
-        self.state, self.contacts, self.pushes = snapshot.state, snapshot.contacts, snapshot.pushes
+        self.state, self.before = snapshot.state, snapshot.before
+        self.contacts, self.pushes = snapshot.contacts, snapshot.pushes
         self._delayed = deque(snapshot.delayed)
         self.saturated_ticks = snapshot.saturated_ticks.copy()
         self._body.forget_reading()

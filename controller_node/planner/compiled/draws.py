@@ -1,7 +1,4 @@
-"""Random numbers that depend on nothing but their key: numpy's Philox, and Box and Muller's way.
-
-A generator's normal draws may change with numpy; its raw words do not.
-"""
+"""Normal numbers that depend on nothing but their key: random words, and Box and Muller's way."""
 
 import math
 
@@ -9,20 +6,17 @@ import numpy as np
 
 from controller_node.planner.compiled.decorator import compiled
 from msgs_config.arrays import FloatArray
+from msgs_config.random_words import random_words
 
 _STEP = 2.0**-53
-_MASK = 2**64 - 1
 
 
 def normal_draws(key: tuple[int, int], counter: tuple[int, int], count: int) -> FloatArray:
     """Standard normal numbers (count,) of a key and a counter.
 
-    Source: Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3" (Philox); Box and
-    Muller 1958, "A Note on the Generation of Random Normal Deviates".
+    Source: Box and Muller 1958, "A Note on the Generation of Random Normal Deviates".
     """
-    words = [word & _MASK for word in (0, 0, *counter)]
-    generator = np.random.Philox(counter=words, key=[word & _MASK for word in key])
-    raw = generator.random_raw(count + count % 2)
+    raw = random_words(key, (0, 0, *counter), count + count % 2)
     return _normal((raw >> np.uint64(11)).astype(float))[:count]
 
 

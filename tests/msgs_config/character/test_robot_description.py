@@ -312,7 +312,10 @@ def test_the_description_has_the_humanoids_masses() -> None:
         assert inertial.mass == link.mass
         tensor = inertial.inertia
         assert (tensor.ixx, tensor.iyy, tensor.izz) == link.inertia_diagonal
-    assert {link.name for link in robot.links if link.inertial is None} == {"base_link"} | {
+    sensors = {sensor.name for sensor in whole.sensors}
+    assert {link.name for link in robot.links if link.inertial is None} == {
+        "base_link"
+    } | sensors | {
         f"{name}_{angle}"
         for name in whole.layout.actuated_joint_names
         if whole.layout.joint(name).type is JointType.SPHERICAL

@@ -1,0 +1,70 @@
+"""The publishers of a character's sensors, for controllers that know no more than a robot does."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+from msgs_config.character.sensors import SensorType
+from msgs_config.messages import topics
+from msgs_config.messages.cdr import DoublesEncoder
+from msgs_config.messages.topics import Outgoing
+from sim_node.node_settings import NodeSettings
+from sim_node.physics.sensors import SensorReader, make_readers
+from sim_node.physics.simulated_character import SimulatedCharacter
+
+_NO_WRENCH = np.zeros(6)
+
+
+class _SensorPublisher(NamedTuple):
+    """One sensor's reader and publisher."""
+
+    reader: SensorReader
+    publisher: Publisher
+    encoder: DoublesEncoder
+    reads_contacts: bool
+
+
+class SensorPublishers:
+    """Publishes the readings of the sensors that have subscribers; nothing is read for others."""
+
+    def __init__(self, node: Node, character: SimulatedCharacter, settings: NodeSettings) -> None:
+        """Offer a topic for each sensor, below the character's name."""
+        self._character, self._clock = character, settings.clock
+        self._sensors = []
+        for sensor, reader in make_readers(character, settings.sensing):
+            topic = topics.sensor_reading(sensor.type, sensor.name).under(character.setup.name)
+            self._sensors.append(
+                _SensorPublisher(
+                    reader,
+                    topics.create_publisher(node, topic),
+                    DoublesEncoder(character.setup.prefix + sensor.name),
+                    sensor.type is SensorType.FORCE,
+                )
+            )
+
+    @property
+    def wants_contacts(self) -> bool:
+        """Whether a force sensor has subscribers."""
+        for each in self._sensors:
+            if each.reads_contacts and topics.has_subscribers(each.publisher):
+                return True
+        return False
+
+    def messages(self) -> Iterator[Outgoing]:
+        """The readings of a tick, which are the same whenever they are asked for.
+
+        A force whose sensor had no subscribers during the tick is not known, and zero.
+        """
+        stamp_ns = self._character.state.stamp_ns
+        for reader, publisher, encoder, _ in self._sensors:
+            if topics.has_subscribers(publisher):
+                values = reader.read(self._clock.tick(stamp_ns))
+                yield publisher, encoder.encode(stamp_ns, _NO_WRENCH if values is None else values)
+
+    @property
+    def publishers(self) -> list[Publisher]:
+        """The publishers of all sensors."""
+        return [each.publisher for each in self._sensors]

@@ -1,0 +1,168 @@
+"""What the sensors of a character read: IMUs by its states, force sensors by its contacts.
+
+Readings are functions of the last two states, the contacts between them and the tick, so they do
+not depend on whether a sensor was read before. The engine knows no accelerations: that of an IMU is
+the difference between its velocities in the last two states, over the tick.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.sensors import Noise, Sensor, SensorType
+from msgs_config.geometry import frames
+from msgs_config.messages.state import StampedState
+from sim_node.physics.link_motion import AT_REST, LinkKinematics, Motion
+from sim_node.physics.sensor_noise import NoiseSource
+from sim_node.physics.simulated_character import SimulatedCharacter
+
+_IMU_DOUBLES = 37  # of sensor_msgs/Imu: orientation, rate and acceleration, a covariance after each
+_ORIENTATION, _ANGULAR_VELOCITY, _ACCELERATION = slice(0, 4), slice(13, 16), slice(25, 28)
+_COVARIANCES = {"orientation": 4, "angular_velocity": 16, "linear_acceleration": 28}
+_DIAGONAL = 4  # entries of a covariance from one variance to the next
+_UNKNOWN = -1.0  # first entry of a covariance: the quantity before it is not measured
+
+
+@dataclass(frozen=True)
+class SensingSettings:
+    """What readings depend on beside states, contacts and the sensor itself."""
+
+    tick_s: float
+    gravity: float  # m/s^2, along -z
+    seed: int  # of the noise
+
+
+class SensorReader:
+    """Reads one sensor of a character. See `ImuReader` and `ForceReader`."""
+
+    def __init__(
+        self, character: SimulatedCharacter, sensor: Sensor, settings: SensingSettings
+    ) -> None:
+        """Find the sensor's link, and make the sources of its noise."""
+        self._character, self._sensor, self._settings = character, sensor, settings
+        self._kinematics = LinkKinematics(character.character, sensor.link)
+        self._axes = frames.axes(sensor.orientation_xyzw)  # of the sensor, in the link
+        name = f"{character.setup.prefix}{sensor.name}"
+        self._noise = {
+            quantity: NoiseSource(noise, settings.seed, f"{name}.{quantity}", settings.tick_s)
+            for quantity, noise in sensor.noise.items()
+        }
+
+    def read(self, tick: int) -> FloatArray | None:
+        """All doubles of the sensor's message at a tick; None if it has nothing to say."""
+        raise NotImplementedError
+
+    def _with_noise(self, quantity: str, value: frames.Triple, tick: int) -> frames.Triple:
+        if quantity not in self._noise:
+            return value
+        (x, y, z), (dx, dy, dz) = value, self._noise[quantity].at(tick)
+        return (x + dx, y + dy, z + dz)
+
+
+class ImuReader(SensorReader):
+    """Orientation, angular velocity and specific force of a frame, for `sensor_msgs/Imu`.
+
+    The specific force of a state at t is `R^-1 ((v(t) - v(t - h)) / h - g)` with the frame's
+    orientation R at t, the velocity v of its origin in the world, and a tick's length h: the mean
+    over the tick before, so that `v` is the sum of what is measured. At rest it is `g` upwards. In
+    an episode's first state there is none: zeros, and -1 for the covariance's first entry.
+
+    Source: REP 145, "Conventions for IMU Sensor Drivers".
+    """
+
+    def __init__(
+        self, character: SimulatedCharacter, sensor: Sensor, settings: SensingSettings
+    ) -> None:
+        """Fill in the covariances: the variances of the white noise, or zeros for unknown."""
+        super().__init__(character, sensor, settings)
+        self._doubles = np.zeros(_IMU_DOUBLES)
+        for quantity, start in _COVARIANCES.items():
+            deviations = np.array(sensor.noise.get(quantity, Noise()).stddev)
+            self._doubles[start : start + 9 : _DIAGONAL] = deviations * deviations
+        self._last: tuple[StampedState | None, Motion] = (None, AT_REST)
+        self._first_variance = self._doubles[_COVARIANCES["linear_acceleration"]]
+
+    def read(self, tick: int) -> FloatArray:
+        """The doubles (37,) of the message."""
+        state, before = self._character.state, self._character.before
+        motion = self._motion(state)
+        turn, force, variance = motion.turn_xyzw, (0.0, 0.0, 0.0), _UNKNOWN
+        if before is not None:
+            (vx, vy, vz), (ux, uy, uz) = motion.velocity, self._motion(before).velocity
+            h, gravity = self._settings.tick_s, self._settings.gravity
+            in_world = ((vx - ux) / h, (vy - uy) / h, (vz - uz) / h + gravity)
+            force = frames.to_child(frames.axes(turn), in_world)
+            force = self._with_noise("linear_acceleration", force, tick)
+            variance = self._first_variance
+        if "orientation" in self._noise:
+            turn = frames.product(turn, frames.quaternion(self._noise["orientation"].at(tick)))
+        self._last = (state, motion)
+        doubles = self._doubles
+        doubles[_ORIENTATION] = turn
+        doubles[_ANGULAR_VELOCITY] = self._with_noise(
+            "angular_velocity", motion.angular_velocity, tick
+        )
+        doubles[_ACCELERATION] = force
+        doubles[_COVARIANCES["linear_acceleration"]] = variance
+        return doubles
+
+    def _motion(self, state: StampedState) -> Motion:
+        """The motion of the sensor's frame in a state."""
+        read_state, motion = self._last
+        if read_state is not state:  # mostly that before was the present one a tick ago
+            link = self._kinematics.motion(state.position.tolist(), state.velocity.tolist())
+            motion = link.at(self._sensor.position, self._sensor.orientation_xyzw)
+        return motion
+
+
+class ForceReader(SensorReader):
+    """Force and torque of all contacts on a link, in the sensor's frame and about its origin.
+
+    It is what the surroundings do to the link: a foot that stands is pressed upwards. The mean over
+    the tick before, turned into the frame by the link's orientation in the present state.
+    """
+
+    def __init__(
+        self, character: SimulatedCharacter, sensor: Sensor, settings: SensingSettings
+    ) -> None:
+        """Find the link's centre of mass, about which contacts are known."""
+        super().__init__(character, sensor, settings)
+        links = character.character.links
+        self._link = [link.name for link in links].index(sensor.link)
+        (x, y, z), (cx, cy, cz) = sensor.position, links[self._link].inertial_pose.position
+        self._arm = (cx - x, cy - y, cz - z)  # from the sensor to the centre, link frame
+
+    def read(self, tick: int) -> FloatArray | None:
+        """Force and torque (6,), N and N m; None if contacts were not watched in the tick."""
+        contacts, state = self._character.contacts, self._character.state
+        if contacts is None:
+            return None
+        force = torque = (0.0, 0.0, 0.0)
+        if contacts.touching[self._link]:
+            fx, fy, fz, *moment = contacts.wrenches[self._link].tolist()
+            link = frames.axes(self._kinematics.orientation(state.position.tolist()))
+            force_in_link = frames.to_child(link, (fx, fy, fz))
+            x, y, z = frames.to_child(link, moment)
+            ax, ay, az = frames.cross(self._arm, force_in_link)
+            force = frames.to_child(self._axes, force_in_link)
+            torque = frames.to_child(self._axes, (x + ax, y + ay, z + az))
+        force = self._with_noise("force", force, tick)
+        return np.array((*force, *self._with_noise("torque", torque, tick)))
+
+
+_READERS: dict[SensorType, type[SensorReader]] = {
+    SensorType.IMU: ImuReader,
+    SensorType.FORCE: ForceReader,
+}
+
+
+def make_readers(
+    character: SimulatedCharacter, settings: SensingSettings
+) -> Sequence[tuple[Sensor, SensorReader]]:
+    """The sensors of a character, each with what reads it."""
+    return [
+        (sensor, _READERS[sensor.type](character, sensor, settings))
+        for sensor in character.character.sensors
+    ]
