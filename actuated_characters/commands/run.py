@@ -229,9 +229,10 @@ def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
     if options.exclude:
         from actuated_characters.recorder.topics import EXCLUDABLE
 
+        known = [*EXCLUDABLE, *(sensor.topic for sensor in plan.character.sensors)]
         for name in options.exclude:
-            if not {name, name.removeprefix("/")} & set(EXCLUDABLE):
-                raise ConfigurationError(one_of("topic to --exclude:", name, EXCLUDABLE))
+            if not {name, name.removeprefix("/")} & set(known):
+                raise ConfigurationError(one_of("topic to --exclude:", name, known))
 
 
 def _run_plan(

@@ -28,6 +28,7 @@ from actuated_characters.recorder.topics import (
     NamedTopics,
     RecordedTopic,
     contract_topics,
+    sensor_topics,
     simulator_name,
 )
 from actuated_characters.runs.run_directory import BAG, metrics_directory, write_metrics
@@ -66,6 +67,12 @@ PARAMETERS = [
         choices=LOG_TIMES,
     ),
     Parameter("topics", [], "names of topics to record beside those of the contract", texts=True),
+    Parameter(
+        "sensors",
+        [],
+        "topics of sensors to record, such as imu/NAME; `run` gives those of its character",
+        texts=True,
+    ),
     Parameter("exclude", [], "names of topics of the contract not to record", texts=True),
     SESSION,
     Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
@@ -100,6 +107,9 @@ class RecorderNode(Node):
         wanted = contract_topics(
             self, characters, values.texts("exclude"), measured_only=not values.flag("write_bag")
         )
+        if values.flag("write_bag"):
+            # first: the simulator begins when its states have all their subscribers
+            wanted = sensor_topics(self, values.texts("sensors")) + wanted
         names = values.texts("topics")
         self._named = NamedTopics(self, names, {recorded.name for recorded in wanted})
         self._collectors = {

@@ -11,6 +11,7 @@ from rclpy.validate_topic_name import validate_topic_name
 
 from actuated_characters.bags.format.definitions import find_message_type
 from actuated_characters.metrics.collector import HEARD
+from msgs_config.character.sensors import SensorType
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.topics import Topic
@@ -101,6 +102,27 @@ def contract_topics(
         for each in found
         if each not in left_out and (each.own_name in HEARD or not measured_only)
     ]
+
+
+def sensor_topics(node: Node, names: Sequence[str]) -> list[RecordedTopic]:
+    """The topics of sensors, by their names below the recorder's namespace.
+
+    Raises:
+        ConfigurationError: a name is not one that a sensor's topic can have.
+    """
+    _check_names("sensors", names)
+    types = {each.value: each for each in SensorType}
+    found = []
+    for name in names:
+        kind = name.split("/")[-2:-1]
+        if not (kind and kind[0] in types):
+            raise ConfigurationError(
+                f"parameter 'sensors' has {name!r}; it must be the topic of a sensor, such as "
+                f"{' or '.join(f'{each}/NAME' for each in types)}"
+            )
+        topic = topics.sensor_reading(types[kind[0]], name)
+        found.append(RecordedTopic(topic, node.resolve_topic_name(name), name, None))
+    return found
 
 
 def simulator_name(node: Node, character: str) -> str:

@@ -60,6 +60,11 @@ class Sensor:
     noise: dict[str, Noise] = field(default_factory=dict)
     """By the measured quantity; those without noise are left out."""
 
+    @property
+    def topic(self) -> str:
+        """Name of the topic of its readings, below the character's."""
+        return f"{self.type.value}/{self.name}"
+
 
 def read_sensors(reader: MappingReader) -> tuple[Sensor, ...]:
     """The sensors in the mapping under the key `sensors` of a character's file.

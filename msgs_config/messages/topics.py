@@ -160,8 +160,8 @@ _SENSOR_MESSAGES = {SensorType.IMU: Imu, SensorType.FORCE: WrenchStamped}
 
 
 def sensor_reading(sensor_type: SensorType, name: str) -> Topic:
-    """The topic of a sensor's readings, of its name below that of its type."""
-    return Topic(f"{sensor_type.value}/{name}", _SENSOR_MESSAGES[sensor_type], STREAM_QOS)
+    """The topic of a sensor's readings; `name` is that of `Sensor.topic`."""
+    return Topic(name, _SENSOR_MESSAGES[sensor_type], STREAM_QOS)
 
 
 SIM_NODE = "sim_node"

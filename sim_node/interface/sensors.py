@@ -35,7 +35,7 @@ class SensorPublishers:
         self._character, self._clock = character, settings.clock
         self._sensors = []
         for sensor, reader in make_readers(character, settings.sensing):
-            topic = topics.sensor_reading(sensor.type, sensor.name).under(character.setup.name)
+            topic = topics.sensor_reading(sensor.type, sensor.topic).under(character.setup.name)
             self._sensors.append(
                 _SensorPublisher(
                     reader,

@@ -21,10 +21,14 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.recording import read_recording
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder
+from msgs_config.messages.state import StampedState
 from msgs_config.messages.topics import Topic
 from msgs_config.runtime.polling import DirectSubscription
+from sim_node.physics.sensors import SensingSettings, make_readers
+from tests.support.physics import simulation
 from tests.support.ros import Client, Process, Processes, SimulatorClient, tick_of, wait_until
 
 pytestmark = pytest.mark.slow
@@ -118,6 +122,46 @@ def test_a_run_stores_and_compresses_its_bag_as_it_is_told(
     states = read_messages(tmp_path / "run" / "bag", ["/joint_states"])
     ticks = dict.fromkeys(tick_of(message.decode()) for message in states)
     assert list(ticks) == list(range(1, TICKS + 2))
+
+
+def test_a_run_records_the_sensors_and_the_states_alone_give_the_same_readings(
+    processes: Processes, tmp_path: Path
+) -> None:
+    command = ("run", "--character", "humanoid", "--duration", "0.5", "--output", "run")
+    run = processes.command(*command, "--exclude", "force/left_sole")
+
+    assert run.wait(120.0) == 0, run.stderr
+
+    # Arrange: the states in the bag, one after the other
+    bag, ticks = tmp_path / "run" / "bag", list(range(1, 122))
+    recording, simulated = read_recording(bag), simulation("humanoid").simulated
+    readers = {
+        sensor.topic: reader
+        for sensor, reader in make_readers(simulated, SensingSettings(1.0 / 240.0, 9.81, 0))
+    }
+    expected, before = [], None
+    for stamp, position, velocity in zip(
+        recording.stamps_ns.tolist(), recording.position, recording.velocity, strict=True
+    ):
+        simulated.state, simulated.before = StampedState(stamp, position, velocity, None), before
+        before = simulated.state
+        expected.append(readers["imu/pelvis_imu"].read(0).tobytes())
+
+    # Act
+    found: dict[str, dict[int, bytes]] = {}
+    for message in read_messages(bag):
+        if message.topic.startswith(("/imu/", "/force/")):
+            found.setdefault(message.topic, {})[tick_of(message.decode())] = message.raw
+
+    # Assert
+    assert {topic: sorted(of_topic) for topic, of_topic in found.items()} == {
+        "/imu/pelvis_imu": ticks,
+        "/force/right_sole": ticks,
+    }
+    recorded = [found["/imu/pelvis_imu"][tick][-37 * 8 :] for tick in ticks]
+    assert recorded == expected
+    replayed = processes.command("replay", "run")
+    assert replayed.wait(120.0) == 0, replayed.stderr
 
 
 # What is lost, and what is not

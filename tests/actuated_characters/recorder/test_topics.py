@@ -172,7 +172,8 @@ def test_a_run_records_every_topic_of_the_contract(fall: Path) -> None:
     content = yaml.safe_load((fall / "metadata.yaml").read_text())
     listed = content["rosbag2_bagfile_information"]["topics_with_message_count"]
 
-    assert {topic["topic_metadata"]["name"] for topic in listed} == contract()
+    sensors = {f"/{sensor.topic}" for sensor in character("humanoid").sensors}
+    assert {topic["topic_metadata"]["name"] for topic in listed} == contract() | sensors
 
 
 def test_every_tick_of_every_stream_is_recorded(fall: Path) -> None:
@@ -278,6 +279,7 @@ def test_topics_by_name_are_recorded_as_their_publishers_offer_them(
         ({"characters": ["left", "left"]}, ["'characters'", "'left' twice"]),
         ({"exclude": ["contcts"]}, ["'exclude'", "did you mean 'contacts'"]),
         ({"exclude": ["joint_states"]}, ["'exclude'", "'joint_states'"]),
+        ({"sensors": ["pelvis_imu"]}, ["'sensors'", "'pelvis_imu'", "imu/NAME or force/NAME"]),
         ({"storage": "tape"}, ["'storage'", "'tape'", "mcap, sqlite3"]),
         ({"compression": "zip"}, ["'compression'", "'zip'", "none, zstd"]),
         ({"log_time": "sim"}, ["'log_time'", "'sim'", "wall, simulated"]),

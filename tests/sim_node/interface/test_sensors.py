@@ -27,7 +27,7 @@ from tests.support.ros import (
 SETTINGS = SensingSettings(1.0 / 240.0, 9.81, 0)
 IMU, SOLE = (
     topics.sensor_reading(*each)
-    for each in ((SensorType.IMU, "pelvis_imu"), (SensorType.FORCE, "left_sole"))
+    for each in ((SensorType.IMU, "imu/pelvis_imu"), (SensorType.FORCE, "force/left_sole"))
 )
 NOISY = """
 urdf: package://pybullet_data/humanoid/humanoid.urdf
@@ -49,7 +49,7 @@ sensors:
 """
 NOISY_TOPICS = [
     topics.sensor_reading(*each)
-    for each in ((SensorType.IMU, "noisy"), (SensorType.FORCE, "scale"))
+    for each in ((SensorType.IMU, "imu/noisy"), (SensorType.FORCE, "force/scale"))
 ]
 
 
