@@ -13,10 +13,12 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from msgs_config.arrays import FloatArray
+from msgs_config.character.sensors import SensorType
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
+from msgs_config.messages.clock import TickClock
 from tests.support import physics
-from tests.support.ros import Processes, SimulatorClient, tick_of, wait_until
+from tests.support.ros import Processes, SimulatorClient, tick_of, wait_until, wrench_message
 
 pytestmark = pytest.mark.slow
 
@@ -27,6 +29,7 @@ INTERRUPTIBLE = {
     "two_controllers": ("--part", "arms"),
     "push": ("--link", "rod", "--force", "1", "0", "0"),
     "step_response": (),
+    "balance": (),
 }
 MAY_IMPORT = {"numpy", "rclpy", "sensor_msgs", "geometry_msgs"} | set(sys.stdlib_module_names)
 LONG = 120.0  # s that a thousand ticks of three processes may take on a busy machine
@@ -193,6 +196,42 @@ def centre_of_mass(state: JointState) -> tuple[FloatArray, FloatArray]:
         linear, _ = physics.momentum(world.body, humanoid)
     weighted = sum(motion.mass * motion.centre for motion in motions)
     return weighted / humanoid.mass, linear / humanoid.mass
+
+
+def test_the_humanoid_balances_by_its_sensors_and_bears_pushes(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    # Arrange: 20 s, with a push of 7 N s forward, one to the left and one backward
+    imu = client.listen(topics.sensor_reading(SensorType.IMU, "imu/pelvis_imu"))
+    rate, seconds, period = 1000, 20, 4
+    simulator = processes.simulator(
+        "humanoid", rate=rate, max_ticks=rate * seconds, wait_for_subscribers=2
+    )
+    client.spin_until(client.wrenches.get_subscription_count, "a simulator that listens")
+    for number, force in enumerate(([70.0, 0.0, 0.0], [0.0, 70.0, 0.0], [-70.0, 0.0, 0.0])):
+        stamp = TickClock(rate).stamp_ns(rate * period * (number + 1))
+        client.wrenches.publish(wrench_message(stamp, [("chest", [*force, 0.0, 0.0, 0.0])]))
+
+    # Act
+    processes.python(example("balance"))
+    last = client.spin_until(
+        lambda: (
+            client.states.messages
+            and tick_of(client.states.last, rate) == rate * seconds + 1
+            and client.states.last
+        ),
+        "the last state",
+        2 * LONG,
+    )
+    assert simulator.wait() == 0
+
+    # Assert
+    names = list(last.name)
+    heights = [state.position[names.index("root_z")] for state in client.states.messages]
+    assert min(heights) > 0.86  # it begins at 0.882
+    assert np.abs(last.velocity).max() < 0.2
+    rates = [abs(message.angular_velocity.y) for message in imu.messages]
+    assert max(rates) > 0.1  # the pushes were felt
 
 
 def test_a_push_is_applied_when_and_as_it_was_sent_and_says_so(
