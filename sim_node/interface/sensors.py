@@ -33,6 +33,8 @@ class SensorPublishers:
     def __init__(self, node: Node, character: SimulatedCharacter, settings: NodeSettings) -> None:
         """Offer a topic for each sensor, below the character's name."""
         self._character, self._clock = character, settings.clock
+        self.wants_contacts = False
+        """Whether a force sensor had subscribers when the readings were published last."""
         self._sensors = []
         for sensor, reader in make_readers(character, settings.sensing):
             topic = topics.sensor_reading(sensor.type, sensor.topic).under(character.setup.name)
@@ -45,22 +47,16 @@ class SensorPublishers:
                 )
             )
 
-    @property
-    def wants_contacts(self) -> bool:
-        """Whether a force sensor has subscribers."""
-        for each in self._sensors:
-            if each.reads_contacts and topics.has_subscribers(each.publisher):
-                return True
-        return False
-
     def messages(self) -> Iterator[Outgoing]:
         """The readings of a tick, which are the same whenever they are asked for.
 
         A force whose sensor had no subscribers during the tick is not known, and zero.
         """
         stamp_ns = self._character.state.stamp_ns
-        for reader, publisher, encoder, _ in self._sensors:
+        self.wants_contacts = False
+        for reader, publisher, encoder, reads_contacts in self._sensors:
             if topics.has_subscribers(publisher):
+                self.wants_contacts |= reads_contacts
                 values = reader.read(self._clock.tick(stamp_ns))
                 yield publisher, encoder.encode(stamp_ns, _NO_WRENCH if values is None else values)
 

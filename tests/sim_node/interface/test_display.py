@@ -100,6 +100,7 @@ def test_the_tree_is_that_of_rep_105_and_fixed_joints_are_static(
     assert frames.parents["base_link"] == {"odom"}
     assert frames.parents["odom"] == {"world"}
     assert {"odom", "base", "right_wrist", "left_wrist"} <= frames.static.keys()
+    assert {"pelvis_imu", "left_sole", "right_sole"} <= frames.static.keys()  # its sensors
     assert "base_link" in frames.moving[stamp]
     # standing, the base has the world's axes: z up, x forward
     base = frames.in_frame("base_link", "odom", stamp)
