@@ -18,10 +18,10 @@ from actuated_characters.replay.players.controller_parameters import parameter_c
 from actuated_characters.replay.players.processes import ANSWER_TIMEOUT, PlayerReport
 from actuated_characters.replay.players.simulator_outputs import (
     REQUESTS,
-    TICK_TOPICS,
     SessionRewriter,
     read_rare_messages,
     read_ticks,
+    tick_topics,
 )
 from msgs_config.errors import MessageError, RecordingError, RunError
 from msgs_config.messages import topics
@@ -95,8 +95,9 @@ class RecordedSimulator(Node):
 
     def _open_topics(self) -> None:
         rare = (topics.CONFIGURATION, topics.EPISODE)
+        of_ticks = tick_topics(self._recording)
         self._outputs = {
-            topic.name: topics.create_publisher(self, topic) for topic in (*rare, *TICK_TOPICS)
+            topic.name: topics.create_publisher(self, topic) for topic in (*rare, *of_ticks)
         }
         self._clock_topic = topics.create_publisher(self, topics.CLOCK)
         self._requests = {
@@ -161,14 +162,14 @@ class RecordedSimulator(Node):
             self._publish(topics.EPISODE, self._rare.episodes[row])
         stamp_ns = int(self._recording.stamps_ns[row])
         self._clock_topic.publish(encode_clock(stamp_ns))
-        *_, raw_state = [self._publish(topic, raw) for topic, raw in messages]
+        sent = [(topic.name, self._publish(topic, raw)) for topic, raw in messages]
         if is_answered:  # else it was not answered then either, or the answer not recorded
-            self._wait_for_answer(row, stamp_ns, raw_state)
+            self._wait_for_answer(row, stamp_ns, sent)
             for change in self._changes.get(row, ()):
                 self._set(change)
 
-    def _wait_for_answer(self, row: int, stamp_ns: int, raw_state: bytes) -> None:
-        """Take commands until they cover what was commanded; the state is sent again meanwhile.
+    def _wait_for_answer(self, row: int, stamp_ns: int, sent: list[tuple[str, bytes]]) -> None:
+        """Take commands until they cover what was commanded; `sent` is sent again meanwhile.
 
         A controller that was started for this answers at once with all that it has.
         """
@@ -188,7 +189,8 @@ class RecordedSimulator(Node):
                     return True
             if time.monotonic() > next_time:
                 next_time = time.monotonic() + _REPUBLISH_PERIOD
-                self._outputs[topics.JOINT_STATES.name].publish(raw_state)
+                for name, raw in sent:
+                    self._outputs[name].publish(raw)
             return False
 
         self._wait(

@@ -25,8 +25,7 @@ from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Topic
 from msgs_config.messages.wrenches import decode_wrenches, encode_wrenches
 
-TICK_TOPICS = (topics.CONTACTS, topics.APPLIED_WRENCH, topics.ODOM, topics.JOINT_STATES)
-"""What the simulator publishes at each tick; its state is the last."""
+_TICK_TOPICS = (topics.CONTACTS, topics.APPLIED_WRENCH, topics.ODOM, topics.JOINT_STATES)
 
 REQUESTS = tuple(
     topic.of(topics.CONTROLLER_NODE) for topic in (topics.JOINT_TRAJECTORY, topics.STRENGTH)
@@ -86,13 +85,19 @@ class SessionRewriter:
         return raw
 
 
+def tick_topics(recording: Recording) -> list[Topic]:
+    """What the simulator publishes at each tick; its state is the last."""
+    sensors = recording.character.sensors
+    return [*(topics.sensor_reading(each.type, each.topic) for each in sensors), *_TICK_TOPICS]
+
+
 def read_ticks(path: Path, recording: Recording) -> Iterator[list[tuple[Topic, bytes]]]:
     """The messages of each tick of a recording in order, each tick once, its state at the end.
 
     Raises:
         RecordingError: the bag cannot be read, or has become another one.
     """
-    found = {_name(recording, topic): topic for topic in TICK_TOPICS}
+    found = {_name(recording, topic): topic for topic in tick_topics(recording)}
     decoder, row, messages = JointStateDecoder(), 0, list[tuple[Topic, bytes]]()
     for message in read_messages(find_bag(path)):
         if row == len(recording.stamps_ns):

@@ -524,6 +524,24 @@ def test_somebodys_own_controller_is_waited_for_and_compared(
     assert "identical: the commands that answer" in process.stdout
 
 
+def test_a_controller_that_needs_sensors_is_played_their_readings(
+    folder: Path, processes: Processes
+) -> None:
+    sensors = [sensor.topic for sensor in character("humanoid").sensors]
+    with recorded(folder / "balance", sensors=sensors) as together:
+        simulator = together.simulator("humanoid", rate=1000, max_ticks=300, wait_for_subscribers=2)
+        balance = together.python(str(EXAMPLE.with_name("balance.py")))
+        assert simulator.wait(120.0) == 0
+        balance.end()
+
+    options = ["--through-topics", "simulator", "--no-start"]
+    process = processes.command("replay", str(folder / "balance" / "run"), *options)
+    processes.python(str(EXAMPLE.with_name("balance.py")))
+
+    assert process.wait(120.0) == 0, process.stderr
+    assert "identical: the commands that answer" in process.stdout
+
+
 def with_a_request(bag: Path, target: Path) -> Path:
     """A copy of a bag with a trajectory that somebody asked for, in place of the contacts."""
     requests = iter([serialize_message(JointTrajectory())])
