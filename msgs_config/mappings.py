@@ -86,12 +86,18 @@ class MappingReader:
             raise self.wrong(key, value, "true or false")
         return value
 
-    def number(self, key: str, default: float | None = None, minimum: float = -LARGEST) -> float:
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        minimum: float = -LARGEST,
+        maximum: float = LARGEST,
+    ) -> float:
         """A finite number; without a default it must be there."""
         value: Any = self.content.get(key, default)
-        if _is_number(value, minimum, LARGEST):
+        if _is_number(value, minimum, maximum):
             return float(value)
-        raise self.wrong(key, value, f"a finite number{_say_bounds(minimum, LARGEST)}")
+        raise self.wrong(key, value, f"a finite number{_say_bounds(minimum, maximum)}")
 
     def numbers(
         self,

@@ -1,5 +1,6 @@
 """The sensors of a character as its YAML file names them: what, where, and how noisy."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -8,10 +9,13 @@ from pathlib import Path
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.geometry import frames
 from msgs_config.geometry.rotations import IDENTITY_XYZW
-from msgs_config.mappings import LARGEST, MappingReader
+from msgs_config.mappings import MappingReader
 
 _NONE: frames.Triple = (0.0, 0.0, 0.0)
 _WORLD = "world"  # a frame that is there for every character
+_FARTHEST = 1e3  # m from the link's origin
+_LARGEST_ANGLE = 2.0 * math.pi  # rad; degrees are mostly more
+_LARGEST_NOISE = 1e9  # in any unit; its square is a number, too
 _MOST_LETTERS = 64
 _SENSOR_KEYS = ("link", "xyz", "rpy", "noise")
 _NOISE_KEYS = ("stddev", "bias", "bias_stddev", "bias_walk")
@@ -114,8 +118,10 @@ def _read_type(reader: MappingReader, sensor_type: SensorType) -> Iterator[Senso
             name,
             sensor_type,
             each.text("link"),
-            _vector(each.numbers("xyz", 3, default=[0.0] * 3)),
-            frames.of_roll_pitch_yaw(each.numbers("rpy", 3, default=[0.0] * 3)),
+            _vector(each.numbers("xyz", 3, (-_FARTHEST, _FARTHEST), [0.0] * 3)),
+            frames.of_roll_pitch_yaw(
+                each.numbers("rpy", 3, (-_LARGEST_ANGLE, _LARGEST_ANGLE), [0.0] * 3)
+            ),
             {key: value for key, value in read.items() if value},
         )
 
@@ -127,10 +133,10 @@ def _read_noise(reader: MappingReader) -> Noise:
 
 def _per_axis(reader: MappingReader, key: str) -> frames.Triple:
     """A number for each axis: a list of three, or one for all; a deviation is not negative."""
-    least = -LARGEST if key == "bias" else 0.0
+    bounds = (-_LARGEST_NOISE if key == "bias" else 0.0, _LARGEST_NOISE)
     if isinstance(reader.content[key], list):
-        return _vector(reader.numbers(key, 3, (least, LARGEST)))
-    return (reader.number(key, minimum=least),) * 3
+        return _vector(reader.numbers(key, 3, bounds))
+    return (reader.number(key, minimum=bounds[0], maximum=bounds[1]),) * 3
 
 
 def _vector(numbers: tuple[float, ...]) -> frames.Triple:

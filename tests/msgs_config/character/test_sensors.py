@@ -97,6 +97,18 @@ WRONG = {
     "an unknown key": (sensors("a: {link: base, xyx: 1}"), ["sensors.imu.a.xyx", "'xyz'"]),
     "a wrong place": (sensors("a: {link: base, xyz: [1, 2]}"), ["sensors.imu.a.xyz", "3 finite"]),
     "a wrong turn": (sensors("a: {link: base, rpy: 1}"), ["sensors.imu.a.rpy", "3 finite"]),
+    "a turn in degrees": (
+        sensors("a: {link: base, rpy: [-90, 0, 0]}"),
+        ["sensors.imu.a.rpy", "from -6.28319 to 6.28319"],
+    ),
+    "a place beyond all numbers": (
+        sensors("a: {link: base, xyz: [1e300, 0, 0]}"),
+        ["sensors.imu.a.xyz", "from -1000 to 1000"],
+    ),
+    "noise beyond all numbers": (
+        sensors("a: {link: base, noise: {orientation: {stddev: 1e300}}}"),
+        ["noise.orientation.stddev", "from 0 to 1e+09"],
+    ),
     "a name that no topic has": (
         sensors("'le ft': {link: base}"),
         ["sensors.imu.le ft", "letters, digits and underscores"],
@@ -125,7 +137,7 @@ WRONG = {
     ),
     "a negative deviation": (
         sensors("a: {link: base, noise: {orientation: {stddev: -1}}}"),
-        ["noise.orientation.stddev", "-1", "at least 0"],
+        ["noise.orientation.stddev", "-1", "from 0 to 1e+09"],
     ),
     "a negative deviation of an axis": (
         sensors("a: {link: base, noise: {orientation: {bias_walk: [0, -1, 0]}}}"),
