@@ -31,12 +31,13 @@ if TYPE_CHECKING:  # it takes a second to import
     from controller_node.references.files.reconstructed import FoundWith
 
 _DURATION = 10.0  # s
-_NO_PUSH = "none"
+_NO_PUSH, _ALL = "none", "all"
 _RECORDING = {  # options, and the recorder's parameters
     "storage": "storage",
     "compression": "compression",
     "log_time": "log_time",
     "topic": "topics",
+    "sensor": "sensors",
     "exclude": "exclude",
 }
 
@@ -138,6 +139,7 @@ def _add_recorded(run: argparse.ArgumentParser) -> None:
     )
     for name, about in (
         ("--topic", "record this topic beside those of the simulation"),
+        ("--sensor", f"record this sensor of the character, such as imu/NAME, or {_ALL} of them"),
         ("--exclude", "do not record this topic of the simulation, such as contacts"),
     ):
         run.add_argument(name, action="append", metavar="NAME", help=f"{about}; may be repeated")
@@ -229,10 +231,25 @@ def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
     if options.exclude:
         from actuated_characters.recorder.topics import EXCLUDABLE
 
-        known = [*EXCLUDABLE, *(sensor.topic for sensor in plan.character.sensors)]
         for name in options.exclude:
-            if not {name, name.removeprefix("/")} & set(known):
-                raise ConfigurationError(one_of("topic to --exclude:", name, known))
+            if not {name, name.removeprefix("/")} & set(EXCLUDABLE):
+                raise ConfigurationError(one_of("topic to --exclude:", name, EXCLUDABLE))
+    _recorded_sensors(options, plan)
+
+
+def _recorded_sensors(options: argparse.Namespace, plan: "RunPlan") -> list[str] | None:
+    """The topics of `--sensor`. Raises ConfigurationError if the character has no such sensor."""
+    if options.sensor is None:
+        return None
+    known = [sensor.topic for sensor in plan.character.sensors]
+    if not known:
+        raise ConfigurationError(f"--sensor: character '{plan.character.name}' has no sensors")
+    if _ALL in options.sensor:
+        return known
+    for name in options.sensor:
+        if name not in known:
+            raise ConfigurationError(one_of("--sensor:", name, [*known, _ALL]))
+    return list(options.sensor)
 
 
 def _run_plan(
@@ -260,6 +277,7 @@ def _run_plan(
         )
     else:
         given = {parameter: getattr(options, name) for name, parameter in _RECORDING.items()}
+        given["sensors"] = _recorded_sensors(options, plan)
         run_over_topics(
             plan,
             directory,

@@ -70,7 +70,7 @@ PARAMETERS = [
     Parameter(
         "sensors",
         [],
-        "topics of sensors to record, such as imu/NAME; `run` gives those of its character",
+        "topics of sensors to record, such as imu/NAME",
         texts=True,
     ),
     Parameter("exclude", [], "names of topics of the contract not to record", texts=True),

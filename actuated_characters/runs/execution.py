@@ -63,11 +63,7 @@ def run_over_topics(
         RunError: one of the processes failed, with its own message, or the simulator rejected a
             push or throw.
     """
-    recording = {
-        **_with_sensors(plan, recording),
-        "directory": str(directory),
-        "write_bag": write_bag,
-    }
+    recording = {**recording, "directory": str(directory), "write_bag": write_bag}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
     sent = _write_planned(directory, pushes, throws, recording) if pushes or throws else None
@@ -86,25 +82,6 @@ def run_over_topics(
     for what, planned in (("pushes", pushes), ("throws", throws)):
         if planned and (rejected := recorded[f"rejected_{what}"]):
             raise RunError(f"sim_node rejected {rejected} of {len(planned)} {what}")
-
-
-def _with_sensors(plan: RunPlan, recording: Mapping[str, object]) -> dict[str, object]:
-    """The recorder's parameters with the sensors of the character that are not excluded."""
-    sensors = [sensor.topic for sensor in plan.character.sensors]
-    excluded = {name.removeprefix("/"): name for name in _excluded(recording)}
-    given = {
-        **recording,
-        "sensors": [topic for topic in sensors if topic not in excluded],
-        "exclude": [name for topic, name in excluded.items() if topic not in sensors],
-    }
-    return {name: value for name, value in given.items() if value != []}  # ROS has no such lists
-
-
-def _excluded(recording: Mapping[str, object]) -> list[str]:
-    """Names of topics that are not to be recorded."""
-    excluded = recording.get("exclude", ())
-    assert isinstance(excluded, Collection)
-    return list(map(str, excluded))
 
 
 def _start_loop(
@@ -139,7 +116,9 @@ def _write_planned(
 
     It waits for the simulator, and for a recorder that keeps the topic in a bag.
     """
-    left_out = {name.removeprefix("/") for name in _excluded(recording)}
+    excluded = recording.get("exclude", ())
+    assert isinstance(excluded, Collection)
+    left_out = {str(name).removeprefix("/") for name in excluded}
 
     def subscribers(topic: str) -> int:
         return 2 if recording["write_bag"] and topic not in left_out else 1

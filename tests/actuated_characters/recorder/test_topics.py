@@ -172,8 +172,7 @@ def test_a_run_records_every_topic_of_the_contract(fall: Path) -> None:
     content = yaml.safe_load((fall / "metadata.yaml").read_text())
     listed = content["rosbag2_bagfile_information"]["topics_with_message_count"]
 
-    sensors = {f"/{sensor.topic}" for sensor in character("humanoid").sensors}
-    assert {topic["topic_metadata"]["name"] for topic in listed} == contract() | sensors
+    assert {topic["topic_metadata"]["name"] for topic in listed} == contract()
 
 
 def test_every_tick_of_every_stream_is_recorded(fall: Path) -> None:

@@ -334,6 +334,8 @@ WRONG: list[tuple[str, ...]] = [  # a command, and what its error names
     (f"{PENDULUM} --storage sqlite3 --no-record", "--storage", "--no-record"),
     (f"{PENDULUM} --exclude contcts", "'contcts'", "mean 'contacts'"),
     (f"{PENDULUM} --exclude joint_states", "'joint_states'"),
+    (f"{PENDULUM} --sensor all", "--sensor", "'pendulum' has no sensors"),
+    ("run --sensor imu/pelvis", "--sensor", "'imu/pelvis'", "mean 'imu/pelvis_imu'"),
     (f"{SET} sim_node.rate=240", "sim_node.rate=240", ":="),
     (f"{SET} rate:=240", "write it as NODE.NAME:=VALUE"),
     (
