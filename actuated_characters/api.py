@@ -265,7 +265,7 @@ def run(
     controller: Mapping[str, object] = _NONE,
     **reference: object,
 ) -> dict[str, object]:
-    """Run simulator, controller and recorder as processes over topics.
+    """Run simulator, controller and recorder as processes over topics; returns the figures.
 
     Args:
         character: Name of one that ships, or path of its YAML or URDF file.
@@ -277,9 +277,6 @@ def run(
         simulator: Parameters of `sim_node`, by name.
         controller: Parameters of `controller_node`, by name.
         reference: The motion: `clip`, `keyframes` or `reference`; none: the rest pose.
-
-    Returns:
-        The figures of `summary.json`.
 
     Raises:
         ActuatedCharactersError: a name or a value is wrong, or a process failed.
@@ -295,8 +292,7 @@ def run(
         run_in_process(plan, directory)
     else:
         run_over_topics(plan, directory, write_bag=True, composed=composed)
-    metrics, _ = read_metrics(directory)
-    return metrics
+    return read_metrics(directory)[0]
 
 
 def _drivable(character: Character) -> list[str]:

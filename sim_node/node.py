@@ -13,9 +13,9 @@ from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
-from sim_node.initial_state import as_values, describe_start
+from sim_node.initial_state import as_values
 from sim_node.interface.character_interface import CharacterInterface
-from sim_node.interface.initial_state_topic import InitialStates
+from sim_node.interface.initial_state_topic import InitialStates, log_warnings
 from sim_node.interface.publisher_diagnosis import (
     ConflictLog,
     OtherSimulators,
@@ -27,7 +27,7 @@ from sim_node.interface.services import Services
 from sim_node.interface.simulator_publisher import SimulatorPublisher
 from sim_node.interface.world_interface import WorldInterface
 from sim_node.node_settings import make_node_settings
-from sim_node.parameters import SimulatorParameters, load_parameters
+from sim_node.parameters import load_parameters
 from sim_node.physics.probe import probe_engine
 from sim_node.simulation_factory import make_simulation
 from sim_node.timing.flow_control import FlowControl
@@ -67,8 +67,7 @@ class SimNode(ComposableNode):
             not self._settings.is_realtime,
         )
         self._next_diagnostics = 0.0
-        self._timeouts = 0
-        self._begun = False
+        self._timeouts, self._begun = 0, False
         self._control = RunControl()
         self._run_services = Services(self, self._control, self._resume, self._reset)
         LiveParameters(self, self._loaded.declared, values, self._change_parameters)
@@ -143,17 +142,11 @@ class SimNode(ComposableNode):
             self._simulation.begin_in(states)
             declare(self, self._loaded.open, parameters.values)
         if not self._settings.session:  # else a run has said so
-            self._log_warnings(parameters)
+            log_warnings(self, parameters)
         self._publisher.publish_configurations(parameters, self._samples)
         count = self._settings.wait_for_subscribers
         yield from wait_for_subscribers(self, self._publisher.of_characters, count, stop)
         self._begin_episode()
-
-    def _log_warnings(self, parameters: SimulatorParameters) -> None:
-        """Log likely mistakes in characters' files, and those that begin below the ground."""
-        for each in parameters.characters:
-            for warning in (*each.character.warnings, *describe_start(each.character, each.values)):
-                self.get_logger().warning(f"{each.prefix}{warning}")
 
     def _spin_once(self, executor: PollingExecutor) -> float:
         """Take commands, and advance if the tick is complete and due; the turn's result."""
@@ -303,5 +296,5 @@ class SimNode(ComposableNode):
         values |= self._rate_limiter.summary() | self._world.report()
         fault, warning = self._control.fault, self._rate_limiter.take_warning()
         for each in self._characters:
-            report, name = values | each.report(), each.character.character.name
-            self._diagnostics.publish(report, fault, warning, name, below=each.name)
+            report, hardware = values | each.report(), each.character.character.name
+            self._diagnostics.publish(report, fault, warning, hardware, below=each.name)

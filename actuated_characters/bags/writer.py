@@ -5,7 +5,7 @@ They are of version 9, as ROS 2 Jazzy's `ros2 bag record` writes them; rosbags w
 
 import shutil
 import sqlite3
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -72,13 +72,9 @@ class BagWriter:
             ConfigurationError: There is no such storage, compression or log time.
             RecordingError: `path` exists already or cannot be created.
         """
-        for what, value, choices in (
-            ("storage", storage, STORAGES),
-            ("compression", compression, COMPRESSIONS),
-            ("log time", log_time, LOG_TIMES),
-        ):
-            if value not in choices:
-                raise ConfigurationError(one_of(what, value, list(choices)))
+        _check_choice("storage", storage, STORAGES)
+        _check_choice("compression", compression, COMPRESSIONS)
+        _check_choice("log time", log_time, LOG_TIMES)
         wrong = next((character for character in "?#%" if character in str(path)), None)
         if storage == SQLITE3 and wrong is not None:  # SQLite takes it for a part of a URI
             raise RecordingError(
@@ -229,6 +225,11 @@ class BagWriter:
             raise RecordingError(
                 f"recording {self.path} is incomplete, cannot write: {reason(error)}"
             ) from error
+
+
+def _check_choice(what: str, value: str, choices: Iterable[str]) -> None:
+    if value not in choices:
+        raise ConfigurationError(one_of(what, value, list(choices)))
 
 
 def _offered(qos: QoSProfile) -> Qos:

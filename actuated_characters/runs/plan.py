@@ -74,14 +74,10 @@ def make_plan(
         ActuatedCharactersError: a name or value is wrong; names it and the valid ones.
     """
     simulator_given, controller_given = _shared(simulator_settings, controller_settings)
-    for name, option in _SET_BY_RUN.items():
-        if name in simulator_given or name in controller_given:
-            raise ConfigurationError(f"parameter '{name}' is set by {option}")
     simulator_given["character"] = character_name
     controller_given = {**_with_reference(reference, controller_given), "character": character_name}
-    character = placed(
-        loaded or load_character(character_name, collides(simulator_given)), simulator_given
-    )
+    character = loaded or load_character(character_name, collides(simulator_given))
+    character = placed(character, simulator_given)
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller, motion = _controller_values(character, controller_given)
     commanded = controller_parameters.commanded_joints(character, controller)
@@ -158,6 +154,10 @@ def _check_engines(character: Character, gravity: float) -> None:
 def _shared(
     simulator: Mapping[str, object], controller: Mapping[str, object]
 ) -> tuple[dict[str, object], dict[str, object]]:
+    """Both sides' settings, with those that are the same on both sides; none that the run sets."""
+    for name, option in _SET_BY_RUN.items():
+        if name in simulator or name in controller:
+            raise ConfigurationError(f"parameter '{name}' is set by {option}")
     both = {name: side[name] for side in (controller, simulator) for name in SHARED if name in side}
     for name, value in both.items():
         for side in (simulator, controller):

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -59,25 +60,13 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
     """
     if not collides:
         file = replace(file, loading=replace(file.loading, collisions=False))
-    urdf = file.loading.urdf_path
     robot, missing = resolve_meshes(file.loading)
     repairs = repair_urdf(robot, file.loading)
-    shapes = read_shapes(robot, file.loading)
-    client = connect()
-    try:
-        links = _read_links(client, load_urdf(client, file.loading), file)
-    finally:
-        pybullet.disconnect(client)
-    _check_links(urdf, links)
-    check_links(links, robot, file.loading)
-    links = _sort_depth_first(links)
-    for index, link in enumerate(links):
-        seen, collided = shapes[link.name]
-        links[index] = replace(link, shapes=seen, collision_shapes=collided)
+    links = _load_links(robot, file)
     try:
         layout = JointLayout((link.joint.name, link.joint.type) for link in links)
     except LayoutError as error:
-        raise CharacterError(f"{urdf}: {error}") from error
+        raise CharacterError(f"{file.loading.urdf_path}: {error}") from error
     _check_names(file, layout)
     _check_rest_pose(file, links)
     has_shapes = {link.name: bool(link.collision_shapes) for link in links}
@@ -99,6 +88,22 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         frames=repairs.frames,
     )
     return add_defaults(character, file)
+
+
+def _load_links(robot: ElementTree.Element, file: CharacterFile) -> list[Link]:
+    """The links of a repaired URDF as the engine has them, each subtree in a row, with shapes."""
+    shapes = read_shapes(robot, file.loading)
+    client = connect()
+    try:
+        links = _read_links(client, load_urdf(client, file.loading), file)
+    finally:
+        pybullet.disconnect(client)
+    _check_links(file.loading.urdf_path, links)
+    check_links(links, robot, file.loading)
+    return [
+        replace(link, shapes=shapes[link.name][0], collision_shapes=shapes[link.name][1])
+        for link in _sort_depth_first(links)
+    ]
 
 
 def _read_links(client: int, body: int, file: CharacterFile) -> list[Link]:

@@ -13,7 +13,13 @@ from msgs_config.runtime.composition import UNTIL_A_MESSAGE
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 from msgs_config.runtime.process import StopSignal
-from sim_node.initial_state import GIVEN, INITIAL_STATE, begins_with_reference, check_state
+from sim_node.initial_state import (
+    GIVEN,
+    INITIAL_STATE,
+    begins_with_reference,
+    check_state,
+    describe_start,
+)
 from sim_node.interface.publisher_diagnosis import describe_publishers, publisher_names
 from sim_node.parameters import SimulatorParameters
 from sim_node.physics.simulated_character import SimulatedCharacter
@@ -119,3 +125,10 @@ class _Subscription:
         self._messages.close()
         assert self._state is not None
         return self._state
+
+
+def log_warnings(node: Node, parameters: SimulatorParameters) -> None:
+    """Log likely mistakes in characters' files, and which characters begin below the ground."""
+    for each in parameters.characters:
+        for warning in (*each.character.warnings, *describe_start(each.character, each.values)):
+            node.get_logger().warning(f"{each.prefix}{warning}")
