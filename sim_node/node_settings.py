@@ -6,7 +6,7 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.session import given_session
 from msgs_config.parameters import Values
 from sim_node.frames import FrameNames
-from sim_node.physics.sensors import SensingSettings
+from sim_node.sensors.readers import SensingSettings
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from msgs_config.character.file import (
     read_character_texts,
 )
 from msgs_config.character.loading import build_character
-from msgs_config.character.meshes import check_collision_meshes
+from msgs_config.character.meshes.resolving import check_collision_meshes
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.files import resolve

@@ -20,7 +20,7 @@ from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
 from controller_node.planner.compiled.soft_limits import SoftLimits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import add_links, compile_exactly, quaternion_starts
-from msgs_config.character.mesh_triangles import is_converted, read_vertices
+from msgs_config.character.meshes.triangles import is_converted, read_vertices
 from msgs_config.character.model import Character, Link, Shape, ShapeType
 from msgs_config.geometry import rotations
 

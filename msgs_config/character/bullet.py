@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from msgs_config.character.engine_urdf import write_engine_urdf
 from msgs_config.character.model import UrdfOptions
+from msgs_config.character.urdf.engine_text import write_engine_urdf
 from msgs_config.errors import CharacterError
 
 

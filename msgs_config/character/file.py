@@ -9,8 +9,8 @@ from msgs_config import files
 from msgs_config.character.joint_bounds import write_bounds
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
 from msgs_config.character.sensors import Sensor, read_sensors
-from msgs_config.character.urdf_check import check_urdf
-from msgs_config.character.urdf_frames import has_massless_base
+from msgs_config.character.urdf.check import check_urdf
+from msgs_config.character.urdf.frames import has_massless_base
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.mappings import LARGEST, MappingReader
 

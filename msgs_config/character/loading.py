@@ -17,7 +17,7 @@ from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
 from msgs_config.character.file_defaults import add_defaults
 from msgs_config.character.layout import ROOT, JointLayout, JointType
-from msgs_config.character.meshes import resolve_meshes
+from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import (
     ROOT_TORQUE,
     Character,
@@ -28,8 +28,8 @@ from msgs_config.character.model import (
 )
 from msgs_config.character.sensors import check_sensors
 from msgs_config.character.shapes import read_shapes
-from msgs_config.character.urdf_agreement import check_links
-from msgs_config.character.urdf_repair import repair_urdf
+from msgs_config.character.urdf.comparison import check_links
+from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.geometry import rotations
 

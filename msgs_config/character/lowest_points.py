@@ -6,7 +6,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel, still_model
-from msgs_config.character.mesh_triangles import read_vertices
+from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.character.model import Character, Shape, ShapeType
 from msgs_config.geometry import fixed_order, rotations
 

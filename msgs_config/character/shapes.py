@@ -4,7 +4,7 @@ from typing import TypeAlias
 from xml.etree import ElementTree
 
 from msgs_config.character.model import GREY, Quadruple, Shape, ShapeType, UrdfOptions
-from msgs_config.character.urdf_origin import read_numbers, read_origin
+from msgs_config.character.urdf.origin import read_numbers, read_origin
 from msgs_config.errors import CharacterError
 
 Shapes: TypeAlias = tuple[Shape, ...]

@@ -11,7 +11,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
-from msgs_config.character.meshes import collision_meshes
+from msgs_config.character.meshes.resolving import collision_meshes
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import LayoutError, MessageError
 from msgs_config.messages.probe import DynamicsSample, read_probe

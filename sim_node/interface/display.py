@@ -10,8 +10,8 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.described_joints import DescribedJoints
-from msgs_config.character.robot_description import robot_description
+from msgs_config.character.urdf.described_joints import DescribedJoints
+from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.geometry import fixed_order, frames, rotations
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder

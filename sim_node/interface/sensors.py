@@ -12,8 +12,8 @@ from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder
 from msgs_config.messages.topics import Outgoing
 from sim_node.node_settings import NodeSettings
-from sim_node.physics.sensors import SensorReader, make_readers
 from sim_node.physics.simulated_character import SimulatedCharacter
+from sim_node.sensors.readers import SensorReader, make_readers
 
 _NO_WRENCH = np.zeros(6)
 

@@ -6,7 +6,7 @@ import numpy as np
 from rclpy.node import Node
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.described_joints import DescribedJoint, DescribedJoints, pose_rows
+from msgs_config.character.urdf.described_joints import DescribedJoint, DescribedJoints, pose_rows
 from msgs_config.frame_names import WORLD
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics

@@ -10,7 +10,7 @@ import pytest
 
 from msgs_config import files
 from msgs_config.character.bullet import pybullet
-from msgs_config.character.robot_description import robot_description
+from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.messages import configuration
 from sim_node.parameters import load_parameters
 from sim_node.physics.probe import probe_engine

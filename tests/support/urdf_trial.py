@@ -14,7 +14,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
-from msgs_config.character.urdf_repair import repair_urdf
+from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import ActuatedCharactersError, SimulationError
 from msgs_config.shared_parameters import FROM_FILE, NO_COLLISIONS
 

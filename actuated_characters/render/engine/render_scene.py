@@ -16,7 +16,7 @@ from actuated_characters.render.engine.posed_characters import Frames
 from actuated_characters.render.engine.surfaces import Surface, arrow_surface, round_surface
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
-from msgs_config.character.mesh_triangles import file_for_engine
+from msgs_config.character.meshes.triangles import file_for_engine
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations

@@ -13,7 +13,7 @@ import numpy as np
 from actuated_characters.render.engine.camera_pose import Spheres
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
-from msgs_config.character.mesh_triangles import check_readable, read_vertices
+from msgs_config.character.meshes.triangles import check_readable, read_vertices
 from msgs_config.character.model import Character, Quadruple, Shape, ShapeType
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations

@@ -9,7 +9,7 @@ import yaml
 from msgs_config import files
 from msgs_config.character.file import ALONE
 from msgs_config.character.layout import JointType
-from msgs_config.character.meshes import resolve_meshes
+from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import CharacterError
 

@@ -27,7 +27,7 @@ from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.topics import Topic
 from msgs_config.runtime.polling import DirectSubscription
-from sim_node.physics.sensors import SensingSettings, make_readers
+from sim_node.sensors.readers import SensingSettings, make_readers
 from tests.support.physics import simulation
 from tests.support.ros import Client, Process, Processes, SimulatorClient, tick_of, wait_until
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from msgs_config.character.urdf_check import MAX_JOINTS, MAX_POSITION_ENTRIES
+from msgs_config.character.urdf.check import MAX_JOINTS, MAX_POSITION_ENTRIES
 from tests.support.urdf import (
     inertial,
     joint,

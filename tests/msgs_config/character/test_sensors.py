@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from msgs_config.character.described_joints import DescribedJoints
 from msgs_config.character.loading import load_character
-from msgs_config.character.robot_description import robot_description
 from msgs_config.character.sensors import Noise, Sensor, SensorType
+from msgs_config.character.urdf.described_joints import DescribedJoints
+from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import frames, rotations
 from sim_node import parameters as for_simulator

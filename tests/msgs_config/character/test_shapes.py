@@ -10,7 +10,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import captured_output, connect, pybullet
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Pose, Shape, ShapeType
-from msgs_config.character.robot_description import robot_description
+from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.geometry import rotations
 from tests.support.urdf import refusal
 

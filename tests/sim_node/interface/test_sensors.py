@@ -13,7 +13,7 @@ from msgs_config.messages.cdr import read_frame_id
 from sim_node import parameters as for_simulator
 from sim_node.interface.sensors import SensorPublishers
 from sim_node.node_settings import make_node_settings
-from sim_node.physics.sensors import SensingSettings, SensorReader, make_readers
+from sim_node.sensors.readers import SensingSettings, SensorReader, make_readers
 from tests.sim_node.conftest import Join
 from tests.support.physics import LoneSimulation, simulation
 from tests.support.ros import (

@@ -3,11 +3,11 @@
 from pathlib import Path
 from xml.etree import ElementTree
 
-from msgs_config.character.mesh_triangles import file_for_engine
-from msgs_config.character.meshes import resolve_meshes
+from msgs_config.character.meshes.resolving import resolve_meshes
+from msgs_config.character.meshes.triangles import file_for_engine
 from msgs_config.character.model import UrdfOptions
-from msgs_config.character.urdf_check import NUMBERS
-from msgs_config.character.urdf_repair import repair_urdf
+from msgs_config.character.urdf.check import NUMBERS
+from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError
 
 MAX_LINE_BYTES = 8000

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from msgs_config.geometry import rotations
-from sim_node.physics.link_motion import LinkKinematics
+from sim_node.sensors.link_motion import LinkKinematics
 from tests.support.physics import (
     EVERY_CHARACTER,
     character,

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from urdf_parser_py import urdf as ros
 
-from msgs_config.character.described_joints import DescribedJoints, pose_rows
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, ShapeType
-from msgs_config.character.robot_description import robot_description
+from msgs_config.character.urdf.described_joints import DescribedJoints, pose_rows
+from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.geometry import rotations
 from tests.support import urdf
 from tests.support.description import about, link_frames, origin_matrix, parse

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from msgs_config.character.urdf_inertia import nearest_physical, principal_axes
+from msgs_config.character.urdf.inertia import nearest_physical, principal_axes
 
 # LAPACK's own eigenvalues are wrong by a hundredth where one entry is 1e-81 of the others
 _ENTRY = st.floats(-1.0, 1.0).filter(lambda entry: entry == 0.0 or abs(entry) > 1e-30)

@@ -7,11 +7,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from msgs_config.character.described_joints import DescribedJoint, DescribedJoints
 from msgs_config.character.layout import JointType
-from msgs_config.character.meshes import resolve_meshes
+from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import Character, Link, Pose, Quadruple, Shape, ShapeType
-from msgs_config.character.urdf_origin import write_numbers, write_origin
+from msgs_config.character.urdf.described_joints import DescribedJoint, DescribedJoints
+from msgs_config.character.urdf.origin import write_numbers, write_origin
 from msgs_config.frame_names import BASE_FRAME
 from msgs_config.geometry import rotations
 

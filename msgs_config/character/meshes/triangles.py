@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.mesh_check import check_mesh, is_stl_of_text
+from msgs_config.character.meshes.check import check_mesh, is_stl_of_text
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import fixed_order
 

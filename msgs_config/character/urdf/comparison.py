@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Link, UrdfOptions
-from msgs_config.character.urdf_inertia import read_inertial
+from msgs_config.character.urdf.inertia import read_inertial
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import fixed_order, rotations
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Frame, UrdfOptions
-from msgs_config.character.urdf_frames import LinkTree
-from msgs_config.character.urdf_inertia import (
+from msgs_config.character.urdf.frames import LinkTree
+from msgs_config.character.urdf.inertia import (
     ENTRIES,
     LEAST_MOMENT,
     Inertial,
@@ -20,7 +20,7 @@ from msgs_config.character.urdf_inertia import (
     write_inertial,
     write_moments,
 )
-from msgs_config.character.urdf_origin import write_origin
+from msgs_config.character.urdf.origin import write_origin
 from msgs_config.geometry import fixed_order, rotations
 
 _CHANGED = 1e-6  # of the largest moment of inertia: what is more than a file's last digits

@@ -10,10 +10,10 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from msgs_config.character import meshes
 from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
 from msgs_config.character.file import read_character_file, shipped_characters
 from msgs_config.character.loading import load_character
+from msgs_config.character.meshes import resolving as meshes
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 from tests.support.urdf import inertial, joint, link, refusal, robot, write_character

@@ -7,7 +7,7 @@ import pytest
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.sensors import Noise
-from sim_node.physics.sensor_noise import NoiseSource
+from sim_node.sensors.noise import NoiseSource
 
 RATE = 240
 

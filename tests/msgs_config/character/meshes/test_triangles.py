@@ -10,7 +10,7 @@ import trimesh
 
 from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.file import read_character_file
-from msgs_config.character.mesh_triangles import read_vertices
+from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.errors import CharacterError
 from tests.support.urdf import inertial, link, refusal, robot
 

@@ -3,8 +3,8 @@
 from xml.etree import ElementTree
 
 from msgs_config.character.model import Frame
-from msgs_config.character.urdf_inertia import read_inertial
-from msgs_config.character.urdf_origin import move_origin, read_origin
+from msgs_config.character.urdf.inertia import read_inertial
+from msgs_config.character.urdf.origin import move_origin, read_origin
 
 MAX_JOINTS = 127
 """That the engine can hold, without those of mere frames, which are merged before it reads them."""

@@ -12,8 +12,8 @@ from msgs_config.character.sensors import Noise, Sensor, SensorType
 from msgs_config.geometry import rotations
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
-from sim_node.physics.link_motion import LinkKinematics
-from sim_node.physics.sensors import ForceReader, ImuReader, SensingSettings, SensorReader
+from sim_node.sensors.link_motion import LinkKinematics
+from sim_node.sensors.readers import ForceReader, ImuReader, SensingSettings, SensorReader
 from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.physics import (
     FLOATING_TURNED_FRAMES,

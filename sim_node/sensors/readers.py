@@ -14,9 +14,9 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.sensors import Noise, Sensor, SensorType
 from msgs_config.geometry import frames
 from msgs_config.messages.state import StampedState
-from sim_node.physics.link_motion import AT_REST, LinkKinematics, Motion
-from sim_node.physics.sensor_noise import NoiseSource
 from sim_node.physics.simulated_character import SimulatedCharacter
+from sim_node.sensors.link_motion import AT_REST, LinkKinematics, Motion
+from sim_node.sensors.noise import NoiseSource
 
 _IMU_DOUBLES = 37  # of sensor_msgs/Imu: orientation, rate and acceleration, a covariance after each
 _ORIENTATION, _ANGULAR_VELOCITY, _ACCELERATION = slice(0, 4), slice(13, 16), slice(25, 28)

@@ -6,8 +6,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from msgs_config import files
-from msgs_config.character.urdf_frames import MAX_JOINTS, find_frames, joint_end
-from msgs_config.character.urdf_inertia import LEAST_MOMENT, ROUNDING
+from msgs_config.character.urdf.frames import MAX_JOINTS, find_frames, joint_end
+from msgs_config.character.urdf.inertia import LEAST_MOMENT, ROUNDING
 from msgs_config.errors import CharacterError
 
 MAX_LINKS = 2000

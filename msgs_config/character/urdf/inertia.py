@@ -13,7 +13,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Pose, Vector
-from msgs_config.character.urdf_origin import read_origin
+from msgs_config.character.urdf.origin import read_origin
 from msgs_config.geometry import fixed_order, rotations
 
 ROUNDING = 1e-9

@@ -226,7 +226,7 @@ def test_a_link_that_the_engine_reads_otherwise_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As it would be without the repair of the text that the engine is given."""
-    monkeypatch.setattr("msgs_config.character.engine_urdf.repair_urdf", lambda *_: [])
+    monkeypatch.setattr("msgs_config.character.urdf.engine_text.repair_urdf", lambda *_: [])
     write_character(tmp_path, robot(link("a", body(1.0, "1 2 4"))))
 
     line = refusal(tmp_path / "robot.yaml")

@@ -1,0 +1,1 @@
+"""Mesh files: found, checked, read as triangles."""
