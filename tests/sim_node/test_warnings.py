@@ -54,7 +54,7 @@ def test_a_simulator_alone_says_what_was_repaired_and_that_it_begins_below_the_g
         write_character(tmp_path, robot(link("ball", thin + ball)), "rest_pose: {root_z: 0.2}\n")
     )
 
-    alone = processes.simulator(file)
+    alone = processes.simulator(file, wait_for_subscribers=1)  # no motor: no state waits else
     client.first_state()
 
     (line,) = lines_with(alone, "below the ground")
