@@ -1,15 +1,14 @@
 """The command `actuated_characters`: runs of simulator and controller, and what there is to run."""
 
 import argparse
-import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType
 
 from rich.console import Console
 from rich.markup import escape
 from rich.padding import Padding
 
+from actuated_characters.commands.common.interruption import raise_at_signals, was_interrupted
 from actuated_characters.commands.common.settings import (
     NODES,
     add_character,
@@ -31,15 +30,13 @@ from actuated_characters.commands.study import add_study
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.process import EXIT_ERROR, limit_threads
 
-_interrupted = False
 _EXIT_INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     limit_threads()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    raise_at_signals()
     try:
         parser = _parser()
         complete(parser)
@@ -49,24 +46,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_ERROR
     except BaseException:  # a module that was being imported may have turned it into its own
-        if not _interrupted:
+        if not was_interrupted():
             raise
         print("interrupted", file=sys.stderr)
         return _EXIT_INTERRUPTED
     return int(code or 0)
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    global _interrupted
-    del number, frame
-    _interrupted = True
-    raise _Interrupted
-
-
-class _Interrupted(KeyboardInterrupt):
-    """Not KeyboardInterrupt itself: where that goes through code that was made from a text, such
-    as a dataclass's, Python remembers it, and in the end kills a module that was run by `-m`.
-    """
 
 
 def _parser() -> argparse.ArgumentParser:

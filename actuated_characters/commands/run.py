@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.settings import (
     NODES,
@@ -267,6 +268,7 @@ def _run_plan(
         watch_states,
     )
 
+    check_interruption()  # all modules are imported by now
     plan, pushes, throws = run.plan, run.pushes, run.throws
     seen: States = []
     states: States | None = seen
