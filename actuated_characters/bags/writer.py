@@ -117,6 +117,15 @@ class BagWriter:
     def __exit__(self, *error: object) -> None:
         self.close()
 
+    def set_custom_data(self, name: str, text: str) -> None:
+        """Keep a text in the metadata, which `close` writes, as rosbag2's custom data.
+
+        Raises:
+            RecordingError: The recording is closed.
+        """
+        self._check_open()
+        self._writer.set_custom_data(name, text)
+
     def add_topic(self, topic: str, message_type: type, qos: QoSProfile) -> None:
         """Announce a topic, with the quality of service that its publisher offers.
 

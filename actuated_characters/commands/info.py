@@ -69,6 +69,8 @@ def _bag_rows(facts: "BagFacts") -> Iterator[tuple[str, str]]:
         f"{contents.storage}, compression {contents.compression}, metadata version {version}, "
         f"written by {contents.ros_distro}",
     )
+    if contents.forked_from is not None:
+        yield "forked from", str(contents.forked_from)
     if contents.start_ns is not None:
         start = datetime.fromtimestamp(contents.start_ns // _NS_PER_S, tz=UTC)
         yield "begun", start.strftime("%Y-%m-%d %H:%M:%S UTC")

@@ -3,25 +3,18 @@
 import os
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from actuated_characters.bags.format.storage import (
-    COMPRESSIONS,
-    LOG_TIME,
-    LOG_TIMES,
-    MCAP,
-    NONE,
-    SIMULATED,
-    STORAGES,
-    WALL,
-)
+from actuated_characters.bags.format.storage import LOG_TIME, SIMULATED
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, MetricsCollector
 from actuated_characters.recorder.log_time import SimulatedLogTime
+from actuated_characters.recorder.parameters import PARAMETERS
 from actuated_characters.recorder.session_filter import Heard, SessionFilter, find_session
 from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import (
@@ -31,52 +24,18 @@ from actuated_characters.recorder.topics import (
     sensor_topics,
     simulator_name,
 )
+from actuated_characters.runs.forked_from import given_origin
 from actuated_characters.runs.run_directory import BAG, metrics_directory, write_metrics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import REMEDY, SESSION, given_session, named
-from msgs_config.parameters import Parameter, Values, resolve
+from msgs_config.parameters import Values, resolve
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare, given_parameters
 
-PARAMETERS = [
-    Parameter(
-        "directory",
-        "recording",
-        "where bag, summary.json and measurements.csv go; the figures of each of the parameter "
-        "characters go to a folder of its name in there",
-    ),
-    Parameter(
-        "characters",
-        [],
-        "characters that are recorded, each in its namespace below the recorder's; none: "
-        "the one in the recorder's own namespace",
-        texts=True,
-    ),
-    Parameter("write_bag", True, "write the bag; without it the recorder only measures"),
-    Parameter("storage", MCAP, "how the bag is stored", choices=STORAGES),
-    Parameter("compression", NONE, "how the bag is compressed", choices=COMPRESSIONS),
-    Parameter(
-        LOG_TIME,
-        WALL,
-        "clock of the bag's log times, by which players play it: simulated time is that of each "
-        "message's stamp, or of the last state before it",
-        choices=LOG_TIMES,
-    ),
-    Parameter("topics", [], "names of topics to record beside those of the contract", texts=True),
-    Parameter(
-        "sensors",
-        [],
-        "topics of sensors to record, such as imu/NAME",
-        texts=True,
-    ),
-    Parameter("exclude", [], "names of topics of the contract not to record", texts=True),
-    SESSION,
-    Parameter("progress_period", 0.0, "print the tick this often; 0: never", unit="s"),
-]
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
 _LONGEST_END = 20.0  # s for the messages that are on their way at the stop
 _AT_ONCE = 1000  # messages of a topic, between flushes and answers to services
@@ -115,6 +74,7 @@ class RecorderNode(Node):
         self._collectors = {
             name: MetricsCollector(simulator_name(self, name)) for name in characters
         }
+        self._origin = given_origin(values)
         self._bag = self._open_bag(values)
         is_simulated = values.text(LOG_TIME) == SIMULATED
         self._log_time = SimulatedLogTime() if is_simulated else None
@@ -125,12 +85,15 @@ class RecorderNode(Node):
     def _open_bag(self, values: Values) -> BagWriter | None:
         if not values.flag("write_bag"):
             return None
-        return BagWriter(
+        bag = BagWriter(
             self._directory / BAG,
             storage=values.text("storage"),
             compression=values.text("compression"),
             log_time=values.text(LOG_TIME),
         )
+        for name, origin in self._origin.items():
+            bag.set_custom_data(name, origin.to_json())
+        return bag
 
     def _add(self, recorded: RecordedTopic, offered: QoSProfile) -> None:
         """Record a topic from now on, whose publishers offer this."""
@@ -283,7 +246,7 @@ class RecorderNode(Node):
             own = [each for each in self._readers if each.recorded.character in (None, name)]
             foreign = {each.recorded.name: self._filter.dropped(each.recorded.name) for each in own}
             lost_messages = {each.recorded.name: each.lost_messages for each in own}
-            metrics |= {
+            metrics |= {name: asdict(origin) for name, origin in self._origin.items()} | {
                 "lost_messages": {topic: count for topic, count in lost_messages.items() if count},
                 "foreign_messages": {topic: count for topic, count in foreign.items() if count},
             }

@@ -16,6 +16,7 @@ from actuated_characters.bags.format.metadata import METADATA, load_metadata
 from actuated_characters.bags.format.storage import MCAP, SUFFIXES
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.recording import find_bag
+from actuated_characters.runs.forked_from import KEY, ForkedFrom, read_forked_from
 from msgs_config.errors import MessageError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode
@@ -104,6 +105,7 @@ class Contents:
     ros_distro: str
     topics: tuple[TopicContents, ...]  # by name
     states: dict[str, StateMessages]  # by namespace
+    forked_from: ForkedFrom | None = None
 
     @property
     def has_wall_times(self) -> bool:
@@ -158,6 +160,7 @@ def read_contents(path: Path) -> Contents:
         ros_distro=str(metadata.get("ros_distro") or "unknown"),
         topics=tuple(found[name] for name in sorted(found)),
         states={name: of for name, of in sorted(states.items()) if of.has_topic},
+        forked_from=_forked_from(metadata),
     )
 
 
@@ -185,6 +188,12 @@ def _metadata(bag: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError, RecordingError) as error:
         raise RecordingError(f"cannot read {bag / METADATA}") from error
     return content if isinstance(content, dict) else {}
+
+
+def _forked_from(metadata: dict[str, Any]) -> ForkedFrom | None:
+    """Where a forked run comes from."""
+    custom = metadata.get("custom_data")
+    return read_forked_from(custom.get(KEY)) if isinstance(custom, dict) else None
 
 
 def _listed_topics(metadata: dict[str, Any]) -> dict[str, str]:

@@ -237,6 +237,7 @@ def as_json(facts: BagFacts) -> str:
         "compression": contents.compression,
         "metadata_version": contents.version,
         "ros_distro": contents.ros_distro,
+        "forked_from": None if contents.forked_from is None else asdict(contents.forked_from),
         "start_ns": contents.start_ns,
         "wall_time_s": contents.wall_time,
         "sim_time_s": sim_time,

@@ -122,6 +122,8 @@ def _bag_section(contents: Contents) -> Section:
         ("storage", f"{contents.storage}, compression {contents.compression}"),
         ("wall time", NOT_KNOWN if wall_time is None else f"{wall_time:.6g} s"),
     ]
+    if contents.forked_from is not None:
+        facts.append(("forked from", str(contents.forked_from)))
     rows = [
         (
             topic.name,

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from actuated_characters.recorder import node as for_recorder
+from actuated_characters.recorder import parameters as for_recorder
 from controller_node import parameters as for_controller
 from msgs_config.character.loading import load_character
 from sim_node import parameters as for_simulator

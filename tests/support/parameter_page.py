@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from actuated_characters.recorder import node as recorder
+from actuated_characters.recorder import parameters as recorder
 from controller_node import parameters as controller
 from msgs_config.character.loading import load_character
 from msgs_config.parameters import Parameter

@@ -115,7 +115,7 @@ def bring_parameters(
 
 def parameters_of(node: str, character_name: str) -> "list[Parameter]":
     """The parameters of a node by its name; `recorder` has the same for all characters."""
-    from actuated_characters.recorder import node as recorder
+    from actuated_characters.recorder import parameters as recorder
     from controller_node import parameters as controller
     from msgs_config.character.loading import load_character
     from sim_node import parameters as simulator
