@@ -19,6 +19,7 @@ from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.compare import add_compare
 from actuated_characters.commands.completion import add_names, complete
 from actuated_characters.commands.export import add_export
+from actuated_characters.commands.fork import add_fork
 from actuated_characters.commands.info import add_info
 from actuated_characters.commands.reconstruct import add_reconstruct
 from actuated_characters.commands.recover import add_recover
@@ -61,7 +62,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the versions and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in (
-        *(add_run, add_reconstruct, add_render, add_replay, add_info),
+        *(add_run, add_fork, add_reconstruct, add_render, add_replay, add_info),
         *(add_report, add_compare, add_export, add_recover, add_study),
     ):
         add(commands)

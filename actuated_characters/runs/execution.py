@@ -52,12 +52,15 @@ def run_over_topics(
     pushes: Sequence[PlannedPush] = (),
     throws: Sequence[PlannedThrow] = (),
     composed: bool = False,
+    fork: Mapping[str, object] | None = None,
+    resets: int = 0,
 ) -> None:
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
     With `composed`, controller and simulator are nodes of one process. `recording` has parameters
     of the recorder: how the bag is stored, topics more or fewer. Pushes and throws are sent by one
-    more process; in lockstep all are there before the first tick.
+    more process; in lockstep all are there before the first tick. With parameters of the node
+    `fork` that process is the node, which repeats a recording, with so many resets.
 
     Raises:
         RunError: one of the processes failed, with its own message, or the simulator rejected a
@@ -66,38 +69,53 @@ def run_over_topics(
     recording = {**recording, "directory": str(directory), "write_bag": write_bag}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
-    sent = _write_planned(directory, pushes, throws, recording) if pushes or throws else None
+    is_fork = fork is not None
+    sent = None
+    if pushes or throws or is_fork:
+        sent = {**_write_planned(directory, pushes, throws, recording), **(fork or {})}
     with _environment(directory) as environment, Children(directory, environment) as children:
         recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
-        sender = [children.start_node("pusher", sent, *session)] if sent else []
+        name = "fork" if is_fork else "pusher"
+        sender = [children.start_node(name, sent, *session)] if sent else []
         # of the torques, before the first answer, or a tick would go unrecorded
         subscribers = 2 + len(sender)
-        loop = _start_loop(children, plan, session, subscribers, composed=composed)
+        listeners = (2 + is_fork, subscribers)
+        loop = _start_loop(children, plan, session, listeners, composed=composed)
         _wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
+    sent_counts = {"pushes": len(pushes), "throws": len(throws)}
+    _check_recorded(directory, plan.ticks - resets, {} if is_fork else sent_counts)
+
+
+def _check_recorded(directory: Path, ticks: int, counts: Mapping[str, int]) -> None:
+    """Raise RunError unless all ticks were recorded, and all inputs accepted.
+
+    `counts` are the numbers of inputs, where they are known. A reset is a tick without figures.
+    """
     recorded, _ = read_metrics(directory)
-    if recorded["ticks"] != plan.ticks:
-        raise RunError(f"{recorded['ticks']} of {plan.ticks} ticks were recorded")
-    for what, planned in (("pushes", pushes), ("throws", throws)):
-        if planned and (rejected := recorded[f"rejected_{what}"]):
-            raise RunError(f"sim_node rejected {rejected} of {len(planned)} {what}")
+    if recorded["ticks"] != ticks:
+        raise RunError(f"{recorded['ticks']} of {ticks} ticks were recorded")
+    for what in ("pushes", "throws"):
+        if counts.get(what, 1) and (rejected := recorded[f"rejected_{what}"]):
+            of = f"of {counts[what]} " if what in counts else ""
+            raise RunError(f"sim_node rejected {rejected} {of}{what}")
 
 
 def _start_loop(
     children: Children,
     plan: RunPlan,
     session: Sequence[str],
-    torque_subscribers: int,
+    listeners: tuple[int, int],
     *,
     composed: bool,
 ) -> list[Child]:
     """Start simulator and controller; the process of the simulator, and the other if there is one.
 
-    They begin when so many subscribe to the torques, and two to the states.
+    They begin when so many subscribe to the states and to the torques.
     """
     arguments = [*session]
-    for node, count in (("sim_node", 2), ("controller_node", torque_subscribers)):
+    for node, count in zip(("sim_node", "controller_node"), listeners, strict=True):
         arguments += ["-p", f"{node}:wait_for_subscribers:={count}"]
     if composed:
         both = {"sim_node": plan.simulator, "controller_node": plan.controller}

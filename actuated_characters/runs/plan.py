@@ -141,7 +141,7 @@ def _simulator_values(character: Character, given: Mapping[str, object], duratio
     parameters = simulator_parameters.PARAMETERS
     own = simulator_parameters.character_parameters(character)
     values = resolve(parameters + own, {**defaults, **given})
-    values["max_ticks"] = _ticks(duration, values.integer("rate"))
+    values["max_ticks"] = count_ticks(duration, values.integer("rate"))
     character.layout.mask(values.texts("commanded_joints"))  # they exist
     return values
 
@@ -192,7 +192,8 @@ def _listed(names: set[str]) -> str:
     return ", ".join(sorted(names)) or "none"
 
 
-def _ticks(duration: float, rate_hz: int) -> int:
+def count_ticks(duration: float, rate_hz: int) -> int:
+    """The ticks of a duration in s; raises ConfigurationError if it is less than one, or huge."""
     if not 1.0 / rate_hz <= duration <= _LARGEST_DURATION:
         raise ConfigurationError(
             f"duration is {duration} s; it must be {1.0 / rate_hz:g} s (one tick) to "

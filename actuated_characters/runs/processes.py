@@ -20,6 +20,7 @@ MODULES = {
     "composed": "actuated_characters.composed.main",
     "recorder": "actuated_characters.recorder.main",
     "pusher": "actuated_characters.runs.perturbation_main",
+    "fork": "actuated_characters.fork.main",
     "player": "actuated_characters.replay.players.main",
 }
 """The modules that are run by `python -m`, by the names of the nodes, or of several in one."""

@@ -41,6 +41,8 @@ def test_piped_parameters_have_a_line_each(capsys: pytest.CaptureFixture[str]) -
         ("run --clip wal", {"walk", "walk_mine.json"}),
         ("run --behaviour r", {"ragdoll", "reactive"}),
         ("run --character pendulum --set controller_node.gains.hinge.p", {PENDULUM_GAIN}),
+        ("fo", {"fork"}),
+        ("fork run_mine --set controller_node.gains.neck.p", {"controller_node.gains.neck.p:="}),
         ("parameters rec", {"recorder"}),
         ("study li", {"lift"}),
         ("info run", {"run_mine"}),

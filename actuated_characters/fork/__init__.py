@@ -1,0 +1,1 @@
+"""Repeats a recorded run up to a tick, with the real nodes, and lets it go on otherwise."""

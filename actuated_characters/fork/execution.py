@@ -1,0 +1,75 @@
+"""Runs a planned fork, and says which of its balls have hit."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from actuated_characters.bags.recording import Recording
+from actuated_characters.fork.plan import ForkPlan
+from actuated_characters.replay.players.character_files import write_character, write_urdf
+from actuated_characters.runs.execution import Progress, run_over_topics
+from actuated_characters.runs.forked_from import KEY
+from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.run_directory import PARAMETERS
+from actuated_characters.runs.throw_hits import describe_hits, read_states
+from msgs_config.character.loading import load_character
+from msgs_config.errors import ActuatedCharactersError
+from msgs_config.parameters import Values
+from msgs_config.shared_parameters import CHARACTER
+
+
+def run_fork(
+    fork: ForkPlan,
+    directory: Path,
+    *,
+    progress: Progress = lambda ticks: None,
+    composed: bool = False,
+) -> None:
+    """Run a fork over topics; the directory, which was prepared, gets what a run's gets.
+
+    Raises:
+        RunError: one of the processes failed, or a state up to the fork is not the recorded one.
+    """
+    run_over_topics(
+        _with_files(fork.plan, fork.recording, directory / PARAMETERS),
+        directory,
+        write_bag=True,
+        progress=progress,
+        recording={KEY: fork.origin.to_json(), "sensors": list(fork.sensors)},
+        pushes=fork.pushes,
+        throws=fork.throws,
+        composed=composed,
+        fork=fork.node,
+        resets=fork.resets,
+    )
+
+
+def _with_files(plan: RunPlan, recording: Recording, folder: Path) -> RunPlan:
+    """A plan whose files have the recorded texts: today's files, or else some that are written."""
+    terrain, changed = recording.world.terrain, dict[str, str]()
+    if not _is_unchanged(recording):
+        changed[CHARACTER.name] = str(write_character(folder, recording.character))
+    controller = Values(plan.controller | changed)
+    if terrain is not None:
+        changed["terrain"] = str(write_urdf(folder / "terrain.urdf", terrain))
+    return replace(plan, simulator=Values(plan.simulator | changed), controller=controller)
+
+
+def _is_unchanged(recording: Recording) -> bool:
+    """Whether the character's files are what they were."""
+    then = recording.character
+    try:
+        today = load_character(str(recording.parameters[CHARACTER.name]))
+    except ActuatedCharactersError:
+        return False
+    texts = [(each.file_text, each.loading.urdf_text) for each in (then, today)]
+    return texts[0] == texts[1]
+
+
+def describe_new_hits(fork: ForkPlan, directory: Path) -> Sequence[str]:
+    """Of each new throw a few words on whether it hit; none where a reset removed balls."""
+    if not fork.throws or fork.resets:
+        return ()
+    throws = [*fork.repeated_throws, *fork.throws]
+    words = describe_hits(fork.plan, throws, read_states(directory))
+    return words[len(fork.repeated_throws) :]
