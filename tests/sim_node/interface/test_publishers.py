@@ -204,6 +204,11 @@ def test_contacts_carry_the_whole_wrench_on_each_link(
     assert largest > 1.0
 
 
+def clock_ticks(client: SimulatorClient) -> list[int]:
+    times = [message.clock for message in client.clock.messages]
+    return [round((time.sec + 1e-9 * time.nanosec) * 240) for time in times]
+
+
 def test_a_tick_is_published_in_the_order_clock_contacts_pushes_state(
     processes: Processes, client: SimulatorClient
 ) -> None:
@@ -217,12 +222,10 @@ def test_a_tick_is_published_in_the_order_clock_contacts_pushes_state(
     last = tick_of(client.drive(state, 20, rng))
     for inbox in inboxes:
         client.spin_until(lambda inbox=inbox: last in inbox.ticks(), "all of a tick")
+    client.spin_until(lambda: last in clock_ticks(client), "its time")
 
     sent = [dict(zip(inbox.ticks(), inbox.sent_ns, strict=True)) for inbox in inboxes]
-    clock = {
-        round((m.clock.sec + 1e-9 * m.clock.nanosec) * 240): sent_ns
-        for m, sent_ns in zip(client.clock.messages, client.clock.sent_ns, strict=True)
-    }
+    clock = dict(zip(clock_ticks(client), client.clock.sent_ns, strict=True))
     for tick in range(first, last + 1):  # every one of them
         times = [clock[tick], *(of_topic[tick] for of_topic in sent)]
         assert times == sorted(times)
