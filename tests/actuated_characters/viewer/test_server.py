@@ -1,0 +1,172 @@
+"""The viewer's server as other programs and pages meet it: by a plain client of websockets."""
+
+import http.client
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from pathlib import Path
+
+import pytest
+import viser
+import websockets.asyncio.server
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from actuated_characters.viewer import server as server_module
+from actuated_characters.viewer.request_check import RequestCheck
+from actuated_characters.viewer.server import ViewerServer, open_socket, start_server, stop_server
+from msgs_config.errors import ConfigurationError
+from tests.support.ros import wait_until
+
+PROTOCOL = f"viser-v{viser.__version__}"
+
+
+@dataclass
+class Running:
+    server: ViewerServer
+    port: int
+    rejected: list[str] = field(default_factory=list)
+
+    def open(self, origin: str | None, host: str | None = None) -> bool:
+        """Whether a client with these headers gets the scene."""
+        headers = {} if host is None else {"Host": host}
+        try:
+            with connect(
+                f"ws://127.0.0.1:{self.port}",
+                origin=origin,  # type: ignore[arg-type]
+                additional_headers=headers,
+                subprotocols=[PROTOCOL],  # type: ignore[list-item]
+                max_size=None,
+            ) as client:
+                return len(client.recv(timeout=10.0)) > 0
+        except InvalidStatus as error:
+            assert error.response.status_code == HTTPStatus.FORBIDDEN
+            return False
+
+    def get(self, path: str, host: str, origin: str | None = None) -> http.client.HTTPResponse:
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=10.0)
+        connection.putrequest("GET", path, skip_host=True)
+        connection.putheader("Host", host)
+        if origin is not None:
+            connection.putheader("Origin", origin)
+        connection.endheaders()
+        return connection.getresponse()
+
+
+@pytest.fixture
+def running() -> Iterator[Running]:
+    rejected: list[str] = []
+    listening = open_socket("127.0.0.1", 0)
+    server = start_server(listening, RequestCheck("127.0.0.1"), rejected.append)
+    yield Running(server, listening.getsockname()[1], rejected)
+    stop_server(server)
+
+
+def test_a_program_without_an_origin_and_the_servers_own_page_connect(running: Running) -> None:
+    assert running.open(None)
+    assert running.open(f"http://127.0.0.1:{running.port}")
+    assert not running.rejected
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "http://localhost:3000", "null"])
+def test_a_page_of_another_origin_cannot_open_the_websocket(running: Running, origin: str) -> None:
+    assert not running.open(origin)
+    assert not running.server.get_clients()
+    assert len(running.rejected) == 1
+    assert repr(origin) in running.rejected[0]
+
+
+def test_a_page_whose_name_resolves_to_this_machine_gets_nothing(running: Running) -> None:
+    rebound = f"evil.example:{running.port}"
+    page = running.get("/", rebound, f"http://{rebound}")
+
+    assert page.status == HTTPStatus.FORBIDDEN
+    assert b"viser" not in page.read()
+    with socket.create_connection(("127.0.0.1", running.port), timeout=10.0) as plain:
+        lines = (
+            f"GET / HTTP/1.1\r\nHost: {rebound}\r\nOrigin: http://{rebound}\r\n"
+            "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+            f"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+        )
+        plain.sendall(lines.encode())
+        assert plain.recv(100).startswith(b"HTTP/1.1 403 ")
+
+
+def test_the_page_is_served_and_none_may_frame_it(running: Running) -> None:
+    page = running.get("/", f"localhost:{running.port}")
+
+    assert page.status == HTTPStatus.OK
+    assert page.getheader("Content-Security-Policy") == "frame-ancestors 'none'"
+    assert page.getheader("X-Frame-Options") == "DENY"
+    assert b"<html" in page.read()
+
+
+def test_nothing_listens_on_another_address(running: Running) -> None:
+    lines = Path("/proc/net/tcp").read_text().splitlines()[1:]
+    places = [line.split()[1].split(":") for line in lines]
+
+    assert {address for address, port in places if int(port, 16) == running.port} == {"0100007F"}
+
+
+def test_the_server_is_gone_when_it_was_stopped() -> None:
+    listening = open_socket("127.0.0.1", 0)
+    port = listening.getsockname()[1]
+    stop_server(start_server(listening, RequestCheck("127.0.0.1"), lambda fault: None))
+
+    def is_closed() -> bool:
+        with socket.socket() as other:
+            return other.connect_ex(("127.0.0.1", port)) != 0
+
+    wait_until(is_closed, "the port is closed")
+    assert websockets.asyncio.server.serve.__module__ == "websockets.asyncio.server"
+
+
+def test_without_a_port_the_first_one_that_is_free_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with open_socket("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+        monkeypatch.setattr(server_module, "FIRST_PORT", port)
+        monkeypatch.setattr(server_module, "_PORTS", 50)
+        with open_socket("127.0.0.1", None) as free:
+            assert port < free.getsockname()[1] < port + 50
+
+
+def test_a_port_that_is_in_use_is_one_clear_line() -> None:
+    with open_socket("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(
+            ConfigurationError, match=rf"127\.0\.0\.1, port {port}: .*--port"
+        ) as error:
+            open_socket("127.0.0.1", port)
+    assert "\n" not in str(error.value)
+
+
+def test_an_address_of_another_machine_is_one_clear_line() -> None:
+    with pytest.raises(ConfigurationError, match=r"cannot listen on 192\.0\.2\.1"):
+        open_socket("192.0.2.1", None)
+
+
+def test_a_viser_that_makes_its_server_otherwise_is_not_used(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(server_module, "ViewerServer", _NeverServes)
+    with (
+        open_socket("127.0.0.1", 0) as listening,
+        pytest.raises(ConfigurationError, match="cannot be checked"),
+    ):
+        start_server(listening, RequestCheck("127.0.0.1"), lambda fault: None)
+
+
+class _NeverServes:
+    """A viser that starts its server by other means."""
+
+    def __init__(self, *, verbose: bool) -> None:
+        self.verbose = verbose
+
+    def stop(self) -> None: ...
+
+
+def test_nothing_is_made_public_through_other_peoples_servers(running: Running) -> None:
+    assert running.server.request_share_url() is None
