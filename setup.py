@@ -66,7 +66,7 @@ setup(
         "completion": ["argcomplete>=3.5,<4"],
         # `view` and `run --view`: characters in a browser (50 MB with what it needs, MIT; the web
         # client is in the wheel, and works offline).
-        "view": ["viser>=1.1,<2"],
+        "view": ["viser>=1.1,<2", "websockets>=14"],
         # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
         "video": ["av>=14,<19"],
         # Pinocchio, which `make robots` compares masses and forces with (BSD-2, 380 MB with what it
@@ -103,6 +103,7 @@ setup(
             "sim_node = sim_node.main:main",
             "controller_node = controller_node.main:main",
             "recorder = actuated_characters.recorder.main:main",
+            "viewer = actuated_characters.viewer.main:main",
             "composed = actuated_characters.composed.main:main",
             "actuated_characters = actuated_characters.cli:main",
         ],

@@ -28,6 +28,7 @@ from actuated_characters.commands.replay import add_replay
 from actuated_characters.commands.report import add_report
 from actuated_characters.commands.run import add_run
 from actuated_characters.commands.study import add_study
+from actuated_characters.commands.view import add_view
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.process import EXIT_ERROR, limit_threads
 
@@ -62,7 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the versions and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in (
-        *(add_run, add_fork, add_reconstruct, add_render, add_replay, add_info),
+        *(add_run, add_view, add_fork, add_reconstruct, add_render, add_replay, add_info),
         *(add_report, add_compare, add_export, add_recover, add_study),
     ):
         add(commands)

@@ -23,6 +23,8 @@ from actuated_characters.commands.common.settings import (
     node_settings,
 )
 from actuated_characters.commands.common.tables import make_table
+from actuated_characters.commands.run_options import ALL_SENSORS, add_recorded, add_tracked, add_viewed
+from actuated_characters.commands.view import server_parameters
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -32,7 +34,7 @@ if TYPE_CHECKING:  # it takes a second to import
     from controller_node.references.files.reconstructed import FoundWith
 
 _DURATION = 10.0  # s
-_NO_PUSH, _ALL = "none", "all"
+_NO_PUSH = "none"
 _RECORDING = {  # options, and the recorder's parameters
     "storage": "storage",
     "compression": "compression",
@@ -54,7 +56,7 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         ["run --clip walk --set controller_node.law:=pd"],
     )
     add_character(run)
-    _add_tracked(run)
+    add_tracked(run)
     run.add_argument(
         "--duration",
         type=float,
@@ -65,7 +67,7 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         "--output", type=Path, metavar="DIR", help="where the results go (runs/CHARACTER-MOTION)"
     )
     run.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
-    _add_recorded(run)
+    add_recorded(run)
     add_inputs(
         run,
         "for sim_node.wrench_duration. A reconstruction brings those that it was found with, "
@@ -87,63 +89,7 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
     loop.add_argument(
         "--in-process", action="store_true", help="one process without ROS: the same states, no bag"
     )
-
-
-def _add_tracked(run: argparse.ArgumentParser) -> None:
-    """Add the options that say what is tracked, and how."""
-    tracked = run.add_mutually_exclusive_group()
-    tracked.add_argument(
-        "--clip",
-        help="track this motion clip: a name or a file. One by `reconstruct` brings the length, "
-        "the parameters and the pushes that it was found with; --duration, --set and --push take "
-        "precedence",
-    )
-    tracked.add_argument(
-        "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
-    )
-    tracked.add_argument(
-        "--reference",
-        choices=["hold", "step", "sine"],
-        help="the rest pose (hold, the default), or a test signal from it",
-    )
-    run.add_argument(
-        "--behaviour",
-        choices=["tracking", "ragdoll", "active_ragdoll", "reactive"],
-        help="track whatever comes (tracking, the default); be limp; go limp on a hard hit, and "
-        "get up; or react to hits",
-    )
-    run.add_argument(
-        "--collision",
-        choices=["file", "none"],
-        help="what the character collides with: as its file has it (file, the default), or nothing "
-        "(none), in which case meshes may be missing",
-    )
-    run.add_argument(
-        "--planner",
-        choices=["none", "predictive"],
-        help="keep the motion by joint torques alone, planned ahead (predictive: without root "
-        "assistance; needs the extra 'plan'), or not (none, the default)",
-    )
-
-
-def _add_recorded(run: argparse.ArgumentParser) -> None:
-    """Add the options that say what is recorded, and how."""
-    run.add_argument("--no-record", action="store_true", help="write no bag")
-    run.add_argument("--storage", choices=["mcap", "sqlite3"], help="how the bag is stored (mcap)")
-    run.add_argument(
-        "--compression", choices=["none", "zstd"], help="how the bag is compressed (none)"
-    )
-    run.add_argument(
-        "--log-time",
-        choices=["wall", "simulated"],
-        help="clock of the bag's log times (wall); with simulated, players show 20 s as 20 s",
-    )
-    for name, about in (
-        ("--topic", "record this topic beside those of the simulation"),
-        ("--sensor", f"record this sensor of the character, such as imu/NAME, or {_ALL} of them"),
-        ("--exclude", "do not record this topic of the simulation, such as contacts"),
-    ):
-        run.add_argument(name, action="append", metavar="NAME", help=f"{about}; may be repeated")
+    add_viewed(run)
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -197,6 +143,8 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
 
     settings = node_settings(options.set, NODES)
     simulator, controller = settings["sim_node"], settings["controller_node"]
+    if options.view:
+        simulator.setdefault("real_time_factor", 1.0)
     for name in ("behaviour", "planner", "collision"):
         _set_option(name, getattr(options, name), controller)
     character = load_character(options.character, collides(simulator | controller))
@@ -218,6 +166,8 @@ def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
     """Raise ConfigurationError where options contradict each other."""
     from sim_node.node_settings import make_node_settings
 
+    if options.in_process and options.view:
+        raise ConfigurationError("--view shows what is on topics; --in-process has none")
     if options.in_process and make_node_settings(plan.simulator).tick_period:
         raise ConfigurationError(
             "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
@@ -245,11 +195,11 @@ def _recorded_sensors(options: argparse.Namespace, plan: "RunPlan") -> list[str]
     known = [sensor.topic for sensor in plan.character.sensors]
     if not known:
         raise ConfigurationError(f"--sensor: character '{plan.character.name}' has no sensors")
-    if _ALL in options.sensor:
+    if ALL_SENSORS in options.sensor:
         return known
     for name in options.sensor:
         if name not in known:
-            raise ConfigurationError(one_of("--sensor:", name, [*known, _ALL]))
+            raise ConfigurationError(one_of("--sensor:", name, [*known, ALL_SENSORS]))
     return list(options.sensor)
 
 
@@ -289,6 +239,7 @@ def _run_plan(
             pushes=pushes,
             throws=throws,
             composed=options.composed,
+            viewer=server_parameters(options) if options.view else None,
         )
         if throws:
             states = None if options.no_record else read_states(directory)

@@ -54,6 +54,7 @@ def run_over_topics(
     composed: bool = False,
     fork: Mapping[str, object] | None = None,
     resets: int = 0,
+    viewer: Mapping[str, object] | None = None,
 ) -> None:
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
@@ -61,6 +62,8 @@ def run_over_topics(
     of the recorder: how the bag is stored, topics more or fewer. Pushes and throws are sent by one
     more process; in lockstep all are there before the first tick. With parameters of the node
     `fork` that process is the node, which repeats a recording, with so many resets.
+    With `viewer`, its parameters,
+    one more shows the characters in a browser; the run does not wait for it.
 
     Raises:
         RunError: one of the processes failed, with its own message, or the simulator rejected a
@@ -74,6 +77,8 @@ def run_over_topics(
     if pushes or throws or is_fork:
         sent = {**_write_planned(directory, pushes, throws, recording), **(fork or {})}
     with _environment(directory) as environment, Children(directory, environment) as children:
+        if viewer is not None:
+            progress = _watching(children.start_node("viewer", viewer), progress)
         recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
         name = "fork" if is_fork else "pusher"
         sender = [children.start_node(name, sent, *session)] if sent else []
@@ -100,6 +105,22 @@ def _check_recorded(directory: Path, ticks: int, counts: Mapping[str, int]) -> N
         if counts.get(what, 1) and (rejected := recorded[f"rejected_{what}"]):
             of = f"of {counts[what]} " if what in counts else ""
             raise RunError(f"sim_node rejected {rejected} {of}{what}")
+
+
+def _watching(viewer: Child, progress: Progress) -> Progress:
+    """Report progress, and also once each where the viewer's page is, and that it has ended."""
+    ended = False
+
+    def report(ticks: int) -> None:
+        nonlocal ended
+        for line in viewer.read_lines():
+            print(f"watch it at {line}", flush=True)
+        if viewer.exit_code is not None and not ended:
+            ended = True
+            print(f"the run goes on unseen; viewer failed: {viewer.last_words()}", flush=True)
+        progress(ticks)
+
+    return report
 
 
 def _start_loop(

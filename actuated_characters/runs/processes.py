@@ -21,6 +21,7 @@ MODULES = {
     "recorder": "actuated_characters.recorder.main",
     "pusher": "actuated_characters.runs.perturbation_main",
     "fork": "actuated_characters.fork.main",
+    "viewer": "actuated_characters.viewer.main",
     "player": "actuated_characters.replay.players.main",
 }
 """The modules that are run by `python -m`, by the names of the nodes, or of several in one."""

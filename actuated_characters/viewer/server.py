@@ -5,6 +5,7 @@ here, while viser starts, is one that checks, and that has a socket which is bou
 """
 
 import io
+import os
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -46,17 +47,17 @@ def open_socket(host: str, port: int | None) -> socket.socket:
     Raises:
         ConfigurationError: the port is in use, or the address is not one of this machine's.
     """
-    tried = [port] if port is not None else range(FIRST_PORT, FIRST_PORT + _PORTS)
+    numbers = [port] if port is not None else range(FIRST_PORT, FIRST_PORT + _PORTS)
     reason = ""
-    for number in tried:
+    for number in numbers:
         try:
             family, _, _, _, address = socket.getaddrinfo(
                 host, number, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
             )[0]
             return socket.create_server(address, family=family)
         except OSError as error:
-            reason = error.strerror or str(error)
-    ports = f"port {tried[0]}" if port is not None else f"ports {tried[0]} to {tried[-1]}"
+            reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+    ports = f"port {numbers[0]}" if port is not None else f"ports {numbers[0]} to {numbers[-1]}"
     raise ConfigurationError(
         f"cannot listen on {host}, {ports}: {reason}; --port takes another port, --host an address"
     )

@@ -167,3 +167,4 @@ def sensor_reading(sensor_type: SensorType, name: str) -> Topic:
 SIM_NODE = "sim_node"
 CONTROLLER_NODE = "controller_node"
 RECORDER_NODE = "recorder"
+VIEWER_NODE = "viewer"

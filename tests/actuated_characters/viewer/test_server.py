@@ -83,14 +83,14 @@ def test_a_page_whose_name_resolves_to_this_machine_gets_nothing(running: Runnin
 
     assert page.status == HTTPStatus.FORBIDDEN
     assert b"viser" not in page.read()
-    with socket.create_connection(("127.0.0.1", running.port), timeout=10.0) as plain:
+    with socket.create_connection(("127.0.0.1", running.port), timeout=10.0) as connection:
         lines = (
             f"GET / HTTP/1.1\r\nHost: {rebound}\r\nOrigin: http://{rebound}\r\n"
             "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
             f"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
         )
-        plain.sendall(lines.encode())
-        assert plain.recv(100).startswith(b"HTTP/1.1 403 ")
+        connection.sendall(lines.encode())
+        assert connection.recv(100).startswith(b"HTTP/1.1 403 ")
 
 
 def test_the_page_is_served_and_none_may_frame_it(running: Running) -> None:

@@ -1,0 +1,78 @@
+"""Options of the command `run`, by what they are about."""
+
+import argparse
+
+from actuated_characters.commands.view import add_server
+
+ALL_SENSORS = "all"
+
+
+def add_tracked(run: argparse.ArgumentParser) -> None:
+    """Add the options that say what is tracked, and how."""
+    tracked = run.add_mutually_exclusive_group()
+    tracked.add_argument(
+        "--clip",
+        help="track this motion clip: a name or a file. One by `reconstruct` brings the length, "
+        "the parameters and the pushes that it was found with; --duration, --set and --push take "
+        "precedence",
+    )
+    tracked.add_argument(
+        "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
+    )
+    tracked.add_argument(
+        "--reference",
+        choices=["hold", "step", "sine"],
+        help="the rest pose (hold, the default), or a test signal from it",
+    )
+    run.add_argument(
+        "--behaviour",
+        choices=["tracking", "ragdoll", "active_ragdoll", "reactive"],
+        help="track whatever comes (tracking, the default); be limp; go limp on a hard hit, and "
+        "get up; or react to hits",
+    )
+    run.add_argument(
+        "--collision",
+        choices=["file", "none"],
+        help="what the character collides with: as its file has it (file, the default), or nothing "
+        "(none), in which case meshes may be missing",
+    )
+    run.add_argument(
+        "--planner",
+        choices=["none", "predictive"],
+        help="keep the motion by joint torques alone, planned ahead (predictive: without root "
+        "assistance; needs the extra 'plan'), or not (none, the default)",
+    )
+
+
+def add_viewed(run: argparse.ArgumentParser) -> None:
+    """Add the options of the viewer."""
+    run.add_argument(
+        "--view",
+        action="store_true",
+        help="show the run in a browser, in real time unless sim_node.real_time_factor is set "
+        "(needs the extra 'view'); where, is printed",
+    )
+    add_server(run)
+
+
+def add_recorded(run: argparse.ArgumentParser) -> None:
+    """Add the options that say what is recorded, and how."""
+    run.add_argument("--no-record", action="store_true", help="write no bag")
+    run.add_argument("--storage", choices=["mcap", "sqlite3"], help="how the bag is stored (mcap)")
+    run.add_argument(
+        "--compression", choices=["none", "zstd"], help="how the bag is compressed (none)"
+    )
+    run.add_argument(
+        "--log-time",
+        choices=["wall", "simulated"],
+        help="clock of the bag's log times (wall); with simulated, players show 20 s as 20 s",
+    )
+    for name, about in (
+        ("--topic", "record this topic beside those of the simulation"),
+        (
+            "--sensor",
+            f"record this sensor of the character, such as imu/NAME, or {ALL_SENSORS} of them",
+        ),
+        ("--exclude", "do not record this topic of the simulation, such as contacts"),
+    ):
+        run.add_argument(name, action="append", metavar="NAME", help=f"{about}; may be repeated")

@@ -1,0 +1,237 @@
+"""One character in the browser: its links, its reference, and what acts on it."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import viser
+
+from actuated_characters.bags.rebuilding import Rebuilt
+from actuated_characters.render.engine.camera_pose import Spheres
+from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
+from actuated_characters.viewer.latest import CharacterSample
+from actuated_characters.viewer.shape_meshes import triangles_of
+from actuated_characters.viewer.support import support_polygon
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.layout import JointType
+from msgs_config.character.model import Shape
+from msgs_config.geometry import rotations
+from msgs_config.messages.wrenches import WrenchArrays
+
+_STRAINED = np.array((215.0, 25.0, 20.0))  # the colour of a link whose joint is at its limit
+_LEVELS = 12  # of colours, so that few change from frame to frame
+_GHOST = (90, 120, 220)
+_GHOST_OPACITY = 0.25
+_CONTACT, _PUSH, _CENTRE, _SUPPORT = (30, 150, 60), (230, 60, 20), (250, 200, 0), (40, 110, 200)
+_METRES_A_WEIGHT = 0.5  # of an arrow: the length that stands for the character's own weight
+_LONGEST = 2.0  # m, of an arrow
+_LEAST = 1e-3  # of the weight, that an arrow shows
+_ABOVE_GROUND = 0.004  # m, of what is drawn on it
+_GRAVITY = 9.81
+
+Bind = Callable[[viser.MeshHandle, int], None]
+"""Makes a shape of a link, by its number, one that can be touched."""
+
+
+class DrawnCharacter:
+    """The nodes of one character below a name in the scene."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, rebuilt: Rebuilt, bind: Bind) -> None:
+        """Add all nodes. Raises CharacterError if a mesh cannot be used."""
+        self.rebuilt, self.name = rebuilt, name
+        self.character = character = rebuilt.character
+        self._scene, self._model = scene, DynamicsModel(character)
+        shapes = drawn_shapes(character)
+        self._outlines = [_around(link.collision_shapes) for link in character.links]
+        self._rows = {link.name: row for row, link in enumerate(character.links)}
+        self._centres = np.array([link.inertial_pose.position for link in character.links])
+        self._frames = [
+            scene.add_frame(f"{name}/links/{row}", show_axes=False) for row in range(len(shapes))
+        ]
+        self._ghost_frames = [
+            scene.add_frame(f"{name}/ghost/{row}", show_axes=False, visible=False)
+            for row in range(len(shapes))
+        ]
+        self._meshes = [
+            [self._add(f"{name}/links/{row}/{k}", shape) for k, shape in enumerate(own)]
+            for row, own in enumerate(shapes)
+        ]
+        for row, own in enumerate(shapes):
+            for k, shape in enumerate(own):
+                self._add(f"{name}/ghost/{row}/{k}", shape, ghost=True)
+                bind(self._meshes[row][k], row)
+        self._colors = [[np.array(each.color_rgba[:3]) * 255.0 for each in own] for own in shapes]
+        self._levels = [0] * len(shapes)
+        self._vectors = _last_vectors(rebuilt)
+        self._centre = scene.add_icosphere(f"{name}/centre", 0.035, color=_CENTRE, visible=False)
+        self._below = scene.add_icosphere(f"{name}/below", 0.02, color=_CENTRE, visible=False)
+        self._arrows = {
+            what: scene.add_arrows(
+                f"{name}/{what}", np.zeros((1, 2, 3)), color, shaft_radius=0.012,
+                head_radius=0.03, head_length=0.06, visible=False,
+            )
+            for what, color in (("contacts", _CONTACT), ("pushes", _PUSH))
+        }  # fmt: skip
+        self._support = scene.add_line_segments(
+            f"{name}/support",
+            np.zeros((1, 2, 3)),
+            _SUPPORT,
+            thickness=3.0,
+            thickness_units="screen",
+            visible=False,
+        )
+        self.origins: FloatArray = np.zeros((len(shapes), 3))
+        self.turns_xyzw: FloatArray = np.tile((0.0, 0.0, 0.0, 1.0), (len(shapes), 1))
+        self.shows = {"reference": True, "forces": True, "balance": True, "torques": True}
+        """What is drawn beside the character itself."""
+
+    def _add(self, name: str, shape: Shape, *, ghost: bool = False) -> viser.MeshHandle:
+        vertices, faces = triangles_of(shape)
+        red, green, blue, alpha = shape.color_rgba
+        color = _GHOST if ghost else _rgb(255.0 * np.array((red, green, blue)))
+        opacity = _GHOST_OPACITY if ghost else (None if alpha >= 1.0 else max(alpha, 0.1))
+        return self._scene.add_mesh_simple(
+            name,
+            vertices,
+            faces,
+            color=color,
+            opacity=opacity,
+            cast_shadow=not ghost,
+            receive_shadow=False,
+            wxyz=_wxyz(np.array(shape.pose.orientation_xyzw)),
+            position=shape.pose.position,
+        )
+
+    @property
+    def root(self) -> FloatArray:
+        """Where the base link is (3,), m, world."""
+        root: FloatArray = self.origins[0]
+        return root
+
+    def remove(self) -> None:
+        """Remove all nodes."""
+        self._scene.remove_by_name(self.name)
+
+    def draw(self, sample: CharacterSample) -> None:
+        """Move everything to where it is now."""
+        if sample.state is None:
+            return
+        shown = sample.reference if self.shows["reference"] else None
+        if shown is not None:
+            self._place(self._ghost_frames, *self._poses(shown))
+        for frame in self._ghost_frames:
+            frame.visible = shown is not None
+        self.origins, self.turns_xyzw = self._poses(sample.state.position)
+        self._place(self._frames, self.origins, self.turns_xyzw)
+        self._color(sample.state.effort)
+        self._draw_balance(sample.contacts)
+        self._draw_arrows("contacts", sample.contacts)
+        self._draw_arrows("pushes", sample.pushes)
+
+    def _poses(self, position: FloatArray) -> tuple[FloatArray, FloatArray]:
+        self._model.update(position, np.zeros_like(position))
+        return self._model.link_poses()
+
+    @staticmethod
+    def _place(
+        frames: Sequence[viser.FrameHandle], origins: FloatArray, turns_xyzw: FloatArray
+    ) -> None:
+        for frame, origin, turn in zip(frames, origins, turns_xyzw, strict=True):
+            frame.position, frame.wxyz = origin, _wxyz(turn)
+
+    def _color(self, effort: FloatArray | None) -> None:
+        """Colour each link by the share of its joint's limit that the effort has."""
+        known, layout = self.rebuilt.known, self.character.layout
+        shares = np.zeros(len(known.effort_limits))
+        if effort is not None and self.shows["torques"]:
+            norms, limits = layout.norms(effort), known.effort_limits
+            shares = np.divide(norms, limits, out=shares, where=limits > 0.0)
+        for row, vector in enumerate(self._vectors):
+            share = 0.0 if vector is None else min(float(shares[vector]), 1.0)
+            level = round(_LEVELS * share)
+            if level == self._levels[row]:
+                continue
+            self._levels[row] = level
+            for mesh, color in zip(self._meshes[row], self._colors[row], strict=True):
+                mesh.color = _rgb(color + (_STRAINED - color) * (level / _LEVELS))
+
+    def _draw_balance(self, contacts: WrenchArrays | None) -> None:
+        """Draw the centre of mass, the point below it, and the support polygon."""
+        shown = self.shows["balance"] and self.character.layout.has_floating_base
+        self._centre.visible = self._below.visible = shown
+        corners = np.empty((0, 2))
+        if shown:
+            centre = self._model.centre_of_mass()
+            self._centre.position = centre
+            self._below.position = (*centre[:2], _ABOVE_GROUND)
+            links = contacts.links if contacts is not None else ()
+            rows = [self._rows[link] for link in links if link in self._rows]
+            corners = support_polygon(
+                [self._outlines[row] for row in rows], self.origins[rows], self.turns_xyzw[rows]
+            )
+        self._support.visible = len(corners) > 1
+        if len(corners) > 1:
+            ring = np.column_stack((corners, np.full(len(corners), _ABOVE_GROUND)))
+            self._support.points = np.stack((ring, np.roll(ring, -1, axis=0)), axis=1)
+
+    def _draw_arrows(self, what: str, wrenches: WrenchArrays | None) -> None:
+        """Draw forces: those of contacts from where they act, pushes to where they act."""
+        arrows = []
+        if wrenches is not None and self.shows["forces"]:
+            for number, link in enumerate(wrenches.links):
+                row = self._rows.get(link)
+                force = wrenches.wrenches[number, :3] / (self.character.mass * _GRAVITY)
+                size = float(np.linalg.norm(force))
+                if row is None or size < _LEAST:
+                    continue
+                points = wrenches.points
+                at = self.point(row, points[number] if len(points) else self._centres[row])
+                along = force * min(_METRES_A_WEIGHT, _LONGEST / size)
+                arrows.append((at, at + along) if what == "contacts" else (at - along, at))
+        handle = self._arrows[what]
+        handle.visible = bool(arrows)
+        if arrows:
+            handle.points = np.array(arrows)
+
+    def point(self, row: int, local: FloatArray) -> FloatArray:
+        """A point (3,) of a link, m in its frame, in the world."""
+        place: FloatArray = self.origins[row] + rotations.rotate(self.turns_xyzw[row], local)
+        return place
+
+    def local(self, row: int, point: FloatArray) -> FloatArray:
+        """A point (3,) of the world in a link's frame, m."""
+        turn = rotations.conjugate(self.turns_xyzw[row])
+        return rotations.rotate(turn, point - self.origins[row])
+
+    def centre_of(self, row: int) -> FloatArray:
+        """A link's centre of mass (3,), m, world."""
+        return self.point(row, self._centres[row])
+
+
+def _around(shapes: Sequence[Shape]) -> Spheres:
+    return Spheres.joined([Spheres(np.empty((0, 3)), np.empty(0)), *map(outline, shapes)])
+
+
+def _last_vectors(rebuilt: Rebuilt) -> list[int | None]:
+    """Of each link the number of the physical vector of its joint; None where it is not driven."""
+    numbers: dict[str, int] = {}
+    count = 0
+    for joint in rebuilt.character.layout.joints:
+        numbers[joint.name] = count
+        count += len(joint.vectors)
+    return [
+        None
+        if link.joint.type in (JointType.FIXED, JointType.FLOATING)
+        else numbers[link.joint.name]
+        for link in rebuilt.character.links
+    ]
+
+
+def _rgb(color: FloatArray) -> tuple[int, int, int]:
+    red, green, blue = (round(part) for part in np.clip(color, 0.0, 255.0).tolist())
+    return red, green, blue
+
+
+def _wxyz(turn_xyzw: FloatArray) -> Any:
+    return rotations.wxyz_from_xyzw(turn_xyzw)

@@ -1,0 +1,37 @@
+"""The executable `viewer`."""
+
+from collections.abc import Callable
+from typing import NoReturn
+
+from msgs_config.errors import ConfigurationError
+from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, use_batch_scheduling
+
+_ABOUT = """\
+Shows all characters of the simulators in its namespace in a browser, at the address that it prints.
+
+"""
+
+
+def main() -> NoReturn:
+    """Run the viewer until a signal."""
+    limit_threads()
+    use_batch_scheduling()
+    run_node(_load, _ABOUT)
+
+
+def _load() -> Callable[[], RunnableNode]:
+    try:
+        import viser
+    except ImportError as error:
+        raise ConfigurationError(
+            "the viewer needs the extra 'view': pip install 'actuated_characters[view]', or in a "
+            "clone .venv/bin/pip install -e '.[view]'"
+        ) from error
+    del viser
+    from actuated_characters.viewer.node import ViewerNode
+
+    return ViewerNode
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,162 @@
+"""`viewer`: shows characters in a browser; subscribes like any other node, and delays none."""
+
+import time
+from collections import deque
+from typing import Any
+
+import viser
+from rclpy.node import Node
+
+from actuated_characters.bags.rebuilding import Rebuilt
+from actuated_characters.viewer.drawn_character import Bind, DrawnCharacter
+from actuated_characters.viewer.request_check import LOOPBACK, RequestCheck, is_loopback
+from actuated_characters.viewer.scene import WORLD, BrowserScene, DrawnBalls
+from actuated_characters.viewer.server import open_socket, start_server, stop_server
+from actuated_characters.viewer.simulators import Simulators, Watched
+from msgs_config.errors import ActuatedCharactersError
+from msgs_config.messages import topics
+from msgs_config.parameters import Parameter, resolve
+from msgs_config.runtime.once_logger import OnceLogger
+from msgs_config.runtime.polling import PollingExecutor
+from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.ros_parameters import declare, given_parameters
+
+PARAMETERS = [
+    Parameter("host", LOOPBACK, "address to listen on; others than 127.0.0.1 let others in"),
+    Parameter("port", 0, "port to listen on; 0: the first free one from 8080 on", maximum=65535),
+    Parameter("fps", 30.0, "most pictures a second", unit="Hz", minimum=1.0, maximum=120.0),
+]
+_SEARCH_PERIOD = 1.0  # s between looks for simulators
+_IDLE_PERIOD = 0.1  # s between looks for clients
+_LEAST_REST = 0.003  # s a picture, for the threads that send it
+_LEAF = "character"  # below a namespace's name in the scene, where there may be other namespaces
+_MOST_REJECTIONS = 100  # between looks
+
+
+class ViewerNode(Node):
+    """Draws the newest state of every character, at most so many times a second."""
+
+    def __init__(self, **options: Any) -> None:
+        """Open the server; `options` are rclpy's own of every node.
+
+        Raises:
+            ActuatedCharactersError: a parameter is wrong, or the port cannot be listened on.
+        """
+        super().__init__(topics.VIEWER_NODE, **options)
+        values = resolve(PARAMETERS, given_parameters(self))
+        declare(self, PARAMETERS, values)
+        self._period = 1.0 / values.number("fps")
+        self._once_logger = OnceLogger(self)
+        host = values.text("host")
+        self._rejections: deque[str] = deque(maxlen=_MOST_REJECTIONS)
+        listening = open_socket(host, values.integer("port") or None)
+        self._server = start_server(listening, RequestCheck(host), self._rejections.append)
+        self._scene = BrowserScene(self._server)
+        self._simulators = Simulators(self, self.get_namespace().rstrip("/"), self._log)
+        self._drawn: dict[str, DrawnCharacter] = {}
+        self._balls: dict[str, DrawnBalls] = {}
+        self._announce(host, listening.getsockname()[1])
+
+    def _announce(self, host: str, port: int) -> None:
+        place = f"[{host}]" if ":" in host else host
+        print(f"http://{place}:{port}", flush=True)
+        if not is_loopback(host):
+            self.get_logger().warning(
+                f"listening on {host}: all who reach port {port} of this machine can watch, push "
+                "and set parameters; without --host only this machine can"
+            )
+
+    def run(self, stop: StopSignal) -> None:
+        """Draw until `stop`."""
+        executor = PollingExecutor(self)
+        next_search = before = 0.0
+        try:
+            while not stop:
+                now = time.monotonic()
+                executor.serve_pending()
+                if now >= next_search:
+                    next_search = now + _SEARCH_PERIOD
+                    self._search()
+                is_watched = bool(self._server.get_clients())
+                self._update(is_watched=is_watched, seconds=now - before)
+                before = now
+                rest = (self._period if is_watched else _IDLE_PERIOD) - (time.monotonic() - now)
+                time.sleep(max(rest, _LEAST_REST))
+        finally:
+            self._simulators.watch(watches=False)
+            stop_server(self._server)
+            executor.close()
+
+    def _search(self) -> None:
+        self._simulators.look()
+        for watched in self._simulators.gone():
+            self._remove(watched.below)
+        for reason in self._take_rejections():
+            self._log(f"rejected a request: {reason}")
+
+    def _update(self, *, is_watched: bool, seconds: float) -> None:
+        """Bring the scene to the newest states; `seconds` since the last call."""
+        for watched in self._simulators.changed():
+            self._rebuild(watched)
+        self._simulators.watch(watches=is_watched)
+        if not is_watched:
+            return
+        with self._server.atomic():
+            for watched in self._simulators.characters:
+                self._draw(watched)
+            for simulator, reader in self._simulators.balls.items():
+                if simulator not in self._balls:
+                    name = f"{WORLD}/balls{simulator}"
+                    self._balls[simulator] = DrawnBalls(self._scene.api, name)
+                self._balls[simulator].draw(*reader.take())
+            self._scene.follow_characters(list(self._drawn.values()), seconds)
+
+    def _draw(self, watched: Watched) -> None:
+        if watched.is_new_episode and watched.simulator in self._balls:
+            self._balls[watched.simulator].remove()
+        drawn = self._drawn.get(watched.below)
+        if drawn is not None and watched.reader is not None and watched.reader.take():
+            drawn.draw(watched.reader.sample)
+
+    def _rebuild(self, watched: Watched) -> None:
+        """Draw a character as it is described now; one that a restart left as it was stays."""
+        rebuilt, before = watched.rebuilt, self._drawn.get(watched.below)
+        assert rebuilt is not None
+        if before is not None and _looks_alike(before.rebuilt, rebuilt):
+            before.rebuilt = rebuilt
+            return
+        self._remove(watched.below)
+        name = f"{WORLD}/characters{watched.below}/{_LEAF}"
+        try:
+            with self._server.atomic():
+                self._drawn[watched.below] = DrawnCharacter(
+                    self._scene.api, name, rebuilt, self._bind(watched.below)
+                )
+        except ActuatedCharactersError as error:
+            self._log(f"'{rebuilt.character.name}' cannot be drawn: {error}")
+
+    def _bind(self, below: str) -> Bind:
+        def bind(mesh: viser.MeshHandle, row: int) -> None:
+            del mesh, row
+
+        del below
+        return bind
+
+    def _remove(self, below: str) -> None:
+        if (drawn := self._drawn.pop(below, None)) is not None:
+            drawn.remove()
+
+    def _log(self, sentence: str) -> None:
+        self._once_logger.log_once(sentence)
+
+    def _take_rejections(self) -> list[str]:
+        """What was rejected since the last call; noted in the server's thread."""
+        taken = []
+        while self._rejections:
+            taken.append(self._rejections.popleft())
+        return taken
+
+
+def _looks_alike(a: Rebuilt, b: Rebuilt) -> bool:
+    one, other = a.character, b.character
+    return (one.links, one.layout.joints) == (other.links, other.layout.joints)

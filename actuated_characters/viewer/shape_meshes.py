@@ -1,0 +1,54 @@
+"""Shapes of links as triangles, as a browser draws them."""
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from actuated_characters.render.engine.surfaces import round_surface
+from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.character.meshes.triangles import read_vertices
+from msgs_config.character.model import Shape, ShapeType
+from msgs_config.errors import CharacterError
+
+_CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
+_SIDES = np.array(  # corners of each, counterclockwise from outside
+    [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+)
+
+
+def triangles_of(shape: Shape) -> tuple[FloatArray, IntArray]:
+    """Vertices (m, 3) in m in the shape's own frame, and which of them are triangles (k, 3).
+
+    Corners of a box are not shared by its sides, nor those of a mesh by its triangles, so that
+    edges stay sharp.
+
+    Raises:
+        CharacterError: the shape is a mesh that cannot be used; names its file.
+    """
+    if shape.type is ShapeType.BOX:
+        vertices = (_CORNERS * np.array(shape.size))[_SIDES].reshape(-1, 3)
+        first = 4 * np.arange(len(_SIDES))[:, np.newaxis]
+        return vertices, np.concatenate((first + np.array((0, 1, 2)), first + np.array((0, 2, 3))))
+    if shape.type is not ShapeType.MESH:
+        surface = round_surface(shape)
+        return surface.vertices, surface.triangles
+    vertices, triangles = _read_mesh(Path(shape.mesh))
+    scale = np.array(shape.size)
+    if np.prod(scale) < 0.0:  # a mirror turns triangles inside out
+        triangles = triangles[:, ::-1]
+    return vertices * scale, triangles
+
+
+def _read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
+    vertices = read_vertices(path)  # which checks the file
+    if path.suffix.lower() != ".obj":
+        return vertices, np.arange(len(vertices)).reshape(-1, 3)
+    import trimesh
+
+    try:
+        mesh = trimesh.load_mesh(path, process=False, skip_materials=True)
+        return np.array(mesh.vertices), np.array(mesh.faces)
+    except Exception as error:  # whatever a reader of others makes of a broken file
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        raise CharacterError(f"mesh {path} cannot be drawn: {reason}") from error

@@ -1,0 +1,146 @@
+"""A real browser without a window: Chromium, driven by its DevTools protocol over a websocket.
+
+https://chromedevtools.github.io/devtools-protocol/
+"""
+
+import base64
+import io
+import json
+import os
+import shutil
+import signal
+import subprocess
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from websockets.sync.client import ClientConnection, connect
+
+from tests.support.ros import wait_until
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
+
+needs_chromium = pytest.mark.skipif(
+    not CHROMIUM, reason="not run: chromium is not installed (Debian: apt-get install chromium)"
+)
+
+SIZE = (800, 600)  # of the window, in pixels
+SHIFT = 8  # of DevTools' bits of modifiers
+
+Pixels = NDArray[np.uint8]
+
+_PATIENCE = 60.0  # s; WebGL by a processor takes its time
+_OPTIONS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+    "--remote-debugging-port=0",
+    f"--window-size={SIZE[0]},{SIZE[1]}",
+)
+
+
+class Browser:
+    """One page of a Chromium that ends with `close`."""
+
+    def __init__(self, folder: Path) -> None:
+        profile = folder / "chromium"
+        with (folder / "chromium.log").open("wb") as log:
+            self._process = subprocess.Popen(
+                [CHROMIUM, *_OPTIONS, f"--user-data-dir={profile}", "about:blank"],
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        told = profile / "DevToolsActivePort"
+        wait_until(
+            lambda: told.exists() and len(told.read_text().splitlines()) > 1, "chromium", _PATIENCE
+        )
+        port = told.read_text().splitlines()[0]
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json/list", timeout=10.0) as listed:
+            pages = [each for each in json.load(listed) if each["type"] == "page"]
+        self._page: ClientConnection = connect(
+            pages[0]["webSocketDebuggerUrl"], max_size=None, ping_interval=None
+        )
+        self._number = 0
+        self.console: list[str] = []
+        self.call("Page.enable")
+        self.call("Runtime.enable")
+
+    def call(self, method: str, **parameters: object) -> dict[str, Any]:
+        """Call a method of the protocol, and wait for its result."""
+        self._number += 1
+        call = {"id": self._number, "method": method, "params": parameters}
+        self._page.send(json.dumps(call))
+        while True:
+            message = json.loads(self._page.recv(timeout=_PATIENCE))
+            if message.get("id") == self._number:
+                assert "error" not in message, message["error"]
+                result: dict[str, Any] = message["result"]
+                return result
+            if message.get("method") == "Runtime.exceptionThrown":
+                self.console.append(message["params"]["exceptionDetails"]["text"])
+
+    def open(self, url: str) -> None:
+        """Load a page."""
+        self.call("Page.navigate", url=url)
+
+    def evaluate(self, expression: str) -> Any:
+        """The value of an expression of JavaScript in the page."""
+        result = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
+        return result["result"].get("value")
+
+    def png(self) -> bytes:
+        """A picture of the page."""
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+
+    def pixels(self) -> Pixels:
+        """A picture of the page (height, width, 3)."""
+        from PIL import Image
+
+        return np.asarray(Image.open(io.BytesIO(self.png())).convert("RGB"))
+
+    def mouse(self, kind: str, x: float, y: float, *, pressed: bool = False, keys: int = 0) -> None:
+        """An event of the mouse: mouseMoved, mousePressed or mouseReleased, at a pixel."""
+        button = {} if kind == "mouseMoved" and not pressed else {"button": "left"}
+        self.call(
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=x,
+            y=y,
+            modifiers=keys,
+            buttons=int(pressed),
+            clickCount=int(kind != "mouseMoved"),
+            **button,
+        )
+
+    def press(self, x: float, y: float, *, keys: int = 0) -> None:
+        """Press the left button at a pixel."""
+        self.mouse("mouseMoved", x, y, keys=keys)
+        self.mouse("mousePressed", x, y, pressed=True, keys=keys)
+
+    def click(self, label: str) -> bool:
+        """Click on the button with a label; whether there is one."""
+        expression = f"""(() => {{
+            const found = [...document.querySelectorAll("button, label")].find(
+                each => each.innerText.trim() === {json.dumps(label)});
+            if (found) found.click();
+            return Boolean(found);
+        }})()"""
+        return bool(self.evaluate(expression))
+
+    def close(self) -> None:
+        """End the browser with all its processes, whatever they are doing."""
+        self._page.close()
+        os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
