@@ -1,6 +1,6 @@
 """One character in the browser: its links, its reference, and what acts on it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,14 @@ _LONGEST = 2.0  # m, of an arrow
 _LEAST = 1e-3  # of the weight, that an arrow shows
 _ABOVE_GROUND = 0.004  # m, of what is drawn on it
 _GRAVITY = 9.81
+
+SHOWN = {
+    "reference": "Reference",
+    "forces": "Contacts and pushes",
+    "balance": "Centre of mass and support",
+    "torques": "Torques against limits",
+}
+"""What is drawn beside the character itself, and what the panel calls it."""
 
 Bind = Callable[[viser.MeshHandle, int], None]
 """Makes a shape of a link, by its number, one that can be touched."""
@@ -83,8 +91,7 @@ class DrawnCharacter:
         )
         self.origins: FloatArray = np.zeros((len(shapes), 3))
         self.turns_xyzw: FloatArray = np.tile((0.0, 0.0, 0.0, 1.0), (len(shapes), 1))
-        self.shows = {"reference": True, "forces": True, "balance": True, "torques": True}
-        """What is drawn beside the character itself."""
+        self.shows: Mapping[str, bool] = dict.fromkeys(SHOWN, True)
 
     def _add(self, name: str, shape: Shape, *, ghost: bool = False) -> viser.MeshHandle:
         vertices, faces = triangles_of(shape)

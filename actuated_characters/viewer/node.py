@@ -2,13 +2,15 @@
 
 import time
 from collections import deque
+from queue import SimpleQueue
 from typing import Any
 
-import viser
 from rclpy.node import Node
 
 from actuated_characters.bags.rebuilding import Rebuilt
-from actuated_characters.viewer.drawn_character import Bind, DrawnCharacter
+from actuated_characters.viewer.drawn_character import DrawnCharacter
+from actuated_characters.viewer.hands import Action, Hands
+from actuated_characters.viewer.panel import Panel
 from actuated_characters.viewer.request_check import LOOPBACK, RequestCheck, is_loopback
 from actuated_characters.viewer.scene import WORLD, BrowserScene, DrawnBalls
 from actuated_characters.viewer.server import open_socket, start_server, stop_server
@@ -52,7 +54,11 @@ class ViewerNode(Node):
         listening = open_socket(host, values.integer("port") or None)
         self._server = start_server(listening, RequestCheck(host), self._rejections.append)
         self._scene = BrowserScene(self._server)
+        self._actions: SimpleQueue[Action] = SimpleQueue()
+        self._hands = Hands(self, self._scene, self._actions)
+        self._panel = Panel(self, self._server.gui, self._scene, self._hands, self._actions)
         self._simulators = Simulators(self, self.get_namespace().rstrip("/"), self._log)
+        self._chosen: str | None = None  # session of the character that the panel is about
         self._drawn: dict[str, DrawnCharacter] = {}
         self._balls: dict[str, DrawnBalls] = {}
         self._announce(host, listening.getsockname()[1])
@@ -99,6 +105,9 @@ class ViewerNode(Node):
         for watched in self._simulators.changed():
             self._rebuild(watched)
         self._simulators.watch(watches=is_watched)
+        for _ in range(self._actions.qsize()):
+            self._actions.get()()
+        self._show_panel()
         if not is_watched:
             return
         with self._server.atomic():
@@ -109,14 +118,38 @@ class ViewerNode(Node):
                     name = f"{WORLD}/balls{simulator}"
                     self._balls[simulator] = DrawnBalls(self._scene.api, name)
                 self._balls[simulator].draw(*reader.take())
+            self._hands.pull(self._drawn, self._stamps_ns())
             self._scene.follow_characters(list(self._drawn.values()), seconds)
 
     def _draw(self, watched: Watched) -> None:
         if watched.is_new_episode and watched.simulator in self._balls:
             self._balls[watched.simulator].remove()
         drawn = self._drawn.get(watched.below)
+        if drawn is not None:
+            drawn.shows = self._panel.shows
         if drawn is not None and watched.reader is not None and watched.reader.take():
             drawn.draw(watched.reader.sample)
+
+    def _show_panel(self) -> None:
+        """Have the panel be about the first character, and show its time."""
+        known = self._simulators.characters
+        first = next((each for each in known if each.below in self._drawn), None)
+        if first is None:
+            self._panel.update(None)
+            return
+        if self._chosen != first.readers_session and first.reader is not None:
+            self._chosen = first.readers_session
+            self._panel.choose(self._drawn[first.below], first.simulator, first.below)
+        self._panel.update(self._stamps_ns().get(first.below))
+
+    def _stamps_ns(self) -> dict[str, int]:
+        """Stamps of the newest states, by the characters' namespaces."""
+        states = {
+            each.below: each.reader.sample.state
+            for each in self._simulators.characters
+            if each.reader is not None
+        }
+        return {below: state.stamp_ns for below, state in states.items() if state is not None}
 
     def _rebuild(self, watched: Watched) -> None:
         """Draw a character as it is described now; one that a restart left as it was stays."""
@@ -126,21 +159,15 @@ class ViewerNode(Node):
             before.rebuilt = rebuilt
             return
         self._remove(watched.below)
-        name = f"{WORLD}/characters{watched.below}/{_LEAF}"
+        below = watched.below
+        name = f"{WORLD}/characters{below}/{_LEAF}"
+        bind = self._hands.bind(below, lambda: self._drawn.get(below))
+        self._hands.open_topics(below, watched.simulator)
         try:
             with self._server.atomic():
-                self._drawn[watched.below] = DrawnCharacter(
-                    self._scene.api, name, rebuilt, self._bind(watched.below)
-                )
+                self._drawn[below] = DrawnCharacter(self._scene.api, name, rebuilt, bind)
         except ActuatedCharactersError as error:
             self._log(f"'{rebuilt.character.name}' cannot be drawn: {error}")
-
-    def _bind(self, below: str) -> Bind:
-        def bind(mesh: viser.MeshHandle, row: int) -> None:
-            del mesh, row
-
-        del below
-        return bind
 
     def _remove(self, below: str) -> None:
         if (drawn := self._drawn.pop(below, None)) is not None:

@@ -12,7 +12,7 @@ from tests.support.ros import Processes
 
 PROJECT = Path(__file__).parents[2]
 PACKAGE = "actuated_characters"
-EXECUTABLES = {"sim_node", "controller_node", "composed", "recorder", PACKAGE}
+EXECUTABLES = {"sim_node", "controller_node", "composed", "recorder", "viewer", PACKAGE}
 NOT_SOURCES = (".*", "__pycache__", "*.egg-info", "build", "install", "log", "runs")
 AS_COLCON_DOES = ("--single-version-externally-managed", "--record", "install.log")
 

@@ -1,0 +1,145 @@
+"""The panel beside the scene: the run, what is shown, touch, and the controller's parameters."""
+
+from collections.abc import Callable
+from functools import partial
+from queue import SimpleQueue
+from typing import Any
+
+import viser
+from rclpy.node import Node
+from std_srvs.srv import SetBool, Trigger
+
+from actuated_characters.viewer.drawn_character import SHOWN, DrawnCharacter
+from actuated_characters.viewer.hands import Action, Hands
+from actuated_characters.viewer.parameter_controls import ParameterControls
+from actuated_characters.viewer.requests import Requests
+from actuated_characters.viewer.scene import BrowserScene
+from msgs_config.messages import topics
+
+_SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 1.0, "2": 2.0}
+_PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
+_HELP = "Drag a body to push it. Shift and click throws a ball at it."
+_LONGEST = 300  # characters of what a node says
+_MARKUP = str.maketrans({mark: f"\\{mark}" for mark in "\\`*_{}[]<>#|~$&"})
+
+
+class Panel:
+    """The panel of all clients, about one character of those that there are."""
+
+    def __init__(
+        self,
+        node: Node,
+        gui: viser.GuiApi,
+        scene: BrowserScene,
+        hands: Hands,
+        actions: "SimpleQueue[Action]",
+    ) -> None:
+        self._gui, self._scene, self._hands, self._actions = gui, scene, hands, actions
+        self._node = node
+        self.requests = Requests(node)
+        self.shows = dict.fromkeys(SHOWN, True)
+        self._character: DrawnCharacter | None = None
+        self._simulator = self._below = ""
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        gui.set_panel_label("actuated characters")
+        self._state = gui.add_markdown("no simulator")
+        self._add_run()
+        self._told = gui.add_markdown(_HELP)
+        self._add_touch()
+        self._add_shown()
+        self._controls = ParameterControls(gui, self.requests, self._later, self.tell)
+
+    def _later(self, function: Callable[..., None], value: Callable[[], Any]) -> Callable[..., Any]:
+        """A callback of viser that has the node's thread call a function with a value."""
+
+        async def change(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:  # else it is what this panel has set itself
+                self._actions.put(partial(function, value()))
+
+        return change
+
+    def _add_run(self) -> None:
+        buttons = self._gui.add_button_group("Run", (_PAUSE, _RESUME, _STEP, _RESET))
+        buttons.on_click(self._later(self._control, lambda: buttons.value))
+        self._speed: Any = self._gui.add_dropdown(
+            "Speed", tuple(_SPEEDS), initial_value="1", hint="simulated time over wall time"
+        )
+        self._speed.on_update(self._later(self._set_speed, lambda: self._speed.value))
+
+    def _add_touch(self) -> None:
+        gui, hands = self._gui, self._hands
+        with gui.add_folder("Touch", expand_by_default=False):
+            for label, name, limits in (
+                ("Spring (N/m)", "stiffness", (50.0, 3000.0, 50.0)),
+                ("Ball (kg)", "ball_mass", (0.1, 20.0, 0.1)),
+                ("Ball (m/s)", "ball_speed", (1.0, 30.0, 0.5)),
+            ):
+                slider = gui.add_slider(label, *limits, initial_value=float(getattr(hands, name)))
+                slider.on_update(self._later(partial(setattr, hands, name), _value_of(slider)))
+
+    def _add_shown(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Show", expand_by_default=False):
+            for name, label in SHOWN.items():
+                box = gui.add_checkbox(label, initial_value=True)
+                box.on_update(self._later(partial(self._show, name), _value_of(box)))
+            follows = gui.add_checkbox("Follow", initial_value=True)
+            follows.on_update(
+                self._later(partial(setattr, self._scene, "follows"), _value_of(follows))
+            )
+
+    def _show(self, name: str, is_shown: bool) -> None:
+        self.shows[name] = is_shown
+
+    def choose(self, character: DrawnCharacter, simulator: str, below: str) -> None:
+        """Be about a character from now on, below a namespace, of a simulator's."""
+        self._character, self._simulator, self._below = character, simulator, below
+        node = f"{simulator}/{topics.SIM_NODE}"
+        self.requests.get(node, ["real_time_factor", "wrench_duration"], self._take_settings)
+        self._controls.choose(f"{below}/{topics.CONTROLLER_NODE}")
+
+    def _take_settings(self, values: dict[str, object]) -> None:
+        factor, duration = values.get("real_time_factor"), values.get("wrench_duration")
+        speed = next((label for label, each in _SPEEDS.items() if each == factor), None)
+        if speed is not None:
+            self._speed.value = speed
+        if isinstance(duration, float):
+            self._hands.wrench_durations[self._simulator] = duration
+
+    def update(self, stamp_ns: int | None) -> None:
+        """Show the time of the newest state, and hand out what nodes have responded."""
+        self.requests.poll()
+        if self._character is None or stamp_ns is None:
+            return
+        name = self._character.character.name.translate(_MARKUP)
+        text = f"**{name}** {self._below.lstrip('/')}  \n{1e-9 * stamp_ns:.2f} s"
+        if self._state.content != text:
+            self._state.content = text
+
+    def tell(self, sentence: str) -> None:
+        """Show a sentence, of a node for instance, as it is."""
+        self._told.content = (sentence[:_LONGEST] or _HELP).translate(_MARKUP)
+
+    def _tell_of(self, node: str, sentence: str) -> None:
+        self.tell(f"{node}: {sentence}")
+
+    def _control(self, button: str) -> None:
+        node = f"{self._simulator}/{topics.SIM_NODE}"
+        tell = partial(self._tell_of, topics.SIM_NODE)
+        if button in (_PAUSE, _RESUME):
+            content = SetBool.Request(data=button == _PAUSE)
+            self.requests.trigger(SetBool, f"{node}/pause", content, tell)
+        else:
+            service = f"{node}/{button.lower()}"
+            self.requests.trigger(Trigger, service, Trigger.Request(), tell)
+
+    def _set_speed(self, label: str) -> None:
+        node = f"{self._simulator}/{topics.SIM_NODE}"
+        tell = partial(self._tell_of, f"real_time_factor {_SPEEDS[label]:g}")
+        self.requests.set(
+            node, "real_time_factor", _SPEEDS[label], lambda reason: tell(reason or "set")
+        )
+
+
+def _value_of(handle: Any) -> Callable[[], Any]:
+    return lambda: handle.value
