@@ -2,11 +2,14 @@
 
 import argparse
 import os
+import re
 import sys
 
 from actuated_characters.commands.common.settings import Commands, add_command
+from msgs_config.errors import ConfigurationError
 
 _FPS = 30.0
+_NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
 _MODULE = "actuated_characters.viewer.main"
 
 
@@ -55,6 +58,10 @@ def server_parameters(options: argparse.Namespace) -> dict[str, object]:
 
 def _view(options: argparse.Namespace) -> None:
     """Become the node, which has this process's signals and terminal."""
+    if not _NAMESPACE.fullmatch(options.namespace):
+        raise ConfigurationError(
+            f"--namespace is {options.namespace!r}; it must be / or like /lab or /lab/left"
+        )
     arguments = ["--ros-args", "-r", f"__ns:={options.namespace}"]
     for name, value in server_parameters(options).items():
         given = f"'{value}'" if isinstance(value, str) else value  # an address is no YAML number

@@ -26,6 +26,7 @@ from msgs_config.messages import configuration
 from msgs_config.messages.session import SESSION, make_session
 
 _START_TIMEOUT = 120.0  # s until the first answer, on a machine that may be busy with other things
+_VIEWER_TIMEOUT = 30.0  # s until its page is there
 _POLL_PERIOD = 0.05  # s
 _IN_PROCESS_REPORT = 100  # ticks between reports of progress
 _TICK = "tick "  # begins the recorder's lines about its progress
@@ -61,9 +62,8 @@ def run_over_topics(
     With `composed`, controller and simulator are nodes of one process. `recording` has parameters
     of the recorder: how the bag is stored, topics more or fewer. Pushes and throws are sent by one
     more process; in lockstep all are there before the first tick. With parameters of the node
-    `fork` that process is the node, which repeats a recording, with so many resets.
-    With `viewer`, its parameters,
-    one more shows the characters in a browser; the run does not wait for it.
+    `fork` that process is the node, which repeats a recording, with so many resets. With `viewer`,
+    its parameters, one more shows the characters in a browser; the run waits for its page alone.
 
     Raises:
         RunError: one of the processes failed, with its own message, or the simulator rejected a
@@ -108,15 +108,23 @@ def _check_recorded(directory: Path, ticks: int, counts: Mapping[str, int]) -> N
 
 
 def _watching(viewer: Child, progress: Progress) -> Progress:
-    """Report progress, and also once each where the viewer's page is, and that it has ended."""
-    ended = False
+    """Wait for the viewer's page, so that all can be seen; returns a report of progress.
+
+    That reports also, once, that the viewer has ended: the run goes on without it.
+    """
+    deadline = time.monotonic() + _VIEWER_TIMEOUT
+    lines: list[str] = []
+    while not lines and viewer.exit_code is None and time.monotonic() < deadline:
+        time.sleep(_POLL_PERIOD)
+        lines = viewer.read_lines()
+    for line in lines:
+        print(f"watch it at {line}", flush=True)
+    has_ended = False
 
     def report(ticks: int) -> None:
-        nonlocal ended
-        for line in viewer.read_lines():
-            print(f"watch it at {line}", flush=True)
-        if viewer.exit_code is not None and not ended:
-            ended = True
+        nonlocal has_ended
+        if viewer.exit_code is not None and not has_ended:
+            has_ended = True
             print(f"the run goes on unseen; viewer failed: {viewer.last_words()}", flush=True)
         progress(ticks)
 

@@ -29,6 +29,7 @@ PARAMETERS = [
     Parameter("fps", 30.0, "most pictures a second", unit="Hz", minimum=1.0, maximum=120.0),
 ]
 _SEARCH_PERIOD = 1.0  # s between looks for simulators
+_FIRST_SEARCH_PERIOD = 0.2  # s, while none is known
 _IDLE_PERIOD = 0.1  # s between looks for clients
 _LEAST_REST = 0.003  # s a picture, for the threads that send it
 _LEAF = "character"  # below a namespace's name in the scene, where there may be other namespaces
@@ -81,7 +82,8 @@ class ViewerNode(Node):
                 now = time.monotonic()
                 executor.serve_pending()
                 if now >= next_search:
-                    next_search = now + _SEARCH_PERIOD
+                    found = bool(self._simulators.characters)
+                    next_search = now + (_SEARCH_PERIOD if found else _FIRST_SEARCH_PERIOD)
                     self._search()
                 is_watched = bool(self._server.get_clients())
                 self._update(is_watched=is_watched, seconds=now - before)

@@ -22,7 +22,8 @@ _BALL, _UNKNOWN_RADIUS = (225, 95, 40), 0.1  # m
 _CATCH_UP = 4.0  # 1/s: how soon the world follows
 _JUMP = 3.0  # m: a distance that is not caught up with but jumped
 _BACKGROUND = (237, 242, 250)
-_EYE, _LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)  # m, from the middle of the characters
+EYE, LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)
+"""Of the camera at first, m, from the point on the ground below the middle of the characters."""
 
 
 class BrowserScene:
@@ -37,8 +38,8 @@ class BrowserScene:
         scene.set_up_direction("+z")
         scene.set_background_image(np.full((2, 2, 3), _BACKGROUND, dtype=np.uint8))
         scene.configure_default_lights(enabled=True, cast_shadow=True)
-        server.initial_camera.position = _EYE
-        server.initial_camera.look_at = _LOOK_AT
+        server.initial_camera.position = EYE
+        server.initial_camera.look_at = LOOK_AT
         self._world = scene.add_frame(WORLD, show_axes=False)
         self._ground = scene.add_grid(
             f"{WORLD}/ground",

@@ -90,8 +90,10 @@ class Browser:
                 self.console.append(message["params"]["exceptionDetails"]["text"])
 
     def open(self, url: str) -> None:
-        """Load a page."""
+        """Load a page, until all of it has come."""
         self.call("Page.navigate", url=url)
+        loaded = f"document.readyState === 'complete' && location.href.startsWith({url!r})"
+        wait_until(lambda: self.evaluate(loaded), f"{url} in the browser", _PATIENCE)
 
     def evaluate(self, expression: str) -> Any:
         """The value of an expression of JavaScript in the page."""
@@ -139,8 +141,13 @@ class Browser:
         }})()"""
         return bool(self.evaluate(expression))
 
-    def close(self) -> None:
+    def kill(self) -> None:
         """End the browser with all its processes, whatever they are doing."""
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+
+    def close(self) -> None:
+        """End it, if it has not ended yet."""
+        self.kill()
         self._page.close()
-        os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()

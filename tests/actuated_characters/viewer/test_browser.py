@@ -1,0 +1,260 @@
+"""The viewer in a real browser: what its page shows, and what a mouse does to the simulation."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from websockets.sync.client import connect
+
+from actuated_characters.viewer.scene import EYE, LOOK_AT
+from msgs_config.messages import topics
+from tests.support.browser import SHIFT, Browser, Pixels, needs_chromium
+from tests.support.ros import Process, Processes, SimulatorClient, stamp_ns, tick_of, wait_until
+
+pytestmark = [pytest.mark.slow, pytest.mark.sharing, needs_chromium]
+
+SOON = 60.0  # s: WebGL by a processor that does other things as well
+COLOURED = 60  # of 255: how much more a colour than grey; ground, sky and ghost have less
+LEAST_PIXELS = 200  # of a character
+BODY = (0.3, 0.55, 0.25, 0.8)  # left, right, top, bottom as shares of the page: without the panel
+
+
+@pytest.fixture
+def walking(processes: Processes) -> Process:
+    """A humanoid that walks as a clip has it, its root assisted, in real time."""
+    walk = {"reference": "clip", "clip": "walk", "root_assistance": True}
+    simulator = {"real_time_factor": 1.0, "commanded_joints": _joints()}
+    return processes.composed(simulator, walk, character="humanoid")
+
+
+@pytest.fixture
+def standing(processes: Processes) -> Process:
+    """A humanoid that holds its rest pose, likewise."""
+    simulator = {"real_time_factor": 1.0, "commanded_joints": _joints()}
+    return processes.composed(simulator, {"root_assistance": True}, character="humanoid")
+
+
+def _joints() -> list[str]:
+    from msgs_config.character.loading import load_character
+
+    return load_character("humanoid").layout.joint_names
+
+
+@pytest.fixture
+def viewer(processes: Processes) -> Process:
+    return processes.node(topics.VIEWER_NODE, fresh=True)
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Browser]:
+    browser = Browser(tmp_path)
+    yield browser
+    browser.close()
+
+
+def address_of(viewer: Process) -> str:
+    def address() -> str:
+        assert viewer.exit_code is None, viewer.stderr
+        return viewer.stdout.strip()
+
+    return str(wait_until(address, "the viewer's address"))
+
+
+def body_of(pixels: Pixels) -> "np.ndarray[tuple[int, int], np.dtype[np.intp]]":
+    """Rows and columns (m, 2) of the pixels that are neither ground nor sky, near the middle."""
+    height, width = pixels.shape[:2]
+    left, right, top, bottom = (
+        round(share * size)
+        for share, size in zip(BODY, (width, width, height, height), strict=True)
+    )
+    part = pixels[top:bottom, left:right].astype(int)
+    coloured = part.max(axis=2) - part.min(axis=2) > COLOURED
+    return np.argwhere(coloured) + np.array((top, left))
+
+
+def until_seen(browser: Browser, viewer: Process) -> tuple[float, float]:
+    """Load the page, and wait for the character; the pixel (x, y) in the middle of it."""
+    browser.open(address_of(viewer))
+    wait_until(
+        lambda: len(body_of(browser.pixels())) > LEAST_PIXELS, "a character on the page", SOON
+    )
+    body = body_of(browser.pixels())
+    # a pixel of the body, as its mean may lie between two arms
+    middle = body[np.argmin(np.abs(body - body.mean(axis=0)).sum(axis=1))]
+    return float(middle[1]), float(middle[0])
+
+
+def root_of(client: SimulatorClient) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
+    state = client.states.last
+    names = list(state.name)
+    return np.array([state.position[names.index(f"root_{axis}")] for axis in "xyz"])
+
+
+def test_a_page_without_a_simulator_shows_the_ground_and_says_so(
+    viewer: Process, browser: Browser
+) -> None:
+    browser.open(address_of(viewer))
+
+    wait_until(
+        lambda: "no simulator" in browser.evaluate("document.body.innerText"), "the panel", SOON
+    )
+
+    assert len(body_of(browser.pixels())) == 0
+
+
+def test_the_page_shows_the_walker_in_the_middle_and_it_moves(
+    walking: Process, viewer: Process, browser: Browser
+) -> None:
+    x, y = until_seen(browser, viewer)
+
+    height, width = browser.pixels().shape[:2]
+    assert abs(x / width - 0.5) < 0.15  # the camera looks at it, and it stays there
+    assert abs(y / height - 0.5) < 0.25
+    first = {tuple(pixel) for pixel in body_of(browser.pixels())}
+    wait_until(
+        lambda: len(first ^ {tuple(pixel) for pixel in body_of(browser.pixels())}) > 100,
+        "the walker moves",
+        SOON,
+    )
+    assert "humanoid" in browser.evaluate("document.body.innerText")
+    assert not browser.console
+    assert walking.exit_code is None
+
+
+def test_a_drag_to_the_right_pushes_to_the_right_and_is_over_when_it_is_let_go(
+    standing: Process, viewer: Process, browser: Browser, client: SimulatorClient
+) -> None:
+    applied = client.listen(topics.APPLIED_WRENCH)
+    forward = np.array(LOOK_AT) - np.array(EYE)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    x, y = until_seen(browser, viewer)
+    client.spin_until(lambda: client.states.messages, "a state")
+    before = root_of(client)
+
+    browser.press(x, y)
+    for step in range(1, 11):
+        browser.mouse("mouseMoved", x + 8 * step, y, pressed=True)
+
+    client.spin_until(lambda: (root_of(client) - before) @ right > 0.02, "the root moves", SOON)
+    pushes = [message for message in applied.messages if message.wrench]
+    forces = [np.array([w.force.x, w.force.y, w.force.z]) for m in pushes for w in m.wrench]
+    shares = [force @ right / np.linalg.norm(force) for force in forces]
+    assert np.median(shares) > 0.9
+    assert len({name for message in pushes for name in message.joint_names}) == 1
+
+    browser.mouse("mouseReleased", x + 80, y)
+    client.spin_until(lambda: not applied.last.wrench, "no push any more")
+    client.spin_until(lambda: (root_of(client) - before) @ right < 0.015, "the root goes back")
+    assert standing.exit_code is None
+
+
+def test_a_click_with_shift_throws_a_ball_that_hits(
+    standing: Process, viewer: Process, browser: Browser, client: SimulatorClient
+) -> None:
+    thrown, contacts = client.listen(topics.APPLIED_THROW), client.listen(topics.CONTACTS)
+    x, y = until_seen(browser, viewer)
+
+    browser.press(x, y, keys=SHIFT)
+    browser.mouse("mouseReleased", x, y, keys=SHIFT)
+
+    client.spin_until(lambda: thrown.messages, "a ball", SOON)
+    numbers = dict(zip(thrown.last.name, thrown.last.position, strict=True))
+    assert numbers["mass"] == 2.0
+    released = stamp_ns(thrown.last)
+    feet = {"right_ankle", "left_ankle"}
+
+    def struck() -> bool:
+        return any(
+            set(message.joint_names) - feet
+            for message in contacts.messages
+            if stamp_ns(message) > released
+        )
+
+    client.spin_until(struck, "the ball hits")
+    assert standing.exit_code is None
+
+
+def test_pause_holds_the_tick_and_resume_lets_it_go_on(
+    walking: Process, viewer: Process, browser: Browser, client: SimulatorClient
+) -> None:
+    until_seen(browser, viewer)
+    client.spin_until(lambda: client.states.messages, "a state")
+
+    assert browser.click("Pause")
+    wait_until(
+        lambda: "sim_node: paused" in browser.evaluate("document.body.innerText"), "paused", SOON
+    )
+    report = client.reported(paused=True)
+    tick = next(int(item.value) for item in report.values if item.key == "tick")
+    client.spin_until(lambda: tick_of(client.states.last) >= tick, "the last state")
+    again = len(client.diagnostics.messages)
+    client.spin_until(lambda: len(client.diagnostics.messages) > again + 1, "two more reports")
+    assert tick_of(client.states.last) == tick
+
+    assert browser.click("Step")
+    client.spin_until(lambda: tick_of(client.states.last) == tick + 1, "a step", SOON)
+    assert browser.click("Resume")
+    client.spin_until(lambda: tick_of(client.states.last) > tick + 10, "it goes on", SOON)
+    assert walking.exit_code is None
+
+
+def test_a_control_sets_the_controllers_parameter(
+    walking: Process, viewer: Process, browser: Browser, client: SimulatorClient
+) -> None:
+    until_seen(browser, viewer)
+
+    wait_until(lambda: browser.click("Balance"), "the controller's parameters", SOON)
+
+    node = topics.CONTROLLER_NODE
+    client.spin_until(
+        lambda: client.get_parameters(node, ["balance.enabled"]) == [True], "balance", SOON
+    )
+    wait_until(
+        lambda: "balance.enabled True: set" in browser.evaluate("document.body.innerText"),
+        "that it is set",
+        SOON,
+    )
+    assert walking.exit_code is None
+
+
+def test_a_browser_that_is_killed_in_the_middle_of_a_drag_leaves_no_push_behind(
+    standing: Process, viewer: Process, browser: Browser, client: SimulatorClient
+) -> None:
+    applied = client.listen(topics.APPLIED_WRENCH)
+    x, y = until_seen(browser, viewer)
+    browser.press(x, y)
+    for step in range(1, 6):
+        browser.mouse("mouseMoved", x + 8 * step, y, pressed=True)
+    client.spin_until(lambda: applied.messages and applied.last.wrench, "a push", SOON)
+
+    browser.kill()
+
+    client.spin_until(lambda: not applied.last.wrench, "no push any more", SOON)
+    tick = tick_of(client.states.last)
+    client.spin_until(lambda: tick_of(client.states.last) > tick + 240, "it goes on")
+    assert standing.exit_code is None
+    assert viewer.exit_code is None
+    assert "Traceback" not in viewer.stderr
+    with connect(address_of(viewer).replace("http", "ws"), max_size=None) as other:
+        other.close()
+
+
+def test_a_simulator_that_starts_again_is_shown_again(
+    processes: Processes, walking: Process, viewer: Process, browser: Browser
+) -> None:
+    until_seen(browser, viewer)
+    walking.end()
+    text = browser.evaluate("document.body.innerText")
+
+    processes.composed({"real_time_factor": 1.0}, character="pendulum")
+
+    def shows_the_other() -> bool:
+        shown = browser.evaluate("document.body.innerText")
+        return "pendulum" in shown and "humanoid" not in shown
+
+    assert "humanoid" in text
+    wait_until(shows_the_other, "the other character", SOON, lambda: time.sleep(0.1))
+    assert viewer.exit_code is None
