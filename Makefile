@@ -20,7 +20,7 @@ endif
 # and for each worker of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help venv demo backflip test quick docs hashes pages other-numpy bench soak kills noise long-recording robots format clean distclean
+.PHONY: help venv demo backflip play test quick docs hashes pages other-numpy bench soak kills noise long-recording robots format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -33,6 +33,9 @@ demo: .venv/.installed ## Let the humanoid walk for 20 s and record it in runs/d
 
 backflip: .venv/.installed-plan ## Let the humanoid do a backflip by its joints alone, planned; in runs/backflip
 	$(BIN)/actuated_characters run --clip backflip --duration 1.75 --planner predictive --output runs/backflip --overwrite
+
+play: .venv/.installed-view ## Let a humanoid walk in the browser, to be pushed and pelted with balls; in runs/play
+	$(BIN)/actuated_characters run --view --clip walk --behaviour reactive --duration 600 --set sim_node.wrench_duration:=0.05 --set sim_node.ball_lifetime:=20 --output runs/play --overwrite
 
 test: .venv/.installed-test ## Check style and types, run the tests
 	$(BIN)/ruff check
@@ -116,6 +119,11 @@ distclean: clean ## Remove .venv too
 .venv/.installed-plan: $(PACKAGING) | .venv/.created
 	@echo "installing the package and what the planner needs into .venv ..."
 	@$(BIN)/python -m pip install -qq -e '.[wheels,plan]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
+	@touch .venv/.installed $@
+
+.venv/.installed-view: $(PACKAGING) | .venv/.created
+	@echo "installing the package and its viewer into .venv ..."
+	@$(BIN)/python -m pip install -qq -e '.[wheels,view]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
 	@touch .venv/.installed $@
 
 .venv/.installed-test: $(PACKAGING) | .venv/.created
