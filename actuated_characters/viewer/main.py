@@ -1,11 +1,13 @@
 """The executable `viewer`."""
 
+import os
 from collections.abc import Callable
 from typing import NoReturn
 
 from msgs_config.errors import ConfigurationError
 from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, use_batch_scheduling
 
+_NICE = 5  # pictures can wait on a busy machine, ticks cannot
 _ABOUT = """\
 Shows all characters of the simulators in its namespace in a browser, at the address that it prints.
 
@@ -16,6 +18,7 @@ def main() -> NoReturn:
     """Run the viewer until a signal."""
     limit_threads()
     use_batch_scheduling()
+    os.nice(_NICE)
     run_node(_load, _ABOUT)
 
 

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from actuated_characters.bags.rebuilding import Rebuilt
 from actuated_characters.viewer.drawn_character import DrawnCharacter
 from actuated_characters.viewer.hands import Action, Hands
-from actuated_characters.viewer.panel import Panel
+from actuated_characters.viewer.panel import Panel, Subject
 from actuated_characters.viewer.request_check import LOOPBACK, RequestCheck, is_loopback
 from actuated_characters.viewer.scene import WORLD, BrowserScene, DrawnBalls
 from actuated_characters.viewer.server import open_socket, start_server, stop_server
@@ -59,7 +59,6 @@ class ViewerNode(Node):
         self._hands = Hands(self, self._scene, self._actions)
         self._panel = Panel(self, self._server.gui, self._scene, self._hands, self._actions)
         self._simulators = Simulators(self, self.get_namespace().rstrip("/"), self._log)
-        self._chosen: str | None = None  # session of the character that the panel is about
         self._drawn: dict[str, DrawnCharacter] = {}
         self._balls: dict[str, DrawnBalls] = {}
         self._announce(host, listening.getsockname()[1])
@@ -133,16 +132,18 @@ class ViewerNode(Node):
             drawn.draw(watched.reader.sample)
 
     def _show_panel(self) -> None:
-        """Have the panel be about the first character, and show its time."""
-        known = self._simulators.characters
-        first = next((each for each in known if each.below in self._drawn), None)
-        if first is None:
-            self._panel.update(None)
-            return
-        if self._chosen != first.readers_session and first.reader is not None:
-            self._chosen = first.readers_session
-            self._panel.choose(self._drawn[first.below], first.simulator, first.below)
-        self._panel.update(self._stamps_ns().get(first.below))
+        """Have the panel be about the characters that are seen."""
+        known = {
+            each.below: Subject(
+                self._drawn[each.below].character.name,
+                each.simulator,
+                each.below,
+                each.readers_session,
+            )
+            for each in self._simulators.characters
+            if each.below in self._drawn and each.reader is not None
+        }
+        self._panel.update(known, self._stamps_ns())
 
     def _stamps_ns(self) -> dict[str, int]:
         """Stamps of the newest states, by the characters' namespaces."""

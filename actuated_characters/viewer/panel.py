@@ -1,6 +1,7 @@
 """The panel beside the scene: the run, what is shown, touch, and the controller's parameters."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
@@ -9,7 +10,7 @@ import viser
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from actuated_characters.viewer.drawn_character import SHOWN, DrawnCharacter
+from actuated_characters.viewer.drawn_character import SHOWN
 from actuated_characters.viewer.hands import Action, Hands
 from actuated_characters.viewer.parameter_controls import ParameterControls
 from actuated_characters.viewer.requests import Requests
@@ -19,8 +20,19 @@ from msgs_config.messages import topics
 _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 1.0, "2": 2.0}
 _PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
 _HELP = "Drag a body to push it. Shift and click throws a ball at it."
+_ALONE = "alone"  # the character of a simulator that has one, without a name
 _LONGEST = 300  # characters of what a node says
 _MARKUP = str.maketrans({mark: f"\\{mark}" for mark in "\\`*_{}[]<>#|~$&"})
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A character that the panel can be about."""
+
+    character: str
+    simulator: str  # namespace, which begins with `/` or is empty
+    below: str  # its own namespace, likewise
+    session: str
 
 
 class Panel:
@@ -35,14 +47,14 @@ class Panel:
         actions: "SimpleQueue[Action]",
     ) -> None:
         self._gui, self._scene, self._hands, self._actions = gui, scene, hands, actions
-        self._node = node
         self.requests = Requests(node)
         self.shows = dict.fromkeys(SHOWN, True)
-        self._character: DrawnCharacter | None = None
-        self._simulator = self._below = ""
+        self._subject = Subject("", "", "", "")
+        self._names: tuple[str, ...] = ()
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
         self._state = gui.add_markdown("no simulator")
+        self._which: Any = gui.add_dropdown("Character", (_ALONE,), visible=False)
         self._add_run()
         self._told = gui.add_markdown(_HELP)
         self._add_touch()
@@ -91,12 +103,30 @@ class Panel:
     def _show(self, name: str, is_shown: bool) -> None:
         self.shows[name] = is_shown
 
-    def choose(self, character: DrawnCharacter, simulator: str, below: str) -> None:
-        """Be about a character from now on, below a namespace, of a simulator's."""
-        self._character, self._simulator, self._below = character, simulator, below
-        node = f"{simulator}/{topics.SIM_NODE}"
-        self.requests.get(node, ["real_time_factor", "wrench_duration"], self._take_settings)
-        self._controls.choose(f"{below}/{topics.CONTROLLER_NODE}")
+    def update(self, known: Mapping[str, Subject], stamps_ns: Mapping[str, int]) -> None:
+        """Be about the chosen one of the characters that are known now, by their namespaces.
+
+        Shows the time of its newest state, and hands out what nodes have responded.
+        """
+        self.requests.poll()
+        names = tuple(below.lstrip("/") or _ALONE for below in known)
+        if names and names != self._names:
+            self._names = names
+            self._which.options = names
+            self._which.visible = len(names) > 1
+        chosen = dict(zip(names, known.values(), strict=True)).get(self._which.value)
+        if chosen is None:
+            return
+        if chosen != self._subject:
+            self._subject = chosen
+            node = f"{chosen.simulator}/{topics.SIM_NODE}"
+            self.requests.get(node, ["real_time_factor", "wrench_duration"], self._take_settings)
+            self._controls.choose(f"{chosen.below}/{topics.CONTROLLER_NODE}")
+        stamp_ns = stamps_ns.get(chosen.below)
+        if stamp_ns is not None:
+            text = f"**{chosen.character.translate(_MARKUP)}**  \n{1e-9 * stamp_ns:.2f} s"
+            if self._state.content != text:
+                self._state.content = text
 
     def _take_settings(self, values: dict[str, object]) -> None:
         factor, duration = values.get("real_time_factor"), values.get("wrench_duration")
@@ -104,17 +134,7 @@ class Panel:
         if speed is not None:
             self._speed.value = speed
         if isinstance(duration, float):
-            self._hands.wrench_durations[self._simulator] = duration
-
-    def update(self, stamp_ns: int | None) -> None:
-        """Show the time of the newest state, and hand out what nodes have responded."""
-        self.requests.poll()
-        if self._character is None or stamp_ns is None:
-            return
-        name = self._character.character.name.translate(_MARKUP)
-        text = f"**{name}** {self._below.lstrip('/')}  \n{1e-9 * stamp_ns:.2f} s"
-        if self._state.content != text:
-            self._state.content = text
+            self._hands.wrench_durations[self._subject.simulator] = duration
 
     def tell(self, sentence: str) -> None:
         """Show a sentence, of a node for instance, as it is."""
@@ -124,7 +144,7 @@ class Panel:
         self.tell(f"{node}: {sentence}")
 
     def _control(self, button: str) -> None:
-        node = f"{self._simulator}/{topics.SIM_NODE}"
+        node = f"{self._subject.simulator}/{topics.SIM_NODE}"
         tell = partial(self._tell_of, topics.SIM_NODE)
         if button in (_PAUSE, _RESUME):
             content = SetBool.Request(data=button == _PAUSE)
@@ -134,7 +154,7 @@ class Panel:
             self.requests.trigger(Trigger, service, Trigger.Request(), tell)
 
     def _set_speed(self, label: str) -> None:
-        node = f"{self._simulator}/{topics.SIM_NODE}"
+        node = f"{self._subject.simulator}/{topics.SIM_NODE}"
         tell = partial(self._tell_of, f"real_time_factor {_SPEEDS[label]:g}")
         self.requests.set(
             node, "real_time_factor", _SPEEDS[label], lambda reason: tell(reason or "set")
