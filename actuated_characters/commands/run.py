@@ -23,7 +23,12 @@ from actuated_characters.commands.common.settings import (
     node_settings,
 )
 from actuated_characters.commands.common.tables import make_table
-from actuated_characters.commands.run_options import ALL_SENSORS, add_recorded, add_tracked, add_viewed
+from actuated_characters.commands.run_options import (
+    ALL_SENSORS,
+    add_recorded,
+    add_tracked,
+    add_viewed,
+)
 from actuated_characters.commands.view import server_parameters
 from msgs_config.errors import ConfigurationError, one_of
 

@@ -8,13 +8,13 @@ from typing import Any
 from rclpy.node import Node
 
 from actuated_characters.bags.rebuilding import Rebuilt
-from actuated_characters.viewer.drawn_character import DrawnCharacter
-from actuated_characters.viewer.hands import Action, Hands
-from actuated_characters.viewer.panel import Panel, Subject
-from actuated_characters.viewer.request_check import LOOPBACK, RequestCheck, is_loopback
-from actuated_characters.viewer.scene import WORLD, BrowserScene, DrawnBalls
-from actuated_characters.viewer.server import open_socket, start_server, stop_server
+from actuated_characters.viewer.controls.hands import Action, Hands
+from actuated_characters.viewer.controls.panel import Panel, Subject
+from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
+from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
 from actuated_characters.viewer.simulators import Simulators, Watched
+from actuated_characters.viewer.web.request_check import LOOPBACK, RequestCheck, is_loopback
+from actuated_characters.viewer.web.server import open_socket, start_server, stop_server
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
 from msgs_config.parameters import Parameter, resolve

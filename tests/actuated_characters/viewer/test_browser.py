@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from websockets.sync.client import connect
 
-from actuated_characters.viewer.scene import EYE, LOOK_AT
+from actuated_characters.viewer.drawing.scene import EYE, LOOK_AT
 from msgs_config.messages import topics
 from tests.support.browser import SHIFT, Browser, Pixels, needs_chromium
 from tests.support.page_client import PageClient

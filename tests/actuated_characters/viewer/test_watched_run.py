@@ -10,7 +10,7 @@ import pytest
 from actuated_characters.runs.execution import run_in_process, run_over_topics
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.run_directory import prepare_directory
-from actuated_characters.viewer.server import open_socket
+from actuated_characters.viewer.web.server import open_socket
 from tests.support.page_client import PageClient
 from tests.support.ros import Processes, wait_until
 from tests.support.runs import Run, summary_of

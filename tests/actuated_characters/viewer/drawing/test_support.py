@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from actuated_characters.render.engine.camera_pose import Spheres
-from actuated_characters.viewer.support import convex_hull, support_polygon
+from actuated_characters.viewer.drawing.support import convex_hull, support_polygon
 
 NO_TURN = np.array((0.0, 0.0, 0.0, 1.0))
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import viser
 
-from actuated_characters.viewer.requests import Requests
+from actuated_characters.viewer.controls.requests import Requests
 from controller_node.control_laws import LAWS
 
 _LAW, _BALANCE = "law", "balance.enabled"

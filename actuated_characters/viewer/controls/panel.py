@@ -10,11 +10,11 @@ import viser
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from actuated_characters.viewer.drawn_character import SHOWN
-from actuated_characters.viewer.hands import Action, Hands
-from actuated_characters.viewer.parameter_controls import ParameterControls
-from actuated_characters.viewer.requests import Requests
-from actuated_characters.viewer.scene import BrowserScene
+from actuated_characters.viewer.controls.hands import Action, Hands
+from actuated_characters.viewer.controls.parameter_controls import ParameterControls
+from actuated_characters.viewer.controls.requests import Requests
+from actuated_characters.viewer.drawing.drawn_character import SHOWN
+from actuated_characters.viewer.drawing.scene import BrowserScene
 from msgs_config.messages import topics
 
 _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 1.0, "2": 2.0}

@@ -5,8 +5,8 @@ Host and Origin are those of RFC 9110 (7.2) and RFC 6454 (7).
 
 import pytest
 
-from actuated_characters.viewer import request_check
-from actuated_characters.viewer.request_check import RequestCheck, is_loopback
+from actuated_characters.viewer.web import request_check
+from actuated_characters.viewer.web.request_check import RequestCheck, is_loopback
 
 ADDRESS = "192.168.1.5:8080"  # of this machine, in its network
 

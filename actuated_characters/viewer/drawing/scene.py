@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
-from actuated_characters.viewer.drawn_character import DrawnCharacter
+from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 from msgs_config.messages.projectiles import BallStates

@@ -6,8 +6,8 @@ import pytest
 from rclpy.context import Context
 from std_srvs.srv import SetBool
 
-from actuated_characters.viewer import requests as requests_module
-from actuated_characters.viewer.requests import Requests
+from actuated_characters.viewer.controls import requests as requests_module
+from actuated_characters.viewer.controls.requests import Requests
 from msgs_config.messages import topics
 from tests.support.ros import Client, Processes
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from actuated_characters.viewer.touch import LIMIT, Drag, aim_throw, spring_force
+from actuated_characters.viewer.controls.touch import LIMIT, Drag, aim_throw, spring_force
 from msgs_config.errors import CommandError
 
 GRAVITY = 9.81

@@ -17,7 +17,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from actuated_characters.viewer.request_check import RequestCheck
+from actuated_characters.viewer.web.request_check import RequestCheck
 from msgs_config.errors import ConfigurationError
 
 FIRST_PORT = 8080

@@ -11,9 +11,9 @@ import viser
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from actuated_characters.viewer.drawn_character import Bind, DrawnCharacter
-from actuated_characters.viewer.scene import WORLD, BrowserScene
-from actuated_characters.viewer.touch import STIFFNESS, Drag, aim_throw, spring_force
+from actuated_characters.viewer.controls.touch import STIFFNESS, Drag, aim_throw, spring_force
+from actuated_characters.viewer.drawing.drawn_character import Bind, DrawnCharacter
+from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import CommandError
 from msgs_config.messages import topics

@@ -13,9 +13,14 @@ import websockets.asyncio.server
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from actuated_characters.viewer import server as server_module
-from actuated_characters.viewer.request_check import RequestCheck
-from actuated_characters.viewer.server import ViewerServer, open_socket, start_server, stop_server
+from actuated_characters.viewer.web import server as server_module
+from actuated_characters.viewer.web.request_check import RequestCheck
+from actuated_characters.viewer.web.server import (
+    ViewerServer,
+    open_socket,
+    start_server,
+    stop_server,
+)
 from msgs_config.errors import ConfigurationError
 from tests.support.ros import wait_until
 

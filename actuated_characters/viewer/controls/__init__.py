@@ -1,0 +1,1 @@
+"""What those who watch can do: push, throw, and turn knobs."""

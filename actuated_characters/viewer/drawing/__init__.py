@@ -1,0 +1,1 @@
+"""What is drawn: characters, balls, and the ground below them."""
