@@ -72,6 +72,13 @@ class DrawnCharacter:
         self._colors = [[np.array(each.color_rgba[:3]) * 255.0 for each in own] for own in shapes]
         self._levels = [0] * len(shapes)
         self._vectors = _last_vectors(rebuilt)
+        self._add_marks(scene, name)
+        self.origins: FloatArray = np.zeros((len(shapes), 3))
+        self.turns_xyzw: FloatArray = np.tile((0.0, 0.0, 0.0, 1.0), (len(shapes), 1))
+        self.shows: Mapping[str, bool] = dict.fromkeys(SHOWN, True)
+
+    def _add_marks(self, scene: viser.SceneApi, name: str) -> None:
+        """Add what is seen beside the links: centre of mass, support polygon, arrows."""
         self._centre = scene.add_icosphere(f"{name}/centre", 0.035, color=_CENTRE, visible=False)
         self._below = scene.add_icosphere(f"{name}/below", 0.02, color=_CENTRE, visible=False)
         self._arrows = {
@@ -89,9 +96,6 @@ class DrawnCharacter:
             thickness_units="screen",
             visible=False,
         )
-        self.origins: FloatArray = np.zeros((len(shapes), 3))
-        self.turns_xyzw: FloatArray = np.tile((0.0, 0.0, 0.0, 1.0), (len(shapes), 1))
-        self.shows: Mapping[str, bool] = dict.fromkeys(SHOWN, True)
 
     def _add(self, name: str, shape: Shape, *, ghost: bool = False) -> viser.MeshHandle:
         vertices, faces = triangles_of(shape)
