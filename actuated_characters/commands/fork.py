@@ -43,13 +43,8 @@ def add_fork(commands: "Commands[argparse.ArgumentParser]") -> None:
     )
     fork.set_defaults(character=CHARACTER)  # whose parameters a shell completes
     add_bag(fork)
-    fork.add_argument(
-        "--at",
-        type=float,
-        required=True,
-        metavar="S",
-        help="time of the last state in common, in s since the first one",
-    )
+    at = "time of the last state in common, in s since the first one"
+    fork.add_argument("--at", type=float, required=True, metavar="S", help=at)
     add_inputs(fork, "from --at on", " that may change in a run (live), from --at on")
     add_repeated(
         fork,

@@ -25,6 +25,7 @@ from actuated_characters.commands.common.settings import (
 from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.run_options import (
     ALL_SENSORS,
+    add_loop,
     add_recorded,
     add_tracked,
     add_viewed,
@@ -85,15 +86,7 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         "a ball that hits a link, where the reference has it, at a time in s; from=front, left, "
         "right, back, above or degrees (front), distance=M (2), radius=M",
     )
-    loop = run.add_mutually_exclusive_group()
-    loop.add_argument(
-        "--composed",
-        action="store_true",
-        help="simulator and controller as two nodes of one process: the same states, sooner",
-    )
-    loop.add_argument(
-        "--in-process", action="store_true", help="one process without ROS: the same states, no bag"
-    )
+    add_loop(run)
     add_viewed(run)
 
 
@@ -208,6 +201,13 @@ def _recorded_sensors(options: argparse.Namespace, plan: "RunPlan") -> list[str]
     return list(options.sensor)
 
 
+def _recording(options: argparse.Namespace, plan: "RunPlan") -> dict[str, object]:
+    """The recorder's parameters that are given."""
+    given = {parameter: getattr(options, name) for name, parameter in _RECORDING.items()}
+    given["sensors"] = _recorded_sensors(options, plan)
+    return {name: value for name, value in given.items() if value is not None}
+
+
 def _run_plan(
     options: argparse.Namespace,
     run: PlannedRun,
@@ -233,14 +233,12 @@ def _run_plan(
             plan, directory, progress=progress, pushes=pushes, throws=throws, watch=watch
         )
     else:
-        given = {parameter: getattr(options, name) for name, parameter in _RECORDING.items()}
-        given["sensors"] = _recorded_sensors(options, plan)
         run_over_topics(
             plan,
             directory,
             write_bag=not options.no_record,
             progress=progress,
-            recording={name: value for name, value in given.items() if value is not None},
+            recording=_recording(options, plan),
             pushes=pushes,
             throws=throws,
             composed=options.composed,

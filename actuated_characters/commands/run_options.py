@@ -76,3 +76,16 @@ def add_recorded(run: argparse.ArgumentParser) -> None:
         ("--exclude", "do not record this topic of the simulation, such as contacts"),
     ):
         run.add_argument(name, action="append", metavar="NAME", help=f"{about}; may be repeated")
+
+
+def add_loop(run: argparse.ArgumentParser) -> None:
+    """Add the options that say in which processes the loop runs."""
+    loop = run.add_mutually_exclusive_group()
+    loop.add_argument(
+        "--composed",
+        action="store_true",
+        help="simulator and controller as two nodes of one process: the same states, sooner",
+    )
+    loop.add_argument(
+        "--in-process", action="store_true", help="one process without ROS: the same states, no bag"
+    )

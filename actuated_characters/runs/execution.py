@@ -59,45 +59,40 @@ def run_over_topics(
 ) -> None:
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
-    With `composed`, controller and simulator are nodes of one process. `recording` has parameters
-    of the recorder: how the bag is stored, topics more or fewer. Pushes and throws are sent by one
-    more process; in lockstep all are there before the first tick. With parameters of the node
-    `fork` that process is the node, which repeats a recording, with so many resets. With `viewer`,
-    its parameters, one more shows the characters in a browser; the run waits for its page alone.
+    With `composed`, controller and simulator are one process. `recording` has parameters of the
+    recorder. Pushes and throws are sent by one more process; in lockstep all are there before the
+    first tick. With parameters of the node `fork` that process repeats a recording, with so many
+    resets. With those of a `viewer` one more shows the characters in a browser.
 
     Raises:
-        RunError: one of the processes failed, with its own message, or the simulator rejected a
-            push or throw.
+        RunError: one of the processes failed, or the simulator rejected a push or throw.
     """
     recording = {**recording, "directory": str(directory), "write_bag": write_bag}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
-    is_fork = fork is not None
-    sent = None
-    if pushes or throws or is_fork:
-        sent = {**_write_planned(directory, pushes, throws, recording), **(fork or {})}
+    senders = _plan_senders(directory, pushes, throws, recording, fork)
     with _environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             progress = _watching(children.start_node("viewer", viewer), progress)
         recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
-        name = "fork" if is_fork else "pusher"
-        sender = [children.start_node(name, sent, *session)] if sent else []
+        sender = [children.start_node(name, given, *session) for name, given in senders.items()]
         # of the torques, before the first answer, or a tick would go unrecorded
-        subscribers = 2 + len(sender)
-        listeners = (2 + is_fork, subscribers)
+        listeners = (2 + (fork is not None), 2 + len(sender))
         loop = _start_loop(children, plan, session, listeners, composed=composed)
         _wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
-    if recorder.exit_code:
-        raise RunError(f"recorder failed: {recorder.last_words()}")
-    sent_counts = {"pushes": len(pushes), "throws": len(throws)}
-    _check_recorded(directory, plan.ticks - resets, {} if is_fork else sent_counts)
+    counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
+    _check_recorded(recorder, directory, plan.ticks - resets, counts)
 
 
-def _check_recorded(directory: Path, ticks: int, counts: Mapping[str, int]) -> None:
-    """Raise RunError unless all ticks were recorded, and all inputs accepted.
+def _check_recorded(
+    recorder: Child, directory: Path, ticks: int, counts: Mapping[str, int]
+) -> None:
+    """Raise RunError unless the recorder has all ticks, and all inputs were accepted.
 
     `counts` are the numbers of inputs, where they are known. A reset is a tick without figures.
     """
+    if recorder.exit_code:
+        raise RunError(f"recorder failed: {recorder.last_words()}")
     recorded, _ = read_metrics(directory)
     if recorded["ticks"] != ticks:
         raise RunError(f"{recorded['ticks']} of {ticks} ticks were recorded")
@@ -151,6 +146,20 @@ def _start_loop(
         return [children.start_composed("composed", both, *arguments)]
     controller = children.start_node("controller_node", plan.controller, *arguments)
     return [children.start_node("sim_node", plan.simulator, *arguments), controller]
+
+
+def _plan_senders(
+    directory: Path,
+    pushes: Sequence[PlannedPush],
+    throws: Sequence[PlannedThrow],
+    recording: Mapping[str, object],
+    fork: Mapping[str, object] | None,
+) -> dict[str, dict[str, object]]:
+    """The parameters of the node that sends what was planned, by its name; none if nothing was."""
+    if not (pushes or throws or fork is not None):
+        return {}
+    planned = _write_planned(directory, pushes, throws, recording)
+    return {"pusher": planned} if fork is None else {"fork": {**planned, **fork}}
 
 
 def _write_planned(

@@ -17,6 +17,7 @@ from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
 from msgs_config.character.file_defaults import add_defaults
 from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.character.link_order import sort_depth_first
 from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import (
     ROOT_TORQUE,
@@ -102,7 +103,7 @@ def _load_links(robot: ElementTree.Element, file: CharacterFile) -> list[Link]:
     check_links(links, robot, file.loading)
     return [
         replace(link, shapes=shapes[link.name][0], collision_shapes=shapes[link.name][1])
-        for link in _sort_depth_first(links)
+        for link in sort_depth_first(links)
     ]
 
 
@@ -192,20 +193,6 @@ def _check_links(urdf: Path, links: list[Link]) -> None:
             raise CharacterError(
                 f"{urdf}: a joint is named '{joint.name}', which is the floating base's"
             )
-
-
-def _sort_depth_first(links: list[Link]) -> list[Link]:
-    """The links with every child right after its parent's branch so far, parents renumbered."""
-    children: list[list[int]] = [[] for _ in links]
-    for index, link in enumerate(links[1:], start=1):
-        children[link.parent].append(index)
-    order: list[int] = []
-    pending = [0]
-    while pending:
-        order.append(pending.pop())
-        pending += reversed(children[order[-1]])
-    place = {old: new for new, old in enumerate(order)} | {-1: -1}
-    return [replace(links[old], parent=place[links[old].parent]) for old in order]
 
 
 def _check_names(file: CharacterFile, layout: JointLayout) -> None:
