@@ -120,7 +120,7 @@ def test_messages_of_equal_log_time_are_in_the_order_of_their_publishing(
         if message.log_time_ns > FIRST_NS:  # the first state is published until it is answered
             seen.setdefault(message.log_time_ns, []).append(message.topic)
 
-    orders = list(seen.values())
+    orders = [list(dict.fromkeys(each)) for each in seen.values()]  # a late answer: a state again
     assert len(orders) == TICKS
     assert all(each == ["/contacts", "/joint_states", "/joint_torques"] for each in orders[:-1])
     assert orders[-1][:2] == ["/contacts", "/joint_states"]

@@ -1,5 +1,8 @@
 """The viewer in a real browser: what its page shows, and what a mouse does to the simulation."""
 
+import fcntl
+import os
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -54,9 +57,13 @@ def viewer(processes: Processes) -> Process:
 
 @pytest.fixture
 def browser(tmp_path: Path) -> Iterator[Browser]:
-    browser = Browser(tmp_path)
-    yield browser
-    browser.close()
+    lock = Path(tempfile.gettempdir()) / f"actuated_characters_browser_{os.getuid()}"
+    with lock.open("w") as file:
+        # one at a time on a machine: each draws with all processors
+        fcntl.flock(file, fcntl.LOCK_EX)
+        browser = Browser(tmp_path)
+        yield browser
+        browser.close()
 
 
 def address_of(viewer: Process) -> str:
@@ -152,9 +159,10 @@ def test_a_drag_to_the_right_pushes_to_the_right_and_is_over_when_it_is_let_go(
 
     client.spin_until(lambda: (root_of(client) - before) @ right > 0.02, "the root moves", SOON)
     pushes = [message for message in applied.messages if message.wrench]
+    # their sum, to which those of a mouse that has hardly moved add nothing
     forces = [np.array([w.force.x, w.force.y, w.force.z]) for m in pushes for w in m.wrench]
-    shares = [force @ right / np.linalg.norm(force) for force in forces]
-    assert np.median(shares) > 0.9
+    impulse = np.sum(forces, axis=0)
+    assert impulse @ right > 0.9 * np.linalg.norm(impulse)
     assert len({name for message in pushes for name in message.joint_names}) == 1
 
     browser.mouse("mouseReleased", x + 80, y)
@@ -169,13 +177,20 @@ def test_a_click_with_shift_throws_a_ball_that_hits(
     thrown, contacts = client.listen(topics.APPLIED_THROW), client.listen(topics.CONTACTS)
     x, y = until_seen(browser, viewer)
 
-    browser.press(x, y, keys=SHIFT)
-    browser.mouse("mouseReleased", x, y, keys=SHIFT)
+    clicked_at = -np.inf
 
-    client.spin_until(lambda: thrown.messages, "a ball", SOON)
+    def click() -> None:
+        """Click, again where a page that is slow to draw has not found the body."""
+        nonlocal clicked_at
+        if time.monotonic() - clicked_at > 5.0:
+            clicked_at = time.monotonic()
+            browser.press(x, y, keys=SHIFT)
+            browser.mouse("mouseReleased", x, y, keys=SHIFT)
+
+    client.spin_sending(click, lambda: thrown.messages, "a ball")
     numbers = dict(zip(thrown.last.name, thrown.last.position, strict=True))
     assert numbers["mass"] == 2.0
-    released = stamp_ns(thrown.last)
+    released = stamp_ns(thrown.messages[0])
     feet = {"right_ankle", "left_ankle"}
 
     def struck() -> bool:
@@ -185,7 +200,7 @@ def test_a_click_with_shift_throws_a_ball_that_hits(
             if stamp_ns(message) > released
         )
 
-    client.spin_until(struck, "the ball hits")
+    client.spin_sending(click, struck, "a ball hits")
     assert standing.exit_code is None
 
 
