@@ -45,8 +45,8 @@ def _package_directory(package: str, error: type[ActuatedCharactersError]) -> Pa
     raise error(f"package '{package}' is not installed")
 
 
-def read_text(path: Path, error: type[ActuatedCharactersError]) -> str:
-    """The text of a file.
+def read_text(path: Path, error: type[ActuatedCharactersError], most: int = MAX_FILE_BYTES) -> str:
+    """The text of a file of so many bytes at most.
 
     Raises:
         error: it is missing, unreadable, too large or no text.
@@ -54,8 +54,8 @@ def read_text(path: Path, error: type[ActuatedCharactersError]) -> str:
     try:
         if path.exists() and not path.is_file():
             raise error(f"{path}: not a file")
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise error(f"{path}: larger than {MAX_FILE_BYTES >> 20} MiB")
+        if path.stat().st_size > most:
+            raise error(f"{path}: larger than {most >> 20} MiB")
         return path.read_text(encoding="utf-8")
     except (OSError, ValueError) as cause:  # ValueError: no UTF-8, or a NUL in the path
         reason = cause.strerror if isinstance(cause, OSError) else "not a text file"

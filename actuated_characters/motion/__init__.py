@@ -1,0 +1,1 @@
+"""Motion in and out: files of motion capture, retargeting, and edits of clips."""

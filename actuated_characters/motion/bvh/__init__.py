@@ -1,0 +1,1 @@
+"""BVH files: what is in them, read and written."""
