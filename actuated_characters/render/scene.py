@@ -102,10 +102,13 @@ class Scene:
         states = recording.balls[row] if recording.balls else None
         if states is None:
             return None
+        return np.column_stack((states.motion[:, :3], self.ball_radii(row, len(states.names))))
+
+    def ball_radii(self, row: int, count: int) -> list[float]:
+        """Radii of the balls that are there in a state, m, so many of them."""
         first = int(self.episode_rows[np.searchsorted(self.episode_rows, row, side="right") - 1])
-        thrown = [throw for each in recording.throws[first:row] for throw in each]
-        radii = [throw.radius for throw in thrown] + [_RADIUS] * len(states.names)
-        return np.column_stack((states.motion[:, :3], radii[: len(states.names)]))
+        thrown = [throw for each in self.recordings[0].throws[first:row] for throw in each]
+        return ([throw.radius for throw in thrown] + [_RADIUS] * count)[:count]
 
     def _touching(self, begin: int, end: int) -> BoolArray:
         """Which links (l,) touched something in ticks from one to before another."""

@@ -4,13 +4,17 @@ https://chromedevtools.github.io/devtools-protocol/
 """
 
 import base64
+import fcntl
 import io
 import json
 import os
 import shutil
 import signal
 import subprocess
+import tempfile
 import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -151,3 +155,14 @@ class Browser:
         """End it, if it has not ended yet."""
         self.kill()
         self._page.close()
+
+
+@contextmanager
+def one_browser(folder: Path) -> Iterator[Browser]:
+    """The only browser of its user on this machine: each draws with all processors."""
+    lock = Path(tempfile.gettempdir()) / f"actuated_characters_browser_{os.getuid()}"
+    with lock.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        browser = Browser(folder)
+        yield browser
+        browser.close()

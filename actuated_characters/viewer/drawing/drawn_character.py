@@ -8,8 +8,8 @@ import viser
 
 from actuated_characters.bags.rebuilding import Rebuilt
 from actuated_characters.render.engine.camera_pose import Spheres
+from actuated_characters.render.engine.shape_meshes import triangles_of
 from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
-from actuated_characters.viewer.drawing.shape_meshes import triangles_of
 from actuated_characters.viewer.drawing.support import support_polygon
 from actuated_characters.viewer.latest import CharacterSample
 from msgs_config.arrays import FloatArray

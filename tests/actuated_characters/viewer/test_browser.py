@@ -1,8 +1,5 @@
 """The viewer in a real browser: what its page shows, and what a mouse does to the simulation."""
 
-import fcntl
-import os
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -15,7 +12,7 @@ from websockets.sync.client import connect
 
 from actuated_characters.viewer.drawing.scene import EYE, LOOK_AT
 from msgs_config.messages import topics
-from tests.support.browser import SHIFT, Browser, Pixels, needs_chromium
+from tests.support.browser import SHIFT, Browser, Pixels, needs_chromium, one_browser
 from tests.support.page_client import PageClient
 from tests.support.ros import Process, Processes, SimulatorClient, stamp_ns, tick_of, wait_until
 
@@ -57,13 +54,8 @@ def viewer(processes: Processes) -> Process:
 
 @pytest.fixture
 def browser(tmp_path: Path) -> Iterator[Browser]:
-    lock = Path(tempfile.gettempdir()) / f"actuated_characters_browser_{os.getuid()}"
-    with lock.open("w") as file:
-        # one at a time on a machine: each draws with all processors
-        fcntl.flock(file, fcntl.LOCK_EX)
-        browser = Browser(tmp_path)
+    with one_browser(tmp_path) as browser:
         yield browser
-        browser.close()
 
 
 def address_of(viewer: Process) -> str:

@@ -1,11 +1,11 @@
-"""Shapes of links as triangles, as a browser draws them."""
+"""Shapes of links as triangles, as browsers and files of scenes have them."""
 
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from actuated_characters.render.engine.surfaces import round_surface
+from actuated_characters.render.engine.surfaces import Surface, round_surface
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.character.model import Shape, ShapeType
@@ -40,12 +40,37 @@ def triangles_of(shape: Shape) -> tuple[FloatArray, IntArray]:
     return vertices * scale, triangles
 
 
+def surface_of(shape: Shape) -> Surface:
+    """The triangles of a shape with their normals, in the shape's own frame.
+
+    Round shapes are smooth. The triangles of a box or a mesh share no corners, so that edges stay
+    sharp, and those without area are left out.
+
+    Raises:
+        CharacterError: see `triangles_of`.
+    """
+    if shape.type not in (ShapeType.BOX, ShapeType.MESH):
+        return round_surface(shape)
+    vertices, triangles = triangles_of(shape)
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    solid = areas > 0.0
+    normals = normals[solid] / areas[solid, np.newaxis]
+    corners = corners[solid].reshape(-1, 3)
+    return Surface(corners, np.repeat(normals, 3, axis=0), np.arange(len(corners)).reshape(-1, 3))
+
+
 def _read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
     vertices = read_vertices(path)  # which checks the file
     if path.suffix.lower() != ".obj":
         return vertices, np.arange(len(vertices)).reshape(-1, 3)
-    import trimesh
-
+    try:
+        import trimesh
+    except ImportError as error:
+        raise CharacterError(
+            f"mesh {path} is an .obj, which takes trimesh to draw: pip install trimesh"
+        ) from error
     try:
         mesh = trimesh.load_mesh(path, process=False, skip_materials=True)
         return np.array(mesh.vertices), np.array(mesh.faces)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from actuated_characters.viewer.drawing.shape_meshes import triangles_of
+from actuated_characters.render.engine.shape_meshes import triangles_of
 from msgs_config.character.model import Shape, ShapeType
 from msgs_config.errors import CharacterError
 
