@@ -1,0 +1,1 @@
+"""Runs, bags and clips as files of other programs."""
