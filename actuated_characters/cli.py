@@ -21,6 +21,7 @@ from actuated_characters.commands.completion import add_names, complete
 from actuated_characters.commands.export import add_export
 from actuated_characters.commands.fork import add_fork
 from actuated_characters.commands.info import add_info
+from actuated_characters.commands.motion import add_motion
 from actuated_characters.commands.reconstruct import add_reconstruct
 from actuated_characters.commands.recover import add_recover
 from actuated_characters.commands.render import add_render
@@ -64,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in (
         *(add_run, add_view, add_fork, add_reconstruct, add_render, add_replay, add_info),
-        *(add_report, add_compare, add_export, add_recover, add_study),
+        *(add_report, add_compare, add_export, add_motion, add_recover, add_study),
     ):
         add(commands)
     add_command(commands, _list, "list", "list the characters and their clips", "", [])

@@ -1,0 +1,18 @@
+"""The command `actuated_characters motion`: motion from elsewhere and to elsewhere."""
+
+import argparse
+
+from actuated_characters.commands.common.settings import Commands
+from actuated_characters.commands.completion import add_names
+from actuated_characters.commands.motion_export import add_motion_export
+
+
+def add_motion(commands: "Commands[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters`."""
+    about = "motion from and to other programs"
+    motion = commands.add_parser("motion", help=about, description=f"{about.capitalize()}.")
+    subcommands = motion.add_subparsers(required=True, metavar="COMMAND")
+    for add in (add_motion_export,):
+        add(subcommands)
+    for subcommand in subcommands.choices.values():
+        add_names(subcommand)
