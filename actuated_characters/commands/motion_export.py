@@ -86,6 +86,10 @@ def _export(options: argparse.Namespace) -> None:
     if suffix == _BVH and len(motion.characters) > 1:
         names = ", ".join(each.name for each in motion.characters)
         raise ConfigurationError(f"BVH has one skeleton; name one by --character: {names}")
+    if options.ground and not motion.has_plane:
+        raise ConfigurationError(
+            "--ground: the recording has a terrain in place of the plane, and terrains are left out"
+        )
     total = len(times) * len(motion.characters)
     make = _bvh if suffix == _BVH else _gltf
     with progress_bar(options.output.name, total, "frames", transient=True) as bar:

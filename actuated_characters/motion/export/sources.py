@@ -91,6 +91,7 @@ def of_recordings(recordings: Sequence[Recording]) -> Trajectories:
         characters=characters,
         balls=tuple(_balls(scene)),
         cuts=scene.episode_rows[1:],
+        has_plane=scene.ground,
     )
 
 

@@ -58,6 +58,7 @@ class Trajectories:
     balls: tuple[BallTrajectory, ...] = ()
     cuts: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     """Rows that do not go on from the one before: the first ones of episodes."""
+    has_plane: bool = True  # whether the ground is the plane z = 0
 
     def sample_times(
         self, start: float = 0.0, end: float | None = None, rate: float | None = None

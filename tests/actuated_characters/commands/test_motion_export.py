@@ -14,7 +14,7 @@ from actuated_characters.motion.export.sources import of_recordings, read_source
 from controller_node.references.files.clip import clip_path
 from msgs_config.character.dynamics import still_model
 from msgs_config.messages import topics
-from tests.support.bags import Made, add_to, make_run
+from tests.support.bags import Made, add_to, make_run, raw_configuration, raw_states
 from tests.support.eventful import Eventful, eventful_run, write_timed
 from tests.support.gltf import Gltf, assert_valid
 from tests.support.limits import file_size_limit
@@ -116,20 +116,36 @@ def test_a_clip_by_name_or_file_is_the_same_motion(tmp_path: Path, order: str) -
     assert "".join(channel[0] for channel in channels[3:]) == order
 
 
-def test_a_bag_of_two_gives_both_and_bvh_one_of_them(
+def test_of_two_worlds_one_is_named(
     pendulum: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with BagWriter(tmp_path / "bag") as bag:
         for namespace in ("left", "right"):
             add_to(bag, pendulum.messages(), namespace)
+    file = tmp_path / "one.glb"
+
+    assert "several worlds" in refused(capsys, tmp_path, "--output", file)
+    assert exported(tmp_path, "--output", file, "--character", "right") == 0
+    assert_valid(Gltf.of_glb(file.read_bytes()))
+
+
+def test_a_world_of_two_gives_both_and_bvh_one_of_them(
+    pendulum: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names, states = ("left", "right"), raw_states(pendulum.plan, pendulum.states)
+    with BagWriter(tmp_path / "bag") as bag:
+        for name in names:
+            add_to(bag, [raw_configuration(pendulum.plan, name, names), *states], name)
     both, one = tmp_path / "both.glb", tmp_path / "one.bvh"
 
-    line = refused(capsys, tmp_path, "--output", both)
-    assert "several worlds" in line
-    assert "left, right" in refused(capsys, tmp_path, "--output", one)
+    assert exported(tmp_path, "--output", both) == 0
+    gltf = Gltf.of_glb(both.read_bytes())
+    assert_valid(gltf)
+    link = pendulum.plan.character.links[-1].name
+    left, right = (gltf.poses(0.05)[gltf.node(f"{name}_{link}")] for name in names)
+    np.testing.assert_array_equal(left, right)
+    assert "by --character: left, right" in refused(capsys, tmp_path, "--output", one)
     assert exported(tmp_path, "--output", one, "--character", "left") == 0
-    assert exported(tmp_path, "--output", both, "--character", "right") == 0
-    assert_valid(Gltf.of_glb(both.read_bytes()))
 
 
 @pytest.mark.parametrize(
