@@ -45,12 +45,13 @@ def _package_directory(package: str, error: type[ActuatedCharactersError]) -> Pa
     raise error(f"package '{package}' is not installed")
 
 
-def read_text(path: Path, error: type[ActuatedCharactersError], most: int = MAX_FILE_BYTES) -> str:
-    """The text of a file of so many bytes at most.
+def read_text(path: Path, error: type[ActuatedCharactersError], most: int | None = None) -> str:
+    """The text of a file of so many bytes at most, by default `MAX_FILE_BYTES`.
 
     Raises:
         error: it is missing, unreadable, too large or no text.
     """
+    most = MAX_FILE_BYTES if most is None else most
     try:
         if path.exists() and not path.is_file():
             raise error(f"{path}: not a file")
