@@ -88,7 +88,7 @@ def _export(options: argparse.Namespace) -> None:
         raise ConfigurationError(f"BVH has one skeleton; name one by --character: {names}")
     if options.ground and not motion.has_plane:
         raise ConfigurationError(
-            "--ground: the recording has a terrain in place of the plane, and terrains are left out"
+            "--ground: the world of the recording has no plane, and another terrain is left out"
         )
     total = len(times) * len(motion.characters)
     make = _bvh if suffix == _BVH else _gltf

@@ -14,7 +14,7 @@ from actuated_characters.motion.export.sources import of_recordings, read_source
 from controller_node.references.files.clip import clip_path
 from msgs_config.character.dynamics import still_model
 from msgs_config.messages import topics
-from tests.support.bags import Made, add_to, make_run, raw_configuration, raw_states
+from tests.support.bags import Made, add_to, make_run, raw_configuration, raw_states, write_bag
 from tests.support.eventful import Eventful, eventful_run, write_timed
 from tests.support.gltf import Gltf, assert_valid
 from tests.support.limits import file_size_limit
@@ -191,6 +191,15 @@ def test_a_bag_without_states_is_one_line(
     bag = write_timed(tmp_path / "bag", messages)
 
     assert "bag" in refused(capsys, bag, "--output", tmp_path / "motion.glb")
+
+
+def test_a_world_without_a_plane_has_no_ground(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = write_bag(tmp_path / "bag", make_run("pendulum", 0.02, terrain="none").messages())
+
+    assert "no plane" in refused(capsys, bag, "--output", tmp_path / "motion.glb", "--ground")
+    assert exported(bag, "--output", tmp_path / "motion.glb") == 0
 
 
 def test_a_full_disk_leaves_what_was_there(
