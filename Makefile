@@ -30,12 +30,13 @@ venv: .venv/.installed ## Set up .venv
 
 demo: .venv/.installed ## Let the humanoid walk for 20 s and record it in runs/demo
 	$(BIN)/actuated_characters run --character humanoid --clip walk --duration 20 --output runs/demo --overwrite
+	@echo "to watch it: make play (live, in the browser), or $(BIN)/actuated_characters view runs/demo (this run; needs the extra 'view')"
 
 backflip: .venv/.installed-plan ## Let the humanoid do a backflip by its joints alone, planned; in runs/backflip
 	$(BIN)/actuated_characters run --clip backflip --duration 1.75 --planner predictive --output runs/backflip --overwrite
 
-play: .venv/.installed-view ## Let a humanoid walk in the browser, to be pushed and pelted with balls; in runs/play
-	$(BIN)/actuated_characters run --view --clip walk --behaviour reactive --duration 600 --set sim_node.wrench_duration:=0.05 --set sim_node.ball_lifetime:=20 --output runs/play --overwrite
+play: .venv/.installed-view ## Let a humanoid walk in the browser, to be pushed and pelted with balls; in runs/play-walker
+	$(BIN)/actuated_characters play
 
 test: .venv/.installed-test ## Check style and types, run the tests
 	$(BIN)/ruff check

@@ -24,6 +24,7 @@ setup(
         "": ["py.typed"],
         "msgs_config": ["runtime/*.xml", "character/data/*"],
         "controller_node": ["references/data/*.yaml"],
+        "actuated_characters": ["scenes/data/*.yaml"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),

@@ -9,19 +9,20 @@ from rich.markup import escape
 from rich.padding import Padding
 
 from actuated_characters.commands.common.interruption import raise_at_signals, was_interrupted
+from actuated_characters.commands.common.overview import print_characters, print_overview
 from actuated_characters.commands.common.settings import (
     NODES,
     add_character,
     add_command,
     parameters_of,
 )
-from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.compare import add_compare
 from actuated_characters.commands.completion import add_names, complete
 from actuated_characters.commands.export import add_export
 from actuated_characters.commands.fork import add_fork
 from actuated_characters.commands.info import add_info
 from actuated_characters.commands.motion import add_motion
+from actuated_characters.commands.play import add_play
 from actuated_characters.commands.reconstruct import add_reconstruct
 from actuated_characters.commands.recover import add_recover
 from actuated_characters.commands.render import add_render
@@ -34,6 +35,7 @@ from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.process import EXIT_ERROR, limit_threads
 
 _EXIT_INTERRUPTED = 130
+_RUN = "run"  # without a word of what to run
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -43,8 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         parser = _parser()
         complete(parser)
-        options = parser.parse_args(arguments)
-        code = options.command(options)
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        options = parser.parse_args(given)
+        command = print_overview if given == [_RUN] else options.command
+        code = command(options)
     except (ActuatedCharactersError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_ERROR
@@ -64,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the versions and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in (
-        *(add_run, add_view, add_fork, add_reconstruct, add_render, add_replay, add_info),
+        *(add_run, add_play, add_view, add_fork, add_reconstruct, add_render, add_replay, add_info),
         *(add_report, add_compare, add_export, add_motion, add_recover, add_study),
     ):
         add(commands)
@@ -96,19 +100,7 @@ class _Version(argparse.Action):
 
 def _list(options: argparse.Namespace) -> None:
     del options
-    from controller_node.references.files.clip import available_clips
-    from msgs_config.character.file import shipped_characters
-    from msgs_config.character.loading import load_character
-
-    rows = []
-    for name in shipped_characters():
-        character = load_character(name)
-        clips = ", ".join(available_clips(character)) or "-"
-        base = "floating" if character.layout.has_floating_base else "fixed"
-        freedom = f"{character.layout.size}, {base} base"
-        rows.append((name, freedom, f"{character.mass:.3g} kg", clips))
-    columns = ("name", "degrees of freedom", "mass", "clips")
-    Console().print(make_table("characters", columns, rows, right=False))
+    print_characters(Console())
 
 
 def _parameters(options: argparse.Namespace) -> None:

@@ -10,6 +10,7 @@ from controller_node.behaviours.base import (
     BehaviourOutput,
     ModeReport,
     Observation,
+    Surroundings,
 )
 from controller_node.control_laws import (
     COMPENSATES_GRAVITY,
@@ -82,9 +83,9 @@ class Controller:
         self.check(settings)
         self._settings = settings
         self._limits = EffortLimits(self.layout, settings.gains.effort_limits)  # those met last
-        choice = behaviour or BehaviourChoice()
-        self._make_behaviour = choice.make
+        self._choice = choice = behaviour or BehaviourChoice()
         self.needs_contacts = choice.needs_contacts  # of the tick before, to answer a state
+        self.opponent = choice.opponent  # the character whose place it needs as well; or none
         self._own_reference = reference
         self._no_contacts = np.zeros((len(character.links), 6))
         self.begin_episode(0)  # until a state says of which episode it is
@@ -102,7 +103,7 @@ class Controller:
         self._episode_ns = episode_ns
         self.mode: ModeReport | None = None  # since which state which mode holds
         self._law: Law = make_law(self._settings.law, self._context)
-        self._behaviour = self._make_behaviour()
+        self._behaviour = self._choice.make()
         self._strengths = StrengthSchedule(self.layout)
         self._effective: EffectiveGains | None = None
         self._tracked = TrackedReference(
@@ -185,22 +186,26 @@ class Controller:
         self._strengths.add(strengths)
 
     def compute_effort(
-        self, state: StampedState, episode_ns: int, contacts: FloatArray | None = None
+        self,
+        state: StampedState,
+        episode_ns: int,
+        contacts: FloatArray | None = None,
+        opponent: FloatArray | None = None,
     ) -> tuple[FloatArray, StampedReference]:
         """The effort (n,) that answers a state, and the reference at the state's stamp.
 
         `episode_ns` is the stamp of the episode's first state, from which the reference counts;
         `contacts` (links, 6) are the net wrenches of the tick before, N and N m, world axes, which
-        a behaviour may need.
+        a behaviour may need; `opponent` (3,) is where the root of its opponent is, m, world.
 
         Raises:
             ClockError: the state's stamp is no tick at this controller's rate.
-            ConfigurationError: the behaviour needs contacts, and there are none.
+            ConfigurationError: the behaviour needs contacts or an opponent, and there are none.
         """
         self._enter_episode(episode_ns)
         tick, stamp_ns = self.clock.tick(state.stamp_ns), state.stamp_ns
         acting = self._state_then(tick, state)
-        seen = self._observe(acting, stamp_ns, contacts)
+        seen = self._observe(acting, stamp_ns, Surroundings(contacts, opponent))
         output = self._behaviour.advance(seen)
         self._take(output, stamp_ns)
         gains = seen.gains if output.gains is None else output.gains
@@ -229,12 +234,9 @@ class Controller:
         stamp_ns = self.clock.stamp_ns(tick + late.delay_ticks)
         return StampedState(stamp_ns, position, velocity, state.effort)
 
-    def _observe(
-        self, state: StampedState, stamp_ns: int, contacts: FloatArray | None
-    ) -> Observation:
+    def _observe(self, state: StampedState, stamp_ns: int, around: Surroundings) -> Observation:
         """The behaviour's view of a state, for the answer to a stamp."""
-        if contacts is None and self.needs_contacts:
-            raise ConfigurationError("the behaviour needs the contacts of each state's tick")
+        self._choice.check(around)
         tick = self._tracked.tick(state.stamp_ns)
         (time, now), (next_time, upcoming) = self._tracked.own(tick)
         effective = self._effective_gains(stamp_ns)
@@ -243,13 +245,14 @@ class Controller:
             next_time=next_time,
             position=state.position,
             velocity=state.velocity,
-            contacts=self._no_contacts if contacts is None else contacts,
+            contacts=self._no_contacts if around.contacts is None else around.contacts,
             now=now,
             upcoming=upcoming,
             gains=effective.gains,
             whole_gains=self._settings.gains,
             strengths=effective.strengths,
             assisted=effective.assisted,
+            opponent=around.opponent,
         )
 
     def _effective_gains(self, stamp_ns: int) -> EffectiveGains:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from controller_node.actuation import describe_actuation
-from controller_node.interface.contact_subscription import ContactSubscription
+from controller_node.behaviours.base import Surroundings
+from controller_node.interface.awaited_messages import AwaitedMessages
 from controller_node.interface.publishers import Publishers, Reply
 from controller_node.interface.simulators import Simulators, check_simulator
 from controller_node.interface.stamped_topics import StampedTopics
@@ -22,7 +23,6 @@ from controller_node.parameters import (
     make_settings,
 )
 from controller_node.references.factory import make_motion
-from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
@@ -88,12 +88,8 @@ class ControllerNode(ComposableNode):
             partial(check_simulator, controller, self._character, self._values),
             logger,
         )
-        self._contacts = (
-            ContactSubscription(self, self._character, self._simulators, logger)
-            if controller.needs_contacts
-            else None
-        )
-        self._pending_state: bytes | None = None  # a state, for the contacts of its tick
+        self._awaited = AwaitedMessages(self, controller, self._character, self._simulators, logger)
+        self._pending_state: bytes | None = None  # a state, for what is awaited with it
         # after them: a simulator that has found this subscription has found the others as well
         self._states = DirectSubscription(self, topics.JOINT_STATES)
         joints = commanded_joints(self._character, self._values)
@@ -182,23 +178,21 @@ class ControllerNode(ComposableNode):
         episode_ns = self._episode_of(state)
         if episode_ns is None:
             return  # the simulator publishes the state again
-        contacts = None
-        if self._contacts is not None:
-            contacts = self._contacts.until(state.stamp_ns, episode_ns)
-            if contacts is None:
-                self._pending_state = raw
-                return  # the simulator publishes the contacts again, too
+        surroundings = self._awaited.until(state.stamp_ns, episode_ns)
+        if surroundings is None:
+            self._pending_state = raw
+            return  # the simulator publishes these messages again, too
         self._pending_state = None
         self._check_rate(state)
         self._stamped_topics.take(state.stamp_ns, episode_ns)
-        self._answer_state(raw, state, episode_ns, contacts)
+        self._answer_state(raw, state, episode_ns, surroundings)
 
     def _answer_state(
-        self, raw: bytes, state: StampedState, episode_ns: int, contacts: FloatArray | None
+        self, raw: bytes, state: StampedState, episode_ns: int, surroundings: Surroundings
     ) -> None:
         started = time.perf_counter()
         self._is_answering = True
-        effort, reference = self._controller.compute_effort(state, episode_ns, contacts)
+        effort, reference = self._controller.compute_effort(state, episode_ns, *surroundings)
         self._is_answering = False
         self._last_reply = self._outputs.make_reply(raw, state, effort, reference)
         self._answer_times.add(time.perf_counter() - started)
@@ -221,8 +215,7 @@ class ControllerNode(ComposableNode):
         if self._simulators.bind(frame_id):
             self._episode_ns = self._pending_state = None
             self._outputs.bind(self._simulators.bound or ANONYMOUS)
-            if self._contacts is not None:
-                self._contacts.restart()
+            self._awaited.restart()
 
     def _is_heard(self) -> bool:
         """Whether all that are to hear the first answer are there; later ones wait for none."""
@@ -265,8 +258,7 @@ class ControllerNode(ComposableNode):
         self._episode_ns = stamp_ns
         self._controller.begin_episode(stamp_ns)
         self._outputs.begin_episode()
-        if self._contacts is not None:
-            self._contacts.begin()
+        self._awaited.begin()
 
     def _report(self, *, at_once: bool = False) -> None:
         """Publish the diagnostics if they are due and there is a subscriber."""

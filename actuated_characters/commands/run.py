@@ -12,6 +12,13 @@ from rich.console import Console
 
 from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import progress_bar
+from actuated_characters.commands.common.run_options import (
+    ALL_SENSORS,
+    add_loop,
+    add_recorded,
+    add_tracked,
+    add_viewed,
+)
 from actuated_characters.commands.common.settings import (
     NODES,
     Commands,
@@ -23,13 +30,6 @@ from actuated_characters.commands.common.settings import (
     node_settings,
 )
 from actuated_characters.commands.common.tables import make_table
-from actuated_characters.commands.run_options import (
-    ALL_SENSORS,
-    add_loop,
-    add_recorded,
-    add_tracked,
-    add_viewed,
-)
 from actuated_characters.commands.view import server_parameters
 from msgs_config.errors import ConfigurationError, one_of
 
@@ -58,7 +58,8 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         _run,
         "run",
         "run simulator, controller and recorder",
-        "Run simulator, controller and recorder in lockstep, and report the figures.",
+        "Run simulator, controller and recorder in lockstep, and report the figures. Without any "
+        "option: say what there is to run.",
         ["run --clip walk --set controller_node.law:=pd"],
     )
     add_character(run)

@@ -71,15 +71,15 @@ def run_over_topics(
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
     senders = _plan_senders(directory, pushes, throws, recording, fork)
-    with _environment(directory) as environment, Children(directory, environment) as children:
+    with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
-            progress = _watching(children.start_node("viewer", viewer), progress)
+            progress = watch(children.start_node("viewer", viewer), progress)
         recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
         sender = [children.start_node(name, given, *session) for name, given in senders.items()]
         # of the torques, before the first answer, or a tick would go unrecorded
         listeners = (2 + (fork is not None), 2 + len(sender))
         loop = _start_loop(children, plan, session, listeners, composed=composed)
-        _wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
+        wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
     counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
     _check_recorded(recorder, directory, plan.ticks - resets, counts)
 
@@ -102,7 +102,7 @@ def _check_recorded(
             raise RunError(f"sim_node rejected {rejected} {of}{what}")
 
 
-def _watching(viewer: Child, progress: Progress) -> Progress:
+def watch(viewer: Child, progress: Progress) -> Progress:
     """Wait for the viewer's page, so that all can be seen; returns a report of progress.
 
     That reports also, once, that the viewer has ended: the run goes on without it.
@@ -191,7 +191,7 @@ def _write_planned(
 
 
 @contextmanager
-def _environment(directory: Path) -> Iterator[dict[str, str]]:
+def run_environment(directory: Path) -> Iterator[dict[str, str]]:
     """An environment that keeps the run's traffic on this machine, and to itself."""
     environment = {
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -206,7 +206,7 @@ def _environment(directory: Path) -> Iterator[dict[str, str]]:
         yield {**environment, "ROS_DOMAIN_ID": str(domain)}
 
 
-def _wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> None:
+def wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> None:
     """Wait until the simulator has ended well, and the others have not ended before."""
     recorder = others[-1]
     start_deadline = time.monotonic() + _START_TIMEOUT

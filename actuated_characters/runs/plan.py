@@ -32,7 +32,9 @@ _SET_BY_RUN = {
     "session": "the run itself, which makes one for all its nodes",
     "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",
 }
-_LOCKSTEP_TIMEOUT = 60.0  # s that one answer may take, on a machine that may be busy
+RUN_DEFAULTS = {"on_fault": "abort", "lockstep_timeout": 60.0}
+"""The simulator ends with an error rather than pause, or wait forever; an answer may take so many
+seconds, on a machine that may be busy."""
 
 
 @dataclass(frozen=True)
@@ -136,11 +138,9 @@ def _controller_values(character: Character, given: Mapping[str, object]) -> tup
 
 
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:
-    # a run ends with an error rather than pause or wait forever
-    defaults = {"on_fault": "abort", "lockstep_timeout": _LOCKSTEP_TIMEOUT}
     parameters = simulator_parameters.PARAMETERS
     own = simulator_parameters.character_parameters(character)
-    values = resolve(parameters + own, {**defaults, **given})
+    values = resolve(parameters + own, {**RUN_DEFAULTS, **given})
     values["max_ticks"] = count_ticks(duration, values.integer("rate"))
     character.layout.mask(values.texts("commanded_joints"))  # they exist
     return values

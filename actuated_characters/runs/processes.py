@@ -160,9 +160,14 @@ class Children:
     def start_composed(
         self, name: str, parameters: Mapping[str, Mapping[str, object]], *ros_arguments: str
     ) -> Child:
-        """Start one process of several nodes, with the parameters of each by its name."""
-        given = parameters.items()
-        files = [write_parameters(self.directory, node, values) for node, values in given]
+        """Start one process of several nodes, with the parameters of each by its name.
+
+        The name of one in a namespace contains that: `left/controller_node`.
+        """
+        files = [
+            write_parameters(self.directory, node.replace("/", "."), values, node)
+            for node, values in parameters.items()
+        ]
         return self._start(name, files, ros_arguments)
 
     def _start(

@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +20,16 @@ STRIP, VIDEO = "strip.png", "video.mp4"  # what `render` makes of the bag
 REPORT = "report"  # what `report` does
 
 
-def prepare_directory(directory: Path, *, overwrite: bool) -> None:
+def prepare_directory(directory: Path, *, overwrite: bool, characters: Sequence[str] = ()) -> None:
     """Make a directory ready for a run's results; remove those of an earlier run, nothing else.
+
+    `characters` are the names of several, each of which has figures of its own.
 
     Raises:
         RunError: there are results and `overwrite` is not set, or files that no run has made.
     """
     names = (BAG, DAMAGED, PARAMETERS, LOGS, SUMMARY, SERIES, PLOT, STRIP, VIDEO, REPORT)
-    results = [directory / name for name in names]
+    results = [directory / name for name in (*names, *characters)]
     results += [part_of(path) for path in results]  # of a run that was killed
     try:
         present = set(directory.iterdir()) if directory.exists() else set()

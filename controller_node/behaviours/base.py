@@ -13,6 +13,7 @@ from controller_node.references.transformed import PlanarTransform
 from controller_node.registry import Registry
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
 
 
@@ -24,6 +25,13 @@ class Mode(Enum):
     SEARCH = "SEARCH"  # looks for a motion to go on with
     BLEND = "BLEND"  # goes over to a motion that was found, or back to its own
     LIMP = "LIMP"  # nothing drives it
+
+
+class Surroundings(NamedTuple):
+    """What is around a character in a state; None is what its behaviour does not need."""
+
+    contacts: FloatArray | None = None  # (links, 6) as in an observation
+    opponent: FloatArray | None = None  # (3,) likewise
 
 
 class Observation(NamedTuple):
@@ -40,6 +48,7 @@ class Observation(NamedTuple):
     whole_gains: GainArrays  # of joints at full strength
     strengths: FloatArray  # (b,) by which those in force are weaker
     assisted: bool  # whether the gains in force drive a floating base
+    opponent: FloatArray | None = None  # (3,) m, world: the root of the opponent, if it has one
 
     def assistance(self, unless_none: object = "full") -> object:
         """The assistance for a report: "none" where the gains drive no floating base."""
@@ -108,6 +117,14 @@ class BehaviourChoice:
 
     make: Callable[[], Behaviour] = Tracking
     needs_contacts: bool = False
+    opponent: str = ""  # the character whose place it needs, if it needs one
+
+    def check(self, around: Surroundings) -> None:
+        """Raise ConfigurationError if what it needs with each state is not there."""
+        if around.contacts is None and self.needs_contacts:
+            raise ConfigurationError("the behaviour needs the contacts of each state's tick")
+        if around.opponent is None and self.opponent:
+            raise ConfigurationError(f"the behaviour needs the place of '{self.opponent}'")
 
 
 BehaviourMaker: TypeAlias = Callable[[Character, Values], BehaviourChoice]

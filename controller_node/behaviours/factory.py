@@ -9,8 +9,8 @@ BEHAVIOUR_PARAMETERS = [
     Parameter(
         "behaviour",
         "tracking",
-        "track whatever comes; be limp; track, and go limp on a hard hit; or track, and react to "
-        "a hit",
+        "track whatever comes; be limp; track, and go limp on a hard hit; likewise, and go for an "
+        "opponent; or track, and react to a hit",
         choices=BEHAVIOURS.names,
     ),
     *BEHAVIOURS.parameters,

@@ -1,10 +1,11 @@
-"""The behaviours `active_ragdoll` and `reactive`, as the parameters' values say."""
+"""The behaviours that react to hits, as the parameters' values say."""
 
 import numpy as np
 
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.behaviours.posture import Posture
+from controller_node.behaviours.pursuit import PURSUIT_PARAMETERS, Pursuit, pursuit_settings
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.settings import REACTION_PARAMETERS, reaction_settings
 from controller_node.planner.settings import NO_PLANNER
@@ -18,6 +19,22 @@ _LYING = 0.5  # the part of a get-up clip in which it may begin
 @BEHAVIOURS.register("active_ragdoll", *REACTION_PARAMETERS)
 @BEHAVIOURS.register("reactive")
 def _reaction(character: Character, values: Values) -> BehaviourChoice:
+    kit = _make_kit(character, values)
+    return BehaviourChoice(lambda: Reaction(kit), needs_contacts=True)
+
+
+@BEHAVIOURS.register("pursuit", *PURSUIT_PARAMETERS)
+def _pursuit(character: Character, values: Values) -> BehaviourChoice:
+    settings = pursuit_settings(values)
+    kit, strikes = _make_kit(character, values), None
+    if settings.strikes:
+        strikes = MotionLibrary(character, settings.strikes, lasting=0.0)
+    return BehaviourChoice(
+        lambda: Pursuit(kit, settings, strikes), needs_contacts=True, opponent=settings.opponent
+    )
+
+
+def _make_kit(character: Character, values: Values) -> ReactionKit:
     posture = Posture(character)
     settings = reaction_settings(character, values)
     library = get_ups = None
@@ -40,4 +57,4 @@ def _reaction(character: Character, values: Values) -> BehaviourChoice:
     for made in (library, get_ups):
         if made is not None:  # a first search takes longer than others
             made.nearest(made.predicted(rest, np.zeros_like(rest)))
-    return BehaviourChoice(lambda: Reaction(kit), needs_contacts=True)
+    return kit

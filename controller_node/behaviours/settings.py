@@ -8,7 +8,7 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.parameters import Parameter, Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
 
-_TELLS_HITS = ("active_ragdoll", "reactive")
+_TELLS_HITS = ("active_ragdoll", "pursuit", "reactive")
 
 REACTION_PARAMETERS = [
     Parameter("hit.threshold", 3.0, "impulse of contacts that counts as a hit", unit="N s"),
@@ -38,7 +38,7 @@ REACTION_PARAMETERS = [
         maximum=60.0,
     ),
     Parameter("library", [], "clips that a reaction may go on with; none named: all", texts=True),
-    Parameter("upright.torque", 150.0, "active_ragdoll: largest root torque", unit="N m"),
+    Parameter("upright.torque", 150.0, "active_ragdoll, pursuit: largest root torque", unit="N m"),
     Parameter(
         "recovery",
         "clip",
@@ -60,7 +60,7 @@ REACTION_PARAMETERS = [
 
 @dataclass(frozen=True)
 class ReactionSettings:
-    """The settings of `active_ragdoll` and `reactive`."""
+    """The settings of `active_ragdoll`, `pursuit` and `reactive`."""
 
     searches: bool  # reactive
     hit_threshold: float  # N s
@@ -70,7 +70,7 @@ class ReactionSettings:
     assistance: float  # weights
     blend_duration: float  # s
     library: tuple[str, ...]
-    upright_torque: float  # N m, of active_ragdoll
+    upright_torque: float  # N m, of active_ragdoll and pursuit
     by_clip: bool  # gets up by a clip
     recovery_duration: float  # s
     face_up: str  # clips

@@ -1,0 +1,57 @@
+"""What there is to see: scenes, characters, clips, and commands to copy."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from actuated_characters.commands.common.tables import make_table
+
+_PROGRAM = "actuated_characters"
+_COMMANDS = {
+    "play": "a humanoid that walks in the browser, to be pushed; needs the extra 'view'",
+    "play --scene brawl": "another scene",
+    "run --clip walk --duration 20": "a recorded run, and its figures",
+    "run --view --clip dance_a": "any run in the browser",
+    "run --clip backflip --duration 1.75 --planner predictive": "by joint torques "
+    "alone; needs the extra 'plan'",
+    "run --help": "all that can be set",
+}
+
+
+def print_overview(options: argparse.Namespace) -> None:
+    """Print what can be run, and how."""
+    from actuated_characters.scenes.scene import load_scene, scene_names
+
+    del options
+    print_characters(Console())
+    print("\nscenes:")
+    for name in scene_names():
+        print(f"  {name}: {load_scene(name).title}")
+    typed = sys.argv[0]
+    program = typed if Path(typed).name == _PROGRAM else _PROGRAM
+    for words, about in _COMMANDS.items():
+        print(f"\n# {about}\n{program} {words}")
+
+
+def print_characters(console: Console) -> None:
+    """Print the characters that come with the package, and their clips."""
+    columns = ("name", "degrees of freedom", "mass", "clips")
+    console.print(make_table("characters", columns, _characters(), right=False))
+
+
+def _characters() -> Sequence[tuple[str, ...]]:
+    from controller_node.references.files.clip import available_clips
+    from msgs_config.character.file import shipped_characters
+    from msgs_config.character.loading import load_character
+
+    rows = []
+    for name in shipped_characters():
+        character = load_character(name)
+        clips = ", ".join(available_clips(character)) or "-"
+        base = "floating" if character.layout.has_floating_base else "fixed"
+        freedom = f"{character.layout.size}, {base} base"
+        rows.append((name, freedom, f"{character.mass:.3g} kg", clips))
+    return rows

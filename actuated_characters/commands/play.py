@@ -1,0 +1,136 @@
+"""The command `actuated_characters play`: a scene in the browser, to be watched and touched."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from actuated_characters.commands.common.interruption import check_interruption
+from actuated_characters.commands.common.progress import progress_bar
+from actuated_characters.commands.common.settings import (
+    NODES,
+    Commands,
+    add_command,
+    add_repeated,
+    node_settings,
+)
+from actuated_characters.commands.common.tables import make_table
+from actuated_characters.commands.view import add_server, server_parameters
+from msgs_config.errors import ConfigurationError
+
+if TYPE_CHECKING:  # it takes a while to import
+    from actuated_characters.scenes.scene import Scene
+
+_SCENE = "walker"
+_DURATION = 600.0  # s
+
+
+def add_play(commands: "Commands[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters`."""
+    play = add_command(
+        commands,
+        _play,
+        "play",
+        "play a scene in a browser: push its characters, throw balls at them",
+        "Play a scene in real time in a browser: drag a body to push it, click on it with Shift to "
+        "throw a ball at it. Ctrl-C ends it. All is recorded, and `replay` repeats it. Needs the "
+        "extra 'view'.",
+        ["play", "play --scene brawl"],
+    )
+    play.add_argument(
+        "--scene",
+        default=_SCENE,
+        metavar="NAME",
+        help="which (%(default)s; --list says what there is), or a .yaml file of parameters",
+    )
+    play.add_argument("--list", action="store_true", help="list the scenes, a line each, and end")
+    play.add_argument(
+        "--duration",
+        type=float,
+        default=_DURATION,
+        metavar="S",
+        help="simulated time in s, unless it is ended before (%(default)g)",
+    )
+    play.add_argument(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="where the results go (runs/play-SCENE, which is replaced)",
+    )
+    play.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
+    play.add_argument("--no-view", action="store_true", help="without a browser")
+    add_repeated(
+        play,
+        "--set",
+        "NODE.NAME:=VALUE",
+        "a parameter of sim_node, or of the controller_node of every character",
+    )
+    add_server(play)
+
+
+def _play(options: argparse.Namespace) -> None:
+    from actuated_characters.scenes.scene import load_scene, scene_names
+
+    if options.list:
+        for name in scene_names():
+            print(f"{name}: {load_scene(name).title}")
+        return
+    _run_scene(options, load_scene(options.scene, node_settings(options.set, NODES)))
+
+
+def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
+    from actuated_characters.runs.plan import count_ticks
+    from actuated_characters.runs.run_directory import prepare_directory
+    from actuated_characters.scenes.execution import play_scene
+
+    rate = scene.simulator.get("rate")
+    if not isinstance(rate, int) or rate < 1:
+        raise ConfigurationError(f"scene '{scene.name}': sim_node's 'rate' is {rate}, not in Hz")
+    ticks = count_ticks(options.duration, rate)
+    directory = (options.output or Path("runs") / f"play-{scene.name}").absolute()
+    overwrite = options.overwrite or options.output is None
+    prepare_directory(directory, overwrite=overwrite, characters=scene.characters)
+    viewer = None if options.no_view else server_parameters(options)
+    check_interruption()  # all modules are imported by now
+    for line in _described(scene):
+        print(line, flush=True)
+    with progress_bar(f"{scene.name} (Ctrl-C ends it)", ticks, "ticks") as bar:
+        was_ended = play_scene(
+            scene,
+            directory,
+            ticks,
+            viewer=viewer,
+            progress=lambda done: bar.update(bar.task_ids[0], completed=min(done, ticks)),
+        )
+    if was_ended:
+        print("ended")
+    _print_figures(directory, scene.characters)
+
+
+def _described(scene: "Scene") -> list[str]:
+    """What there is to see, and the bounds of what draws its characters."""
+    lines = [scene.title] if scene.title else []
+    for name, values in scene.nodes.items():
+        if opponent := values.get("opponent"):
+            force, torque = (values.get(key) for key in ("effort_limit.root", "upright.torque"))
+            lines.append(
+                f"{name.partition('/')[0]} goes for {opponent}: root force at most {force} N, root "
+                f"torque at most {torque} N m"
+            )
+    return lines
+
+
+def _print_figures(directory: Path, characters: list[str]) -> None:
+    from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
+    from actuated_characters.runs.run_directory import metrics_directory, read_metrics
+
+    shown: dict[str, list[str]] = {}
+    for name in characters or [""]:
+        folder = metrics_directory(directory, name, is_alone=not name)
+        plot_metrics(folder)
+        for figure, value in describe_metrics(read_metrics(folder)[0]):
+            shown.setdefault(figure, []).append(value)
+    columns = ("figure", *(characters or ["value"]))
+    rows = [(figure, *values) for figure, values in shown.items()]
+    Console().print(make_table(f"results in {directory}", columns, rows))

@@ -1,0 +1,1 @@
+"""Scenes: worlds to watch and to touch, by name."""

@@ -1,0 +1,62 @@
+"""Runs a scene: simulator and controllers in one process, a recorder, and a viewer."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from actuated_characters.runs.execution import (
+    Progress,
+    run_environment,
+    wait_for_end,
+    watch,
+)
+from actuated_characters.runs.plan import RUN_DEFAULTS
+from actuated_characters.runs.processes import Children
+from actuated_characters.scenes.scene import SIMULATOR, Scene
+from msgs_config.errors import RunError
+from msgs_config.messages.session import SESSION, make_session
+
+
+def play_scene(
+    scene: Scene,
+    directory: Path,
+    ticks: int,
+    *,
+    viewer: Mapping[str, object] | None,
+    progress: Progress = lambda ticks: None,
+) -> bool:
+    """Run a scene for so many ticks; leaves bag and figures in a directory, which was prepared.
+
+    With parameters of a viewer, it is shown in a browser. An interruption ends it in good order.
+    Returns whether it was interrupted.
+
+    Raises:
+        RunError: one of the processes failed.
+    """
+    session = ("-p", f"{SESSION.name}:={make_session(f'/{SIMULATOR}')}")
+    recording = {"directory": str(directory), "characters": scene.characters}
+    interrupted = False
+    with run_environment(directory) as environment, Children(directory, environment) as children:
+        if viewer is not None:
+            shown = children.start_node("viewer", viewer)
+            progress = watch(shown, progress)
+            if shown.exit_code is not None:
+                raise RunError(f"viewer failed: {shown.last_words()}")
+        recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
+        loop = children.start_composed("composed", _parameters(scene, ticks), *session)
+        try:
+            wait_for_end(loop, [recorder], progress)
+        except KeyboardInterrupt:
+            interrupted = True
+    if recorder.exit_code:
+        raise RunError(f"recorder failed: {recorder.last_words()}")
+    return interrupted
+
+
+def _parameters(scene: Scene, ticks: int) -> dict[str, dict[str, object]]:
+    """The nodes' parameters, with which they wait for each other and for the recorder."""
+    heard_by = [str(values.get("opponent", "")) for values in scene.nodes.values()]
+    most = max(map(heard_by.count, scene.characters), default=0)
+    nodes = {name: {"wait_for_subscribers": 2, **given} for name, given in scene.nodes.items()}
+    simulator = {**RUN_DEFAULTS, **scene.simulator}
+    nodes[SIMULATOR] = {**simulator, "wait_for_subscribers": 2 + most, "max_ticks": ticks}
+    return nodes

@@ -1,0 +1,101 @@
+"""Scenes: a simulator, its characters' controllers and their parameters, as a file has them."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgs_config import files
+from msgs_config.errors import ConfigurationError, one_of
+
+SIMULATOR, CONTROLLER = "sim_node", "controller_node"
+_FOLDER = Path(__file__).parent / "data"
+_SUFFIX = ".yaml"
+_PARAMETERS = "ros__parameters"
+_ANY_NAMESPACE = "/**"
+
+Parameters = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A world to run: the parameters of its nodes."""
+
+    name: str
+    title: str  # what there is to see, in one line
+    nodes: Mapping[str, Parameters]  # by name below the simulator's namespace; the simulator first
+
+    @property
+    def simulator(self) -> Parameters:
+        """The simulator's parameters."""
+        return self.nodes[SIMULATOR]
+
+    @property
+    def characters(self) -> list[str]:
+        """The names of its characters; none of a single one."""
+        return _names_in(self.simulator)
+
+
+def scene_names() -> list[str]:
+    """The names of the scenes that come with the package."""
+    return sorted(path.stem for path in _FOLDER.glob(f"*{_SUFFIX}"))
+
+
+def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> Scene:
+    """A scene that comes with the package, or that of a parameter file.
+
+    Args:
+        name: The scene's name, or the path of a .yaml file as the executable `composed` takes it.
+        settings: Parameters in place of the file's: those of `sim_node`, and those of
+            `controller_node`, which count for every controller.
+
+    Raises:
+        ConfigurationError: there is no such scene, or the file is malformed.
+    """
+    path = Path(name) if name.endswith(_SUFFIX) else _FOLDER / f"{name}{_SUFFIX}"
+    if path.parent == _FOLDER and not path.is_file():
+        raise ConfigurationError(one_of("scene", name, scene_names()))
+    text = files.read_text(path, ConfigurationError)
+    content = files.parse_yaml_mapping(path, text, ConfigurationError)
+    for key, section in content.items():
+        if not (isinstance(section, dict) and isinstance(section.get(_PARAMETERS), dict)):
+            raise ConfigurationError(f"{path}: '{key}' must hold a mapping '{_PARAMETERS}'")
+    settings = settings or {}
+    simulator = _parameters_of(SIMULATOR, content) | settings.get(SIMULATOR, {})
+    if not simulator:
+        raise ConfigurationError(f"{path}: there are no parameters of '{SIMULATOR}'")
+    nodes = {SIMULATOR: simulator}
+    for character in _names_in(simulator) or [""]:
+        node = f"{character}/{CONTROLLER}".lstrip("/")
+        nodes[node] = _parameters_of(node, content) | settings.get(CONTROLLER, {})
+    return Scene(path.stem, _title(text), nodes)
+
+
+def _title(text: str) -> str:
+    """The comment that a file begins with: its first line."""
+    first = text.partition("\n")[0]
+    return first.removeprefix("#").strip() if first.startswith("#") else ""
+
+
+def _names_in(simulator: Parameters) -> list[str]:
+    names = simulator.get("characters") or []
+    return [str(name) for name in names] if isinstance(names, list) else []
+
+
+def _parameters_of(node: str, content: Mapping[str, Mapping[str, object]]) -> Parameters:
+    """What a file says for a node, as rcl reads it: of the keys that match the last one counts."""
+    found: Parameters = {}
+    for key, section in content.items():
+        pattern = re.escape(key).replace(re.escape(_ANY_NAMESPACE), r"(/\w+)*")
+        if re.fullmatch(pattern, f"/{node}"):
+            found |= _flattened(section[_PARAMETERS])
+    return found
+
+
+def _flattened(section: object, prefix: str = "") -> Iterator[tuple[str, object]]:
+    assert isinstance(section, Mapping)
+    for name, value in section.items():
+        if isinstance(value, dict):
+            yield from _flattened(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value

@@ -1,0 +1,54 @@
+"""The messages beside a state that a behaviour needs to answer it."""
+
+from rclpy.node import Node
+
+from controller_node.behaviours.base import Surroundings
+from controller_node.controller import Controller
+from controller_node.interface.contact_subscription import ContactSubscription
+from controller_node.interface.opponent_subscription import OpponentSubscription
+from controller_node.interface.simulators import Simulators
+from msgs_config.character.model import Character
+from msgs_config.runtime.once_logger import OnceLogger
+
+
+class AwaitedMessages:
+    """Takes what a controller's behaviour needs, and has that of each state ready."""
+
+    def __init__(
+        self,
+        node: Node,
+        controller: Controller,
+        character: Character,
+        simulators: Simulators,
+        logger: OnceLogger,
+    ) -> None:
+        """Subscribe. Raises ConfigurationError if an opponent is needed, and there can be none."""
+        self._contacts = self._opponent = None
+        if controller.needs_contacts:
+            self._contacts = ContactSubscription(node, character, simulators, logger)
+        if controller.opponent:
+            self._opponent = OpponentSubscription(node, controller.opponent, simulators, logger)
+
+    def begin(self) -> None:
+        """An episode begins, whose stamps may be those of another simulator's episode before."""
+        if self._contacts is not None:
+            self._contacts.begin()
+
+    def restart(self) -> None:
+        """Forget all: what comes from now on is another simulator's."""
+        for each in (self._contacts, self._opponent):
+            if each is not None:
+                each.restart()
+
+    def until(self, stamp_ns: int, episode_ns: int) -> Surroundings | None:
+        """What goes with a state; None as long as some of it is yet to come."""
+        opponent = contacts = None
+        if self._opponent is not None:
+            opponent = self._opponent.at(stamp_ns)
+            if opponent is None:
+                return None
+        if self._contacts is not None:  # afterwards: it has those of a state once
+            contacts = self._contacts.until(stamp_ns, episode_ns)
+            if contacts is None:
+                return None
+        return Surroundings(contacts, opponent)
