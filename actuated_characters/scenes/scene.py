@@ -13,6 +13,7 @@ _FOLDER = Path(__file__).parent / "data"
 _SUFFIX = ".yaml"
 _PARAMETERS = "ros__parameters"
 _ANY_NAMESPACE = "/**"
+_OPPONENT = "opponent"
 
 Parameters = dict[str, object]
 
@@ -64,10 +65,15 @@ def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> S
     simulator = _parameters_of(SIMULATOR, content) | settings.get(SIMULATOR, {})
     if not simulator:
         raise ConfigurationError(f"{path}: there are no parameters of '{SIMULATOR}'")
-    nodes = {SIMULATOR: simulator}
-    for character in _names_in(simulator) or [""]:
+    nodes, names = {SIMULATOR: simulator}, _names_in(simulator)
+    for character in names or [""]:
         node = f"{character}/{CONTROLLER}".lstrip("/")
-        nodes[node] = _parameters_of(node, content) | settings.get(CONTROLLER, {})
+        nodes[node] = given = _parameters_of(node, content) | settings.get(CONTROLLER, {})
+        opponent = given.get(_OPPONENT, "")
+        if opponent not in ("", *(name for name in names if name != character)):
+            raise ConfigurationError(
+                f"{path}: '{_OPPONENT}' of '{node}' is {opponent}, which is no other character"
+            )
     return Scene(path.stem, _title(text), nodes)
 
 

@@ -20,9 +20,11 @@ from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.targets import ClipTarget
 from controller_node.planner.settings import NO_PLANNER
+from controller_node.references.files.clip import available_clips
 from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference
-from msgs_config.errors import ConfigurationError
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.parameters import Parameter, Values
 
 _TURN_SPEED = 3.0  # rad/s, of the target's heading at most
@@ -56,11 +58,11 @@ class PursuitSettings:
     strikes: tuple[str, ...]  # clips
 
 
-def pursuit_settings(values: Values) -> PursuitSettings:
+def pursuit_settings(character: Character, values: Values) -> PursuitSettings:
     """The settings that the parameters' values say.
 
     Raises:
-        ConfigurationError: there is no opponent, or a planner.
+        ConfigurationError: there is no opponent, or a planner; or a clip does not exist.
     """
     if not values.text("opponent"):
         raise ConfigurationError(
@@ -72,6 +74,10 @@ def pursuit_settings(values: Values) -> PursuitSettings:
             "parameter 'behaviour' is pursuit, whose way no planner can foresee; 'planner' must be "
             f"{NO_PLANNER}"
         )
+    clips = available_clips(character)
+    for clip in values.texts("strike.clips"):
+        if clip not in clips:
+            raise ConfigurationError(one_of("clip in parameter 'strike.clips':", clip, clips))
     return PursuitSettings(
         opponent=values.text("opponent"),
         force=values.number("pursuit.force"),

@@ -25,7 +25,7 @@ def _reaction(character: Character, values: Values) -> BehaviourChoice:
 
 @BEHAVIOURS.register("pursuit", *PURSUIT_PARAMETERS)
 def _pursuit(character: Character, values: Values) -> BehaviourChoice:
-    settings = pursuit_settings(values)
+    settings = pursuit_settings(character, values)
     kit, strikes = _make_kit(character, values), None
     if settings.strikes:
         strikes = MotionLibrary(character, settings.strikes, lasting=0.0)

@@ -1,5 +1,7 @@
 """Where another character of the world is at each state, as it comes over a topic."""
 
+import time
+
 import numpy as np
 from rclpy.node import Node
 
@@ -14,6 +16,7 @@ from msgs_config.runtime.polling import DirectSubscription
 
 _AXES = tuple(f"{ROOT}_{axis}" for axis in "xyz")
 _MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the own states waiting
+_EXPLAIN_AFTER = 2.0  # s of wall time
 _MOST_KEPT = 5000  # ticks whose own states are yet to come, as of contacts
 
 
@@ -38,6 +41,7 @@ class OpponentSubscription:
         self._simulators, self._once_logger = simulators, logger
         self._name, self._decoder = topic.name, JointStateDecoder()
         self._places = dict[int, FloatArray]()  # by stamp
+        self._waits_since: float | None = None
 
     def restart(self) -> None:
         """Forget all: what comes from now on is another simulator's."""
@@ -55,7 +59,14 @@ class OpponentSubscription:
             self._keep(raw)
         for past in [stamp for stamp in self._places if stamp < stamp_ns]:
             del self._places[past]
-        return self._places.get(stamp_ns)
+        place = self._places.get(stamp_ns)
+        if place is not None:
+            self._waits_since = None
+        elif self._waits_since is None:
+            self._waits_since = time.monotonic()
+        elif time.monotonic() > self._waits_since + _EXPLAIN_AFTER:
+            self._once_logger.log_once(f"waiting for the opponent's states on '{self._name}'")
+        return place
 
     def _keep(self, raw: bytes) -> None:
         try:

@@ -1,0 +1,97 @@
+"""Scenes as their files have them, and the list of them."""
+
+from pathlib import Path
+
+import pytest
+
+from actuated_characters.cli import main
+from actuated_characters.scenes.scene import load_scene, scene_names
+from msgs_config.errors import ConfigurationError
+from sim_node.parameters import load_parameters
+
+
+def test_the_list_has_a_line_for_each_scene(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["play", "--list"]) == 0
+
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(": ")[0] for line in lines] == scene_names()
+    assert all(line.split(": ")[1].endswith(".") for line in lines)
+    assert {"brawl", "walker"} <= set(scene_names())
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_both_sides_of_a_scene_agree(name: str) -> None:
+    scene = load_scene(name)
+    parts = load_parameters(scene.simulator).characters
+    controllers = list(scene.nodes.values())[1:]
+
+    assert len(parts) == len(controllers)
+    for part, controller in zip(parts, controllers, strict=True):
+        assert controller["rate"] == part.values["rate"]
+        assert controller["character"] == part.values["character"]
+        assert controller.get("placement", [0.0] * 4) == part.values["placement"]
+
+
+def test_a_file_is_read_as_rcl_reads_it_and_settings_count_more(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "# Mine.\n"
+        "/**/sim_node: {ros__parameters: {characters: [a, b], rate: 240, a: {character: lift}}}\n"
+        "/**/controller_node: {ros__parameters: {rate: 240, gains: {hinge: {p: 1.0}}, law: pd}}\n"
+        "/a/controller_node: {ros__parameters: {rate: 480, law: pid}}\n"
+    )
+
+    scene = load_scene(str(file), {"controller_node": {"law": "zero"}})
+
+    assert (scene.name, scene.title, scene.characters) == ("mine", "Mine.", ["a", "b"])
+    assert list(scene.nodes) == ["sim_node", "a/controller_node", "b/controller_node"]
+    assert scene.simulator["a.character"] == "lift"
+    assert scene.nodes["a/controller_node"] == {"rate": 480, "gains.hinge.p": 1.0, "law": "zero"}
+    assert scene.nodes["b/controller_node"] == {"rate": 240, "gains.hinge.p": 1.0, "law": "zero"}
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("sim_node: 3", "'sim_node' must hold a mapping 'ros__parameters'"),
+        ("/**/controller_node: {ros__parameters: {rate: 240}}", "no parameters of 'sim_node'"),
+        ("[]", "must hold a mapping"),
+    ],
+)
+def test_a_malformed_file_is_refused(tmp_path: Path, text: str, reason: str) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+
+    with pytest.raises(ConfigurationError, match=reason):
+        load_scene(str(file))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--scene", "bralw"], "unknown scene 'bralw'; did you mean 'brawl'?"),
+        (["--scene", "nowhere.yaml"], "nowhere.yaml: No such file"),
+        (["--duration", "0"], "duration is 0.0 s"),
+        (["--set", "sim_node.rate:=fast"], "'rate' is fast"),
+        (
+            ["--scene", "brawl", "--set", "controller_node.opponent:=nobody"],
+            "'opponent' of 'left/controller_node' is nobody, which is no other character",
+        ),
+        (["--set", "recorder.storage:=mcap"], "unknown node 'recorder'"),
+    ],
+)
+def test_a_mistake_is_one_clear_line(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    line: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    assert main(["play", *arguments]) == 1
+
+    (error,) = capsys.readouterr().err.splitlines()
+    assert error.startswith("error: ")
+    assert line in error
+    assert not list(tmp_path.iterdir())
