@@ -32,6 +32,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.get_closest_marker("sharing") is None)
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the tests in a browser that did not run, where there is none."""
+    skipped = terminalreporter.stats.get("skipped", ())
+    if not skipped:
+        return
+    from tests.support.browser import NO_CHROMIUM
+
+    names = [report.nodeid for report in skipped if NO_CHROMIUM in str(report.longrepr)]
+    if names:
+        terminalreporter.section(f"{len(names)} tests in a browser {NO_CHROMIUM}")
+        for name in sorted(names):
+            terminalreporter.line(name)
+
+
 @pytest.fixture(scope="session")
 def domain() -> Iterator[int]:
     """A ROS domain that nobody else on this machine uses; the tests' processes inherit it."""

@@ -17,7 +17,7 @@ def complete(parser: argparse.ArgumentParser) -> None:
 
 def add_names(parser: argparse.ArgumentParser) -> None:
     """Let a command's options be completed by names: characters, their clips, parameters."""
-    completers = {"character": _characters, "clip": _clips, "set": _settings}
+    completers = {"character": _characters, "clip": _clips, "set": _settings, "scene": _scenes}
     for action in parser._actions:
         if action.dest in completers and action.option_strings:
             action.completer = completers[action.dest]  # type: ignore[attr-defined]
@@ -40,11 +40,20 @@ def _clips(prefix: str, parsed_args: argparse.Namespace, **ignored: object) -> I
     return [*available_clips(load_character(parsed_args.character)), *FilesCompleter()(prefix)]
 
 
-def _settings(parsed_args: argparse.Namespace, **ignored: object) -> Iterable[str]:
-    from actuated_characters.commands.common.settings import NODES, parameters_of
+def _scenes(prefix: str, **ignored: object) -> Iterable[str]:
+    from argcomplete.completers import FilesCompleter
 
+    from actuated_characters.scenes.scene import scene_names
+
+    return [*scene_names(), *FilesCompleter()(prefix)]
+
+
+def _settings(parsed_args: argparse.Namespace, **ignored: object) -> Iterable[str]:
+    from actuated_characters.commands.common.settings import CHARACTER, NODES, parameters_of
+
+    character = getattr(parsed_args, "character", CHARACTER)
     return [
         f"{node}.{parameter.name}:="
         for node in NODES
-        for parameter in parameters_of(node, parsed_args.character)
+        for parameter in parameters_of(node, character)
     ]

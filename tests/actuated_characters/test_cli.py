@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from actuated_characters.cli import main
+from actuated_characters.scenes.scene import scene_names
 from controller_node.parameters import PARAMETERS
+from msgs_config.character.file import shipped_characters
 
 PENDULUM_GAIN = "controller_node.gains.hinge.p:="
 
@@ -32,6 +34,28 @@ def test_piped_parameters_have_a_line_each(capsys: pytest.CaptureFixture[str]) -
     assert "gains.hinge.p: 50 N m/rad" in "\n".join(lines)
 
 
+def test_run_without_a_word_says_what_there_is_to_run_and_runs_nothing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    assert main(["run"]) == 0
+
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in shipped_characters())
+    assert "spinkick" in shown
+    assert all(f"  {name}: " in shown for name in scene_names())
+    commands = [line.split()[1:] for line in shown.splitlines() if "actuated_characters " in line]
+    assert ["play", "--scene", "brawl"] in commands
+    for arguments in commands:  # each can be copied: its options are there
+        options = {argument for argument in arguments if argument.startswith("--")} - {"--help"}
+        with pytest.raises(SystemExit):
+            main([arguments[0], "--help"])
+        about = capsys.readouterr().out
+        assert all(option in about for option in options)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
@@ -42,6 +66,8 @@ def test_piped_parameters_have_a_line_each(capsys: pytest.CaptureFixture[str]) -
         ("run --behaviour r", {"ragdoll", "reactive"}),
         ("run --character pendulum --set controller_node.gains.hinge.p", {PENDULUM_GAIN}),
         ("fo", {"fork"}),
+        ("play --scene br", {"brawl"}),
+        ("play --set controller_node.gains.neck.p", {"controller_node.gains.neck.p:="}),
         ("fork run_mine --set controller_node.gains.neck.p", {"controller_node.gains.neck.p:="}),
         ("parameters rec", {"recorder"}),
         ("study li", {"lift"}),

@@ -27,9 +27,8 @@ from tests.support.ros import wait_until
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 
-needs_chromium = pytest.mark.skipif(
-    not CHROMIUM, reason="not run: chromium is not installed (Debian: apt-get install chromium)"
-)
+NO_CHROMIUM = "not run: chromium is not installed (Debian: apt-get install chromium)"
+needs_chromium = pytest.mark.skipif(not CHROMIUM, reason=NO_CHROMIUM)
 
 SIZE = (800, 600)  # of the window, in pixels
 SHIFT = 8  # of DevTools' bits of modifiers

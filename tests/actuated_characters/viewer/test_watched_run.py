@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 DURATION = 3.0  # s, in real time, so that it lasts
 LEAST_PICTURES = 20
+OTHER_ADDRESS = "127.0.0.2"
 
 
 @pytest.fixture(scope="module")
@@ -106,9 +108,19 @@ def test_the_command_ends_with_the_signal_and_says_where_it_listens(processes: P
 
 
 def test_a_host_that_others_can_reach_is_warned_of(processes: Processes) -> None:
-    command = processes.command("view", "--host", "0.0.0.0", "--port", str(free_port()))
+    alone, open_to_all = free_port(), free_port()
+    watched = processes.command("view", "--port", str(alone))
+    command = processes.command("view", "--host", "0.0.0.0", "--port", str(open_to_all))
 
-    wait_until(lambda: "listening on 0.0.0.0: all who reach port" in command.stderr, "a warning")
+    wait_until(lambda: watched.stdout and command.stdout, "the pages")
+    warning = f"listening on 0.0.0.0: all who reach port {open_to_all}"
+    wait_until(lambda: warning in command.stderr, "a warning")
+
+    # another address of this machine stands for what others reach
+    with socket.create_connection((OTHER_ADDRESS, open_to_all), timeout=10.0):
+        pass
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection((OTHER_ADDRESS, alone), timeout=10.0)
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ class World:
         message = joint_state(CLOCK.stamp_ns(tick), ROOT, place, [0.0] * 3, [0.0] * 3)
         self._opponents.publish(message)
 
-    def answer(self, tick: int) -> JointState | None:
+    def answered_at(self, tick: int) -> JointState | None:
         return self.torques.of_stamp(CLOCK.stamp_ns(tick))
 
 
@@ -85,7 +85,9 @@ def test_a_state_waits_for_the_opponents_state_of_its_tick(
     assert not world.torques.messages
 
     first = world.client.spin_sending(
-        lambda: (world.send_state(1), world.send_opponent(1)), lambda: world.answer(1), "an answer"
+        lambda: (world.send_state(1), world.send_opponent(1)),
+        lambda: world.answered_at(1),
+        "an answer",
     )
 
     # at rest, with the law's implicit step: towards the opponent, and less than the force
@@ -94,7 +96,7 @@ def test_a_state_waits_for_the_opponents_state_of_its_tick(
     assert 0.5 * FORCE < y <= FORCE
     world.client.spin_sending(
         lambda: (world.send_state(2), world.send_opponent(2, (0.0, -4.0, 0.88))),
-        lambda: world.answer(2),
+        lambda: world.answered_at(2),
         "an answer",
     )
     assert [stamp_ns(each) for each in world.torques.messages] == sorted(
@@ -117,7 +119,9 @@ def test_a_state_without_a_finite_place_is_ignored(
     )
     assert not world.torques.messages
     world.client.spin_sending(
-        lambda: (world.send_state(1), world.send_opponent(1)), lambda: world.answer(1), "an answer"
+        lambda: (world.send_state(1), world.send_opponent(1)),
+        lambda: world.answered_at(1),
+        "an answer",
     )
 
 

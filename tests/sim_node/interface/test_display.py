@@ -165,6 +165,12 @@ def test_who_looks_later_at_a_waiting_simulator_gets_the_frames(
     frames = Frames(client.node)
 
     client.spin_until(lambda: stamp in frames.moving and frames.static, "frames")
+    # those of the state that waits, and nothing of a tick that has not begun
+    assert frames.moving.keys() == {stamp}
+    links = {link.name for link in character("humanoid").links}
+    assert links <= frames.moving[stamp].keys() | frames.static.keys()
+    base = frames.in_frame("base_link", "odom", stamp)
+    np.testing.assert_allclose(base[:3, :3], np.eye(3), atol=1e-9)
 
 
 def test_a_bag_has_the_frames_where_their_type_is_installed(
