@@ -21,6 +21,7 @@ from actuated_characters.replay.players.processes import (
     wait_for_player,
 )
 from actuated_characters.replay.players.simulator_inputs import make_inputs
+from actuated_characters.replay.players.simulator_outputs import opponent_of
 from actuated_characters.replay.world import read_world, simulator_values
 from actuated_characters.runs.processes import Child
 from msgs_config.errors import ConfigurationError, RunError
@@ -41,6 +42,7 @@ _NOT_TO_BE_SET = (
     COLLISION.name,
     PLACEMENT.name,
     SESSION.name,
+    "opponent",
     "rate",
     "wait_for_subscribers",
 )
@@ -166,12 +168,16 @@ def replay_states(
     session = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
     with child_processes(own=start) as children:
         others = []
+        # one that is started may be anywhere, unless it listens to the namespace beside its own
+        namespace = "" if start and not opponent_of(recording) else recording.name
         if start:
             parameters = _controller_parameters(children.directory, recording) | settings | session
-            others.append(children.start_node(topics.CONTROLLER_NODE, parameters))
+            remap = ["-r", f"__ns:=/{namespace}"] if namespace else []
+            others.append(
+                children.start_node(topics.CONTROLLER_NODE, parameters, *remap, any_node=True)
+            )
         file = children.directory / "commands.npz"
         playing = _player_parameters(recording, settings, start) | {"commands": str(file)} | session
-        namespace = "" if start else recording.name
         player = start_player(children, SIMULATOR, path, playing, namespace)
         wait_for_player(player, others, progress, tell)
         with np.load(file) as arrays:

@@ -19,6 +19,8 @@ from actuated_characters.replay.players.processes import ANSWER_TIMEOUT, PlayerR
 from actuated_characters.replay.players.simulator_outputs import (
     REQUESTS,
     SessionRewriter,
+    opponent_of,
+    read_opponent,
     read_rare_messages,
     read_ticks,
     tick_topics,
@@ -76,7 +78,7 @@ class RecordedSimulator(Node):
         self._file = Path(values.text("commands"))
         self._session = given_session(values) or make_session(self.get_fully_qualified_name())
         self._rewriter = SessionRewriter(self._session)
-        path = Path(values.text("recording"))
+        self._path = path = Path(values.text("recording"))
         self._start_timeout = values.number("start_timeout") or math.inf
         self._recording = read_recording(path, values.text("character") or None)
         self._rare = read_rare_messages(path, self._recording)
@@ -108,6 +110,11 @@ class RecordedSimulator(Node):
         self._parameter_client = self.create_client(
             SetParametersAtomically, f"{topics.CONTROLLER_NODE}/set_parameters_atomically"
         )
+        self._opponent = opponent_of(self._recording)
+        if self._opponent:
+            topic = topics.JOINT_STATES.under(f"/{self._opponent}")
+            self._outputs[self._opponent] = topics.create_publisher(self, topic)
+            self._opponents_states = read_opponent(self._path, self._recording)
         self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
 
     def run(self, stop: StopSignal) -> None:
@@ -142,6 +149,12 @@ class RecordedSimulator(Node):
         self._outputs[topic.name].publish(own)
         return own
 
+    def _publish_opponent(self) -> bytes:
+        """Publish the next state of the opponent in this node's session; returns it."""
+        own = self._rewriter.rewrite(topics.JOINT_STATES, next(self._opponents_states))
+        self._outputs[self._opponent].publish(own)
+        return own
+
     def _is_subscribed(self) -> bool:
         """Whether there is a controller, and all that it is sent will reach it."""
         publishers = [self._outputs[topics.JOINT_STATES.name], *self._requests.values()]
@@ -163,6 +176,8 @@ class RecordedSimulator(Node):
         stamp_ns = int(self._recording.stamps_ns[row])
         self._clock_topic.publish(encode_clock(stamp_ns))
         sent = [(topic.name, self._publish(topic, raw)) for topic, raw in messages]
+        if self._opponent:
+            sent.append((self._opponent, self._publish_opponent()))
         if is_answered:  # else it was not answered then either, or the answer not recorded
             self._wait_for_answer(row, stamp_ns, sent)
             for change in self._changes.get(row, ()):

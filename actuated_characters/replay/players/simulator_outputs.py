@@ -15,7 +15,7 @@ from std_msgs.msg import Header, String
 from trajectory_msgs.msg import JointTrajectory
 
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.recording import Recording, find_bag
+from actuated_characters.bags.recording import Recording, find_bag, read_recording
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode
@@ -113,6 +113,26 @@ def read_ticks(path: Path, recording: Recording) -> Iterator[list[tuple[Topic, b
             messages = []
     if row < len(recording.stamps_ns):
         raise RecordingError(f"recording {path} has changed while it was read")
+
+
+def opponent_of(recording: Recording) -> str:
+    """The name of the recording of a character's opponent, which its controller listens to."""
+    given = recording.controller[0].parameters if recording.controller else {}
+    opponent, world = str(given.get("opponent", "")), recording.name.rpartition("/")[0]
+    return f"{world}/{opponent}".lstrip("/") if opponent else ""
+
+
+def read_opponent(path: Path, recording: Recording) -> Iterator[bytes]:
+    """The opponent's states of the ticks of a recording, in order.
+
+    Raises:
+        RecordingError: as `read_ticks`; or the opponent is not in the bag.
+    """
+    first_ns = recording.stamps_ns[0]
+    for messages in read_ticks(path, read_recording(path, opponent_of(recording))):
+        _, state = messages[-1]
+        if _raw_stamp_ns(state) >= first_ns:
+            yield state
 
 
 def _raw_stamp_ns(raw: bytes) -> int:

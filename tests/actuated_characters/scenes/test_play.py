@@ -10,6 +10,7 @@ import pytest
 
 from actuated_characters.bags.recording import read_recordings
 from actuated_characters.replay.replay import replay
+from actuated_characters.replay.through_topics import replay_states
 from actuated_characters.scenes.scene import load_scene
 from actuated_characters.viewer.web.server import open_socket
 from msgs_config.messages import topics
@@ -77,6 +78,12 @@ def test_nodes_of_their_own_processes_have_the_same_states(
 
     found = {name: hash_of(run / name, ticks) for name in SIDES}
     assert found == brawl_in_process(scene, ticks).hashes
+    # the bag in the simulator's place has the opponent's states, too
+    commands = replay_states(
+        run, character="left", progress=lambda done: None, tell=lambda line: None
+    )
+    assert commands.identical
+    assert commands.states == ticks + 1
 
 
 def test_they_collide_fall_and_get_up_again(brawl: Brawl) -> None:
