@@ -96,16 +96,17 @@ def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
     for line in _described(scene):
         print(line, flush=True)
     with progress_bar(f"{scene.name} (Ctrl-C ends it)", ticks, "ticks") as bar:
-        was_ended = play_scene(
+        done = play_scene(
             scene,
             directory,
             ticks,
             viewer=viewer,
-            progress=lambda done: bar.update(bar.task_ids[0], completed=min(done, ticks)),
+            progress=lambda count: bar.update(bar.task_ids[0], completed=min(count, ticks)),
         )
-    if was_ended:
-        print("ended")
-    _print_figures(directory, scene.characters)
+    if done:
+        _print_figures(directory, scene.characters)
+    else:
+        print("ended before its first tick")
 
 
 def _described(scene: "Scene") -> list[str]:

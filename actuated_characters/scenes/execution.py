@@ -23,40 +23,48 @@ def play_scene(
     *,
     viewer: Mapping[str, object] | None,
     progress: Progress = lambda ticks: None,
-) -> bool:
+) -> int:
     """Run a scene for so many ticks; leaves bag and figures in a directory, which was prepared.
 
     With parameters of a viewer, it is shown in a browser. An interruption ends it in good order.
-    Returns whether it was interrupted.
+    Returns how many ticks there were, about; none if it was interrupted before the first one.
 
     Raises:
         RunError: one of the processes failed.
     """
     session = ("-p", f"{SESSION.name}:={make_session(f'/{SIMULATOR}')}")
     recording = {"directory": str(directory), "characters": scene.characters}
-    interrupted = False
+    done, interrupted = 0, False
+
+    def report(count: int) -> None:
+        nonlocal done
+        done = count
+        progress(count)
+
+    told: Progress = report
     with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             shown = children.start_node("viewer", viewer)
-            progress = watch(shown, progress)
+            told = watch(shown, report)
             if shown.exit_code is not None:
                 raise RunError(f"viewer failed: {shown.last_words()}")
         recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
-        loop = children.start_composed("composed", _parameters(scene, ticks), *session)
         try:
-            wait_for_end(loop, [recorder], progress)
+            loop = children.start_composed("composed", _parameters(scene, ticks), *session)
+            wait_for_end(loop, [recorder], told)
+            report(ticks)
         except KeyboardInterrupt:
             interrupted = True
-    if recorder.exit_code:
+    if recorder.exit_code and (done or not interrupted):
         raise RunError(f"recorder failed: {recorder.last_words()}")
-    return interrupted
+    return done
 
 
 def _parameters(scene: Scene, ticks: int) -> dict[str, dict[str, object]]:
     """The nodes' parameters, with which they wait for each other and for the recorder."""
     heard_by = [str(values.get("opponent", "")) for values in scene.nodes.values()]
-    most = max(map(heard_by.count, scene.characters), default=0)
+    others = min(map(heard_by.count, scene.characters), default=0)  # controllers of opponents
     nodes = {name: {"wait_for_subscribers": 2, **given} for name, given in scene.nodes.items()}
     simulator = {**RUN_DEFAULTS, **scene.simulator}
-    nodes[SIMULATOR] = {**simulator, "wait_for_subscribers": 2 + most, "max_ticks": ticks}
+    nodes[SIMULATOR] = {**simulator, "wait_for_subscribers": 2 + others, "max_ticks": ticks}
     return nodes

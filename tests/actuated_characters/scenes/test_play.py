@@ -116,7 +116,7 @@ def test_what_draws_them_is_bounded_as_the_scene_says(brawl: Brawl) -> None:
         assert force.max() > 300.0  # it is there, and less than the weight
 
 
-def test_both_can_be_pushed_and_pelted_and_ctrl_c_ends_it_in_good_order(
+def test_both_can_be_pushed_pelted_and_reset_and_ctrl_c_ends_it_in_good_order(
     processes: Processes, client: SimulatorClient, tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
@@ -144,12 +144,17 @@ def test_both_can_be_pushed_and_pelted_and_ctrl_c_ends_it_in_good_order(
         )
 
     client.spin_sending(push, has_acted, "pushes and a ball")
+    states = client.listen(topics.JOINT_STATES.under("left"))
+    assert client.reset().success
+    client.spin_until(lambda: any(not each.effort for each in states.messages), "an episode")
+    client.spin_until(lambda: states.messages and states.last.effort, "its second state")
 
     assert command.end(signal.SIGINT, LONG) == 0, command.stderr
     recordings = read_recordings(run)
     assert all(any(each.applied_wrench) for each in recordings)
     assert any(recordings[0].throws)
-    assert replay(recordings).difference is None
+    result = replay(recordings)
+    assert (result.difference, result.episodes) == (None, 2)
 
 
 def test_play_alone_shows_the_walker_in_a_browser_until_it_is_ended(
@@ -187,3 +192,22 @@ def test_what_a_node_refuses_is_one_clear_line(processes: Processes) -> None:
     error = command.stderr.splitlines()[-1]
     assert error.startswith("error: composed failed: left/controller_node: ")
     assert "needs an 'opponent'" in error
+
+
+def test_a_scene_that_lasts_a_tick_is_whole(processes: Processes, tmp_path: Path) -> None:
+    command = processes.command("play", "--duration", "0.005", *FAST)
+
+    assert command.wait(LONG) == 0, command.stderr
+    assert "results in" in command.stdout
+    hash_of(tmp_path / "runs" / "play-walker", 1)
+
+
+def test_what_is_ended_before_it_has_begun_ends_in_good_order(
+    processes: Processes, tmp_path: Path
+) -> None:
+    command = processes.command("play", "--no-view", "--set", "sim_node.real_time_factor:=1e-6")
+    log = tmp_path / "runs" / "play-walker" / "logs" / "composed.log"
+    wait_until(log.exists, "the last process")
+
+    assert command.end(signal.SIGINT, LONG) == 0, command.stderr
+    assert command.stdout.splitlines()[-1] == "ended before its first tick"
