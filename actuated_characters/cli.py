@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.padding import Padding
 
+from actuated_characters.commands.common.completion import add_names, complete
 from actuated_characters.commands.common.interruption import raise_at_signals, was_interrupted
 from actuated_characters.commands.common.overview import print_characters, print_overview
 from actuated_characters.commands.common.settings import (
@@ -17,7 +18,6 @@ from actuated_characters.commands.common.settings import (
     parameters_of,
 )
 from actuated_characters.commands.compare import add_compare
-from actuated_characters.commands.completion import add_names, complete
 from actuated_characters.commands.export import add_export
 from actuated_characters.commands.fork import add_fork
 from actuated_characters.commands.info import add_info

@@ -2,8 +2,8 @@
 
 import argparse
 
+from actuated_characters.commands.common.completion import add_names
 from actuated_characters.commands.common.settings import Commands
-from actuated_characters.commands.completion import add_names
 from actuated_characters.commands.motion_export import add_motion_export
 
 

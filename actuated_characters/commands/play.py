@@ -34,8 +34,7 @@ def add_play(commands: "Commands[argparse.ArgumentParser]") -> None:
         "play",
         "play a scene in a browser: push its characters, throw balls at them",
         "Play a scene in real time in a browser: drag a body to push it, click on it with Shift to "
-        "throw a ball at it. Ctrl-C ends it. All is recorded, and `replay` repeats it. Needs the "
-        "extra 'view'.",
+        "throw a ball at it. Ctrl-C ends it. All is recorded. Needs the extra 'view'.",
         ["play", "play --scene brawl"],
     )
     play.add_argument(

@@ -23,7 +23,7 @@ from actuated_characters.replay.players.processes import (
 from actuated_characters.replay.players.simulator_inputs import make_inputs
 from actuated_characters.replay.players.simulator_outputs import opponent_of
 from actuated_characters.replay.world import read_world, simulator_values
-from actuated_characters.runs.processes import Child
+from actuated_characters.runs.processes import Child, Children
 from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
@@ -172,16 +172,20 @@ def replay_states(
         namespace = "" if start and not opponent_of(recording) else recording.name
         if start:
             parameters = _controller_parameters(children.directory, recording) | settings | session
-            remap = ["-r", f"__ns:=/{namespace}"] if namespace else []
-            others.append(
-                children.start_node(topics.CONTROLLER_NODE, parameters, *remap, any_node=True)
-            )
+            others.append(_start_controller(children, parameters, namespace))
         file = children.directory / "commands.npz"
         playing = _player_parameters(recording, settings, start) | {"commands": str(file)} | session
         player = start_player(children, SIMULATOR, path, playing, namespace)
         wait_for_player(player, others, progress, tell)
         with np.load(file) as arrays:
             return compare_commands(recording, arrays["commands"])
+
+
+def _start_controller(
+    children: Children, parameters: Mapping[str, object], namespace: str
+) -> Child:
+    remap = ["-r", f"__ns:=/{namespace}"] if namespace else []
+    return children.start_node(topics.CONTROLLER_NODE, parameters, *remap, any_node=True)
 
 
 def _player_parameters(

@@ -41,13 +41,8 @@ def play_scene(
         done = count
         progress(count)
 
-    told: Progress = report
     with run_environment(directory) as environment, Children(directory, environment) as children:
-        if viewer is not None:
-            shown = children.start_node("viewer", viewer)
-            told = watch(shown, report)
-            if shown.exit_code is not None:
-                raise RunError(f"viewer failed: {shown.last_words()}")
+        told = report if viewer is None else _show(children, viewer, report)
         recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
         try:
             loop = children.start_composed("composed", _parameters(scene, ticks), *session)
@@ -58,6 +53,15 @@ def play_scene(
     if recorder.exit_code and (done or not interrupted):
         raise RunError(f"recorder failed: {recorder.last_words()}")
     return done
+
+
+def _show(children: Children, viewer: Mapping[str, object], progress: Progress) -> Progress:
+    """Start a viewer, as `watch`. Raises RunError if it fails at once: there is nothing to see."""
+    shown = children.start_node("viewer", viewer)
+    progress = watch(shown, progress)
+    if shown.exit_code is not None:
+        raise RunError(f"viewer failed: {shown.last_words()}")
+    return progress
 
 
 def _parameters(scene: Scene, ticks: int) -> dict[str, dict[str, object]]:
