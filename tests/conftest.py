@@ -1,6 +1,7 @@
 """Fixtures of the tests that start nodes: a ROS domain of their own, processes, clients."""
 
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -87,3 +88,12 @@ def simulator(context: Context) -> Iterator[ControllerClient]:
     client = ControllerClient(context)
     yield client
     client.close()
+
+
+@pytest.fixture
+def own_handlers() -> Iterator[None]:
+    """`main` sets the handlers of signals; afterwards they are as before."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)

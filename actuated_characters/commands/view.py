@@ -1,12 +1,16 @@
-"""The command `actuated_characters view`: running characters in a browser."""
+"""The command `actuated_characters view`: running characters, or a recorded run, in a browser."""
 
 import argparse
 import os
 import re
 import sys
+from pathlib import Path
 
 from actuated_characters.commands.common.settings import Commands, add_command
+from actuated_characters.viewer.extra import check_viser
+from actuated_characters.viewer.parameters import PARAMETERS as SERVER_PARAMETERS
 from msgs_config.errors import ConfigurationError
+from msgs_config.parameters import resolve
 
 _FPS = 30.0
 _NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
@@ -19,14 +23,20 @@ def add_view(commands: "Commands[argparse.ArgumentParser]") -> None:
         commands,
         _view,
         "view",
-        "show running characters in a browser",
-        "Show all characters of the simulators in the present ROS_DOMAIN_ID in a browser: drag a "
-        "body to push it, click on it with Shift to throw a ball at it. Ctrl-C ends it. Needs the "
-        "extra 'view'.",
-        ["view", "view --port 8090 --namespace /lab"],
+        "show running characters, or a recorded run, in a browser",
+        "Without RUN, show all characters of the simulators in the present ROS_DOMAIN_ID: drag a "
+        "body to push it, click on it with Shift to throw a ball at it. With RUN, play a recorded "
+        "run with a time line, plots, export and forks. Ctrl-C ends it. Needs the extra 'view'.",
+        ["view", "view runs/demo", "view runs/demo runs/demo-fork"],
     )
     view.add_argument(
-        "--namespace", default="/", metavar="NAME", help="of the simulators to show (all)"
+        "run", nargs="?", type=Path, metavar="RUN", help="a run's directory, or a bag"
+    )
+    view.add_argument(
+        "others", nargs="*", type=Path, metavar="OTHER", help="others, shown as its ghosts"
+    )
+    view.add_argument(
+        "--namespace", metavar="NAME", help="without RUN: of the simulators to show (all)"
     )
     add_server(view)
 
@@ -57,15 +67,35 @@ def server_parameters(options: argparse.Namespace) -> dict[str, object]:
 
 
 def _view(options: argparse.Namespace) -> None:
-    """Become the node, which has this process's signals and terminal."""
-    if not _NAMESPACE.fullmatch(options.namespace):
+    """Show a recorded run, or become the node, which has this process's signals and terminal."""
+    if options.run is not None:
+        _view_recorded(options)
+        return
+    namespace = options.namespace or "/"
+    if not _NAMESPACE.fullmatch(namespace):
         raise ConfigurationError(
-            f"--namespace is {options.namespace!r}; it must be / or like /lab or /lab/left"
+            f"--namespace is {namespace!r}; it must be / or like /lab or /lab/left"
         )
-    arguments = ["--ros-args", "-r", f"__ns:={options.namespace}"]
+    arguments = ["--ros-args", "-r", f"__ns:={namespace}"]
     for name, value in server_parameters(options).items():
         given = f"'{value}'" if isinstance(value, str) else value  # an address is no YAML number
         arguments += ["-p", f"{name}:={given}"]
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-P", "-m", _MODULE, *arguments])
+
+
+def _view_recorded(options: argparse.Namespace) -> None:
+    if options.namespace is not None:
+        raise ConfigurationError("--namespace is of running simulators; a RUN has none")
+    values = resolve(SERVER_PARAMETERS, server_parameters(options))
+    check_viser()
+    from actuated_characters.viewer.recorded.main import show_recorded
+
+    show_recorded(
+        options.run,
+        options.others,
+        host=values.text("host"),
+        port=values.integer("port") or None,
+        fps=values.number("fps"),
+    )

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable
 from typing import NoReturn
 
-from msgs_config.errors import ConfigurationError
+from actuated_characters.viewer.extra import check_viser
 from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, use_batch_scheduling
 
 _NICE = 5  # pictures can wait on a busy machine, ticks cannot
@@ -23,14 +23,7 @@ def main() -> NoReturn:
 
 
 def _load() -> Callable[[], RunnableNode]:
-    try:
-        import viser
-    except ImportError as error:
-        raise ConfigurationError(
-            "the viewer needs the extra 'view': pip install 'actuated_characters[view]', or in a "
-            "clone .venv/bin/pip install -e '.[view]'"
-        ) from error
-    del viser
+    check_viser()
     from actuated_characters.viewer.node import ViewerNode
 
     return ViewerNode

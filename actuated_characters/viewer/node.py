@@ -7,27 +7,27 @@ from typing import Any
 
 from rclpy.node import Node
 
-from actuated_characters.bags.rebuilding import Rebuilt
 from actuated_characters.viewer.controls.hands import Action, Hands
 from actuated_characters.viewer.controls.panel import Panel, Subject
-from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
+from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
+from actuated_characters.viewer.parameters import PARAMETERS
 from actuated_characters.viewer.simulators import Simulators, Watched
-from actuated_characters.viewer.web.request_check import LOOPBACK, RequestCheck, is_loopback
-from actuated_characters.viewer.web.server import open_socket, start_server, stop_server
+from actuated_characters.viewer.web.request_check import RequestCheck
+from actuated_characters.viewer.web.server import (
+    describe_address,
+    open_socket,
+    start_server,
+    stop_server,
+)
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
-from msgs_config.parameters import Parameter, resolve
+from msgs_config.parameters import resolve
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import declare, given_parameters
 
-PARAMETERS = [
-    Parameter("host", LOOPBACK, "address to listen on; others than 127.0.0.1 let others in"),
-    Parameter("port", 0, "port to listen on; 0: the first free one from 8080 on", maximum=65535),
-    Parameter("fps", 30.0, "most pictures a second", unit="Hz", minimum=1.0, maximum=120.0),
-]
 _SEARCH_PERIOD = 1.0  # s between looks for simulators
 _FIRST_SEARCH_PERIOD = 0.2  # s, while none is known
 _IDLE_PERIOD = 0.1  # s between looks for clients
@@ -59,18 +59,15 @@ class ViewerNode(Node):
         self._hands = Hands(self, self._scene, self._actions)
         self._panel = Panel(self, self._server.gui, self._scene, self._hands, self._actions)
         self._simulators = Simulators(self, self.get_namespace().rstrip("/"), self._log)
-        self._drawn: dict[str, DrawnCharacter] = {}
+        self._drawn: dict[str, LiveCharacter] = {}
         self._balls: dict[str, DrawnBalls] = {}
         self._announce(host, listening.getsockname()[1])
 
     def _announce(self, host: str, port: int) -> None:
-        place = f"[{host}]" if ":" in host else host
-        print(f"http://{place}:{port}", flush=True)
-        if not is_loopback(host):
-            self.get_logger().warning(
-                f"listening on {host}: all who reach port {port} of this machine can watch, push "
-                "and set parameters; without --host only this machine can"
-            )
+        address, *warnings = describe_address(host, port)
+        print(address, flush=True)
+        for warning in warnings:
+            self.get_logger().warning(warning)
 
     def run(self, stop: StopSignal) -> None:
         """Draw until `stop`."""
@@ -158,8 +155,7 @@ class ViewerNode(Node):
         """Draw a character as it is described now; one that a restart left as it was stays."""
         rebuilt, before = watched.rebuilt, self._drawn.get(watched.below)
         assert rebuilt is not None
-        if before is not None and _looks_alike(before.rebuilt, rebuilt):
-            before.rebuilt = rebuilt
+        if before is not None and before.take(rebuilt):
             return
         self._remove(watched.below)
         below = watched.below
@@ -168,7 +164,7 @@ class ViewerNode(Node):
         self._hands.open_topics(below, watched.simulator)
         try:
             with self._server.atomic():
-                self._drawn[below] = DrawnCharacter(self._scene.api, name, rebuilt, bind)
+                self._drawn[below] = LiveCharacter(self._scene.api, name, rebuilt, bind)
         except ActuatedCharactersError as error:
             self._log(f"'{rebuilt.character.name}' cannot be drawn: {error}")
 
@@ -185,8 +181,3 @@ class ViewerNode(Node):
         while self._rejections:
             taken.append(self._rejections.popleft())
         return taken
-
-
-def _looks_alike(a: Rebuilt, b: Rebuilt) -> bool:
-    one, other = a.character, b.character
-    return (one.links, one.layout.joints) == (other.links, other.layout.joints)

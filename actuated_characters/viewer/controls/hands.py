@@ -12,7 +12,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from actuated_characters.viewer.controls.touch import STIFFNESS, Drag, aim_throw, spring_force
-from actuated_characters.viewer.drawing.drawn_character import Bind, DrawnCharacter
+from actuated_characters.viewer.drawing.drawn_character import Bind
+from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import CommandError
@@ -52,7 +53,7 @@ class Hands:
             self._publishers[name] = topics.create_publisher(self._node, replace(topic, name=name))
         return self._publishers[name]
 
-    def bind(self, below: str, drawn: Callable[[], DrawnCharacter | None]) -> Bind:
+    def bind(self, below: str, drawn: Callable[[], LiveCharacter | None]) -> Bind:
         """Let the links of a character, as it is drawn then, be dragged and clicked on."""
 
         def bind(mesh: viser.MeshHandle, row: int) -> None:
@@ -72,7 +73,7 @@ class Hands:
         self,
         below: str,
         row: int,
-        drawn: Callable[[], DrawnCharacter | None],
+        drawn: Callable[[], LiveCharacter | None],
         event: "viser.SceneNodeDragEvent[Any]",
     ) -> None:
         character = drawn()
@@ -94,7 +95,7 @@ class Hands:
         for handle in self._springs.pop(client, ()):
             handle.remove()
 
-    def pull(self, drawn: Mapping[str, DrawnCharacter], stamps_ns: Mapping[str, int]) -> None:
+    def pull(self, drawn: Mapping[str, LiveCharacter], stamps_ns: Mapping[str, int]) -> None:
         """Publish and draw the forces of all drags, in the newest states, with these stamps."""
         for client, drag in list(self._drags.items()):
             character = drawn.get(drag.below)
@@ -109,9 +110,7 @@ class Hands:
             self._push(character, drag, force, stamp_ns)
             self._draw_spring(client, drag, grabbed, pointer)
 
-    def _push(
-        self, character: DrawnCharacter, drag: Drag, force: FloatArray, stamp_ns: int
-    ) -> None:
+    def _push(self, character: LiveCharacter, drag: Drag, force: FloatArray, stamp_ns: int) -> None:
         known, world = character.rebuilt.known, character.rebuilt.world
         simulator = f"/{world.namespace}" if world.namespace else ""
         began_with = float(known.parameters.get("wrench_duration", _WRENCH_DURATION))
@@ -147,7 +146,7 @@ class Hands:
     def _throw(
         self,
         row: int,
-        drawn: Callable[[], DrawnCharacter | None],
+        drawn: Callable[[], LiveCharacter | None],
         event: "viser.SceneNodePointerEvent[Any]",
     ) -> None:
         character = drawn()

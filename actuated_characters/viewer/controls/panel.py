@@ -11,6 +11,7 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from actuated_characters.viewer.controls.hands import Action, Hands
+from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.controls.parameter_controls import ParameterControls
 from actuated_characters.viewer.controls.requests import Requests
 from actuated_characters.viewer.drawing.drawn_character import SHOWN
@@ -21,8 +22,6 @@ _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 
 _PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
 _HELP = "Drag a body to push it. Shift and click throws a ball at it."
 _ALONE = "alone"  # the character of a simulator that has one, without a name
-_LONGEST = 300  # characters of what a node says
-_MARKUP = str.maketrans({mark: f"\\{mark}" for mark in "\\`*_{}[]<>#|~$&"})
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ class Panel:
             self._controls.choose(f"{chosen.below}/{topics.CONTROLLER_NODE}")
         stamp_ns = stamps_ns.get(chosen.below)
         if stamp_ns is not None:
-            text = f"**{chosen.character.translate(_MARKUP)}**  \n{1e-9 * stamp_ns:.2f} s"
+            text = f"**{as_text(chosen.character)}**  \n{1e-9 * stamp_ns:.2f} s"
             if self._state.content != text:
                 self._state.content = text
 
@@ -138,7 +137,7 @@ class Panel:
 
     def tell(self, sentence: str) -> None:
         """Show a sentence, of a node for instance, as it is."""
-        self._told.content = (sentence[:_LONGEST] or _HELP).translate(_MARKUP)
+        self._told.content = as_text(sentence or _HELP)
 
     def _tell_of(self, node: str, sentence: str) -> None:
         self.tell(f"{node}: {sentence}")

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import viser
 
-from actuated_characters.bags.rebuilding import Rebuilt
 from actuated_characters.render.engine.camera_pose import Spheres
 from actuated_characters.render.engine.shape_meshes import triangles_of
 from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
@@ -15,7 +14,7 @@ from actuated_characters.viewer.latest import CharacterSample
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
-from msgs_config.character.model import Shape
+from msgs_config.character.model import Character, Shape
 from msgs_config.geometry import rotations
 from msgs_config.messages.wrenches import WrenchArrays
 
@@ -42,13 +41,27 @@ Bind = Callable[[viser.MeshHandle, int], None]
 """Makes a shape of a link, by its number, one that can be touched."""
 
 
+def _bind_nothing(mesh: viser.MeshHandle, row: int) -> None:
+    """Leave a shape as one that cannot be touched."""
+
+
 class DrawnCharacter:
     """The nodes of one character below a name in the scene."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, rebuilt: Rebuilt, bind: Bind) -> None:
-        """Add all nodes. Raises CharacterError if a mesh cannot be used."""
-        self.rebuilt, self.name = rebuilt, name
-        self.character = character = rebuilt.character
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        character: Character,
+        effort_limits: FloatArray,
+        bind: Bind = _bind_nothing,
+    ) -> None:
+        """Add all nodes; limits (b,) are those of the character's physical vectors.
+
+        Raises:
+            CharacterError: a mesh cannot be used.
+        """
+        self.character, self.name, self.effort_limits = character, name, effort_limits
         self._scene, self._model = scene, DynamicsModel(character)
         shapes = drawn_shapes(character)
         self._outlines = [_around(link.collision_shapes) for link in character.links]
@@ -71,7 +84,7 @@ class DrawnCharacter:
                 bind(self._meshes[row][k], row)
         self._colors = [[np.array(each.color_rgba[:3]) * 255.0 for each in own] for own in shapes]
         self._levels = [0] * len(shapes)
-        self._vectors = _last_vectors(rebuilt)
+        self._vectors = _last_vectors(character)
         self._add_marks(scene, name)
         self.origins: FloatArray = np.zeros((len(shapes), 3))
         self.turns_xyzw: FloatArray = np.tile((0.0, 0.0, 0.0, 1.0), (len(shapes), 1))
@@ -153,10 +166,10 @@ class DrawnCharacter:
 
     def _color(self, effort: FloatArray | None) -> None:
         """Colour each link by the share of its joint's limit that the effort has."""
-        known, layout = self.rebuilt.known, self.character.layout
-        shares = np.zeros(len(known.effort_limits))
+        limits = self.effort_limits
+        shares = np.zeros(len(limits))
         if effort is not None and self.shows["torques"]:
-            norms, limits = layout.norms(effort), known.effort_limits
+            norms = self.character.layout.norms(effort)
             shares = np.divide(norms, limits, out=shares, where=limits > 0.0)
         for row, vector in enumerate(self._vectors):
             share = 0.0 if vector is None else min(float(shares[vector]), 1.0)
@@ -224,18 +237,18 @@ def _around(shapes: Sequence[Shape]) -> Spheres:
     return Spheres.joined([Spheres(np.empty((0, 3)), np.empty(0)), *map(outline, shapes)])
 
 
-def _last_vectors(rebuilt: Rebuilt) -> list[int | None]:
+def _last_vectors(character: Character) -> list[int | None]:
     """Of each link the number of the physical vector of its joint; None where it is not driven."""
     numbers: dict[str, int] = {}
     count = 0
-    for joint in rebuilt.character.layout.joints:
+    for joint in character.layout.joints:
         numbers[joint.name] = count
         count += len(joint.vectors)
     return [
         None
         if link.joint.type in (JointType.FIXED, JointType.FLOATING)
         else numbers[link.joint.name]
-        for link in rebuilt.character.links
+        for link in character.links
     ]
 
 

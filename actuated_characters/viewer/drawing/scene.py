@@ -5,7 +5,7 @@ moves: everything is below one node, which moves back by as far as the character
 """
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import viser
@@ -21,7 +21,7 @@ WORLD = "/world"
 _BALL, _UNKNOWN_RADIUS = (225, 95, 40), 0.1  # m
 _CATCH_UP = 4.0  # 1/s: how soon the world follows
 _JUMP = 3.0  # m: a distance that is not caught up with but jumped
-_BACKGROUND = (237, 242, 250)
+BACKGROUND = (237, 242, 250)
 EYE, LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)
 """Of the camera at first, m, from the point on the ground below the middle of the characters."""
 
@@ -36,7 +36,7 @@ class BrowserScene:
         self.offset: FloatArray = np.zeros(3)
         """What is to be added to a place in the browser, m, to have it in the world."""
         scene.set_up_direction("+z")
-        scene.set_background_image(np.full((2, 2, 3), _BACKGROUND, dtype=np.uint8))
+        scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8))
         scene.configure_default_lights(enabled=True, cast_shadow=True)
         server.initial_camera.position = EYE
         server.initial_camera.look_at = LOOK_AT
@@ -80,15 +80,20 @@ class DrawnBalls:
     def draw(self, released: Sequence[ProjectileThrow], balls: BallStates | None) -> None:
         """Move the balls to where they are now."""
         self._released += [throw.radius for throw in released]
-        if balls is None:
-            return
+        if balls is not None:
+            self.place(balls, lambda _: self._next_radius())
+
+    def _next_radius(self) -> float:
+        return self._released.popleft() if self._released else _UNKNOWN_RADIUS
+
+    def place(self, balls: BallStates, radius_of: Callable[[str], float]) -> None:
+        """Move the balls to where they are; new ones have the radius of their name, m."""
         for name in set(self._balls) - set(balls.names):
             self._balls.pop(name).remove()
         for name, motion in zip(balls.names, balls.motion, strict=True):
             if name not in self._balls:
-                radius = self._released.popleft() if self._released else _UNKNOWN_RADIUS
                 self._balls[name] = self._scene.add_icosphere(
-                    f"{self._name}/{name}", radius, color=_BALL
+                    f"{self._name}/{name}", radius_of(name), color=_BALL
                 )
             ball = self._balls[name]
             ball.position = motion[:3]

@@ -17,7 +17,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from actuated_characters.viewer.web.request_check import RequestCheck
+from actuated_characters.viewer.web.request_check import RequestCheck, is_loopback
 from msgs_config.errors import ConfigurationError
 
 FIRST_PORT = 8080
@@ -61,6 +61,19 @@ def open_socket(host: str, port: int | None) -> socket.socket:
     raise ConfigurationError(
         f"cannot listen on {host}, {ports}: {reason}; --port takes another port, --host an address"
     )
+
+
+def describe_address(host: str, port: int) -> list[str]:
+    """The page's address; and a warning where others than this machine can reach it."""
+    place = f"[{host}]" if ":" in host else host
+    address = f"http://{place}:{port}"
+    if is_loopback(host):
+        return [address]
+    return [
+        address,
+        f"listening on {host}: all who reach port {port} of this machine can watch, push and set "
+        "parameters; without --host only this machine can",
+    ]
 
 
 def start_server(listening: socket.socket, check: RequestCheck, reject: Reject) -> ViewerServer:

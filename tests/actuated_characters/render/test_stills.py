@@ -1,7 +1,6 @@
 """Pictures of recorded runs, as functions and on the command line."""
 
 import signal
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,15 +42,6 @@ def run(walk: Made, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def recording(run: Path) -> Recording:
     return read_recording(run)
-
-
-@pytest.fixture
-def own_handlers() -> Iterator[None]:
-    """`main` sets the handlers of signals; afterwards they are as before."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def tiles(whole: Picture, columns: int) -> list[Picture]:

@@ -251,14 +251,6 @@ def hash_of_a_pendulum(stiffness: float, ticks: int) -> str:
 # The directory
 
 
-@pytest.fixture
-def own_handlers() -> Iterator[None]:
-    """The command line sets a signal handler; here it is in the test's own process."""
-    handler = signal.getsignal(signal.SIGTERM)
-    yield
-    signal.signal(signal.SIGTERM, handler)
-
-
 def test_results_are_not_overwritten_unasked_and_other_files_never_deleted(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, own_handlers: None
 ) -> None:

@@ -1,0 +1,1 @@
+"""Recorded runs in the browser: a time line, plots beside the scene, exports and forks."""

@@ -1,0 +1,179 @@
+"""The panel of a recorded run: the time line, what is shown, exports and forks."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from queue import SimpleQueue
+from typing import Any, Protocol
+
+import viser
+
+from actuated_characters.viewer.controls.markup import as_text
+from actuated_characters.viewer.drawing.drawn_character import SHOWN
+from actuated_characters.viewer.drawing.scene import BrowserScene
+from actuated_characters.viewer.recorded.timeline import Timeline
+
+NO_GHOST, REFERENCE = "none", "reference"
+_SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
+_PLAY, _PAUSE, _BACK, _NEXT, _START = "Play", "Pause", "-1", "+1", "Start"
+_PNG, _MP4, _CANCEL = "PNG", "MP4", "Cancel"
+_OF_SCENE = {name: label for name, label in SHOWN.items() if name != "reference"}
+
+Action = Callable[[], None]
+
+
+class Shown(Protocol):
+    """What the panel acts on; its methods are called in the player's own thread."""
+
+    def save_picture(self, client: viser.ClientHandle) -> None:
+        """Save what a client sees."""
+
+    def save_film(self, client: viser.ClientHandle, start: float, end: float) -> None:
+        """Save what a client sees from one time to another, s."""
+
+    def fork(self, push: str, settings: Sequence[str]) -> None:
+        """Fork the run at the present time."""
+
+    def cancel(self) -> None:
+        """End the film or the fork that is being made."""
+
+
+class RecordedPanel:
+    """The panel of all clients."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        scene: BrowserScene,
+        timeline: Timeline,
+        actions: "SimpleQueue[Action]",
+        shown: Shown,
+    ) -> None:
+        self._gui, self._scene, self._timeline = gui, scene, timeline
+        self._actions, self._shown = actions, shown
+        self.shows = {**dict.fromkeys(SHOWN, True), "reference": True}
+        self.is_cancelled = False
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        gui.set_panel_label("actuated characters")
+        self._state = gui.add_markdown("")
+        self._add_time()
+        self.ghost: Any = gui.add_dropdown("Ghost", (REFERENCE, NO_GHOST))
+        self.character: Any = gui.add_dropdown("Plots of", ("",), visible=False)
+        self._told = gui.add_markdown("", visible=False)
+        self._progress: Any = gui.add_progress_bar(0.0, visible=False)
+        self._add_shown()
+        self._add_export()
+        self._add_fork()
+
+    def _on(self, handle: Any, act: Callable[[Any], None], *, click: bool = False) -> None:
+        """Have the player's thread call a function with a control's value when a client sets it."""
+
+        async def change(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:  # else it is what this panel has set itself
+                self._actions.put(partial(act, handle.value))
+
+        (handle.on_click if click else handle.on_update)(change)
+
+    def _add_time(self) -> None:
+        gui, timeline = self._gui, self._timeline
+        first = float(timeline.times[0])
+        end = max(timeline.end, first + 1e-3)
+        self._slider: Any = gui.add_slider("Time (s)", first, end, 1e-3, initial_value=first)
+        self._on(self._slider, self._seek)
+        buttons = gui.add_button_group("Playback", (_PLAY, _PAUSE, _BACK, _NEXT, _START))
+        self._on(buttons, self._move, click=True)
+        speed: Any = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
+        self._on(speed, lambda label: setattr(timeline, "speed", float(label)))
+        loop: Any = gui.add_checkbox("Loop", initial_value=False)
+        self._on(loop, partial(setattr, timeline, "loops"))
+
+    def _seek(self, time: float) -> None:
+        self._timeline.plays = False
+        self._timeline.seek(time)
+
+    def _move(self, button: str) -> None:
+        timeline = self._timeline
+        if button == _PLAY:
+            timeline.play()
+        elif button == _PAUSE:
+            timeline.plays = False
+        elif button == _START:
+            timeline.seek(float(timeline.times[0]))
+        else:
+            timeline.step(-1 if button == _BACK else 1)
+
+    def _add_shown(self) -> None:
+        with self._gui.add_folder("Show", expand_by_default=False):
+            for name, label in _OF_SCENE.items():
+                box: Any = self._gui.add_checkbox(label, initial_value=True)
+                self._on(box, partial(self.shows.__setitem__, name))
+            follows: Any = self._gui.add_checkbox("Follow", initial_value=True)
+            self._on(follows, partial(setattr, self._scene, "follows"))
+
+    def _add_export(self) -> None:
+        gui, timeline = self._gui, self._timeline
+        with gui.add_folder("Export", expand_by_default=False):
+            start = gui.add_number("From (s)", float(timeline.times[0]), min=0.0, step=0.1)
+            end = gui.add_number("To (s)", timeline.end, min=0.0, step=0.1)
+            buttons = gui.add_button_group("What is seen", (_PNG, _MP4, _CANCEL))
+
+        async def export(event: viser.GuiEvent[Any]) -> None:
+            if event.client is None:
+                return
+            if buttons.value == _PNG:
+                self._actions.put(partial(self._shown.save_picture, event.client))
+            elif buttons.value == _MP4:
+                times = float(start.value), float(end.value)
+                self._actions.put(partial(self._shown.save_film, event.client, *times))
+            else:
+                self._cancel()
+
+        buttons.on_click(export)
+
+    def _add_fork(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Fork", expand_by_default=False):
+            push = gui.add_text("Push", "", hint="at this time: LINK:FX,FY,FZ in N, or nothing")
+            settings = gui.add_text("Set", "", hint="live parameters: NODE.NAME:=VALUE ...")
+            buttons = gui.add_button_group("From here", ("Fork", _CANCEL))
+
+        async def fork(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is None:
+                return
+            if buttons.value == _CANCEL:
+                self._cancel()
+            else:
+                given = settings.value.split()
+                self._actions.put(partial(self._shown.fork, push.value.strip(), given))
+
+        buttons.on_click(fork)
+
+    def _cancel(self) -> None:
+        """Called in the server's thread: the player's may be busy with a film."""
+        self.is_cancelled = True
+        self._actions.put(self._shown.cancel)
+
+    def choose_ghosts(self, names: Sequence[str], chosen: str) -> None:
+        """Offer these ghosts beside the reference."""
+        self.ghost.options = (REFERENCE, *names, NO_GHOST)
+        self.ghost.value = chosen
+
+    def show_time(self, title: str) -> None:
+        """Show where the time line is."""
+        timeline = self._timeline
+        text = (
+            f"**{as_text(title)}**  \n{timeline.time:.3f} s, state {timeline.row} of "
+            f"{len(timeline.times) - 1}"
+        )
+        if self._state.content != text:
+            self._state.content = text
+            self._slider.value = round(timeline.time, 3)
+
+    def tell(self, sentence: str) -> None:
+        """Show a sentence as it is; none if it is empty."""
+        self._told.content = as_text(sentence)
+        self._told.visible = bool(sentence)
+
+    def show_progress(self, share: float | None) -> None:
+        """Show how far something is, 0 to 1; None: nothing is being done."""
+        self._progress.visible = share is not None
+        self._progress.value = 100.0 * (share or 0.0)

@@ -1,0 +1,38 @@
+"""Opens the page of a recorded run."""
+
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+
+from actuated_characters.viewer.recorded.player import RecordedPlayer
+from actuated_characters.viewer.recorded.run import check_comparable, read_run
+from actuated_characters.viewer.web.request_check import RequestCheck
+from actuated_characters.viewer.web.server import describe_address, open_socket, start_server
+from actuated_characters.viewer.web.server import stop_server as stop
+
+_MOST_REJECTIONS = 100  # between two pictures
+
+
+def show_recorded(
+    path: Path, others: Sequence[Path], *, host: str, port: int | None, fps: float
+) -> None:
+    """Show a recorded run, and others as its ghosts, until an interruption.
+
+    Raises:
+        ActuatedCharactersError: a recording cannot be read, the others are of other characters, or
+            the port cannot be listened on.
+    """
+    run = read_run(path)
+    beside = [read_run(other) for other in others]
+    for other in beside:
+        check_comparable(run, other)
+    rejections: deque[str] = deque(maxlen=_MOST_REJECTIONS)
+    listening = open_socket(host, port)
+    server = start_server(listening, RequestCheck(host), rejections.append)
+    try:
+        player = RecordedPlayer(server, run, beside)
+        for line in describe_address(host, listening.getsockname()[1]):
+            print(line, flush=True)
+        player.play(fps, rejections)
+    finally:
+        stop(server)

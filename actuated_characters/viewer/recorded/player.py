@@ -1,0 +1,198 @@
+"""Shows a recorded run in a browser: no node, for nothing of it is on topics."""
+
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from queue import SimpleQueue
+
+import viser
+
+from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
+from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
+from actuated_characters.viewer.recorded.controls import REFERENCE, Action, RecordedPanel
+from actuated_characters.viewer.recorded.export import (
+    FPS,
+    CancelledError,
+    free_path,
+    save_film,
+    save_picture,
+)
+from actuated_characters.viewer.recorded.forking import Fork
+from actuated_characters.viewer.recorded.plots import Plots, curves
+from actuated_characters.viewer.recorded.run import RecordedRun, check_comparable, read_run
+from actuated_characters.viewer.recorded.timeline import Timeline, frame_times
+from msgs_config.arrays import FloatArray
+from msgs_config.errors import ActuatedCharactersError
+
+_LEAST_REST = 0.003  # s a picture, for the threads that send it
+
+
+class RecordedPlayer:
+    """Draws the state of a recorded run that the time line is at; others may be its ghosts."""
+
+    def __init__(
+        self, server: viser.ViserServer, run: RecordedRun, others: Sequence[RecordedRun]
+    ) -> None:
+        """Build the scene; raises CharacterError if a mesh cannot be used."""
+        self._server, self._run = server, run
+        self._ghosts = {_name(other, run): other for other in others}
+        self._timeline = Timeline(run.times)
+        self._actions: SimpleQueue[Action] = SimpleQueue()
+        self._scene = BrowserScene(server)
+        self._drawn = [
+            DrawnCharacter(
+                self._scene.api,
+                f"{WORLD}/characters/{number}",
+                each.character,
+                each.character.effort_limits(),
+            )
+            for number, each in enumerate(run.recordings)
+        ]
+        self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
+        self._panel = RecordedPanel(server.gui, self._scene, self._timeline, self._actions, self)
+        self._panel.choose_ghosts(list(self._ghosts), next(iter(self._ghosts), REFERENCE))
+        self._plots = Plots(server.gui)
+        self._curves: Mapping[str, Mapping[str, FloatArray]] = {
+            each.name or each.character.name: curves(each) for each in run.recordings
+        }
+        self._panel.character.options = tuple(self._curves)
+        self._panel.character.visible = len(self._curves) > 1
+        self._plotted = ""
+        self._fork: Fork | None = None
+
+    def play(self, fps: float, rejections: "deque[str]") -> None:
+        """Show it until an interruption; `rejections` are of requests, to be printed."""
+        before = time.monotonic()
+        try:
+            while True:
+                now = time.monotonic()
+                for _ in range(self._actions.qsize()):
+                    self._actions.get()()
+                self._timeline.advance(now - before)
+                self._draw(now - before)
+                self._look_at_fork()
+                while rejections:
+                    print(f"rejected a request: {rejections.popleft()}", flush=True)
+                before = now
+                time.sleep(max(1.0 / fps - (time.monotonic() - now), _LEAST_REST))
+        finally:
+            if self._fork is not None:
+                self._fork.cancel()
+
+    def _draw(self, seconds: float) -> None:
+        """Bring the scene to the time line; `seconds` since the last call."""
+        row, now = self._timeline.row, self._timeline.time
+        chosen = str(self._panel.ghost.value)
+        other = self._ghosts.get(chosen)
+        with self._server.atomic():
+            for number, drawn in enumerate(self._drawn):
+                sample = self._run.sample(number, row)
+                if other is not None:
+                    sample.reference = other.position_at(number, now)
+                elif chosen != REFERENCE:
+                    sample.reference = None
+                drawn.shows = self._panel.shows
+                drawn.draw(sample)
+            balls, radii = self._run.balls(row)
+            if balls is None or radii[: len(self._radii)] != self._radii[: len(radii)]:
+                self._balls.remove()
+            if balls is not None:
+                self._balls.place(balls, dict(zip(balls.names, radii, strict=True)).__getitem__)
+            self._radii = radii
+            self._scene.follow_characters(self._drawn, seconds)
+        self._panel.show_time(self._run.name)
+        plotted = str(self._panel.character.value)
+        if plotted != self._plotted and plotted in self._curves:
+            self._plotted = plotted
+            self._plots.choose(self._run.times, self._curves[plotted])
+        self._plots.point_at(now)
+
+    def save_picture(self, client: viser.ClientHandle) -> None:
+        """Save what a client sees beside the run."""
+        path = free_path(self._folder, f"view-{self._timeline.time:.3f}s", ".png")
+        try:
+            save_picture(client, path)
+        except ActuatedCharactersError as error:
+            self._tell(f"error: {error}")
+        else:
+            self._tell(f"saved {path}")
+
+    def save_film(self, client: viser.ClientHandle, start: float, end: float) -> None:
+        """Save what a client sees from one time to another, s, at the speed of the time line."""
+        timeline = self._timeline
+        end = min(end, timeline.end)
+        if not float(timeline.times[0]) <= start < end:
+            self._tell(f"error: a film from {start:g} s to {end:g} s; 'From' must be before 'To'")
+            return
+        times = frame_times(start, end, timeline.speed / FPS)
+        path = free_path(self._folder, f"view-{start:.2f}-{end:.2f}s", ".mp4")
+        timeline.plays = self._panel.is_cancelled = False
+
+        def show(moment: float) -> None:
+            timeline.seek(moment)
+            self._draw(timeline.speed / FPS)
+
+        def progress(done: int) -> None:
+            if self._panel.is_cancelled:
+                raise CancelledError
+            self._panel.show_progress(done / len(times))
+
+        try:
+            save_film(client, path, times, show, progress)
+        except ActuatedCharactersError as error:
+            self._tell(f"error: {error}")
+        except CancelledError:
+            self._tell("the film is cancelled")
+        else:
+            self._tell(f"saved {path}")
+        finally:
+            self._panel.show_progress(None)
+
+    @property
+    def _folder(self) -> Path:
+        path = self._run.path.absolute()
+        return path if path.is_dir() else path.parent
+
+    def fork(self, push: str, settings: Sequence[str]) -> None:
+        """Fork the run at the present time; the fork becomes a ghost when it is done."""
+        if self._fork is not None:
+            self._tell("error: a fork is being made; cancel it, or wait for it")
+            return
+        self._fork = Fork(self._run.path, self._timeline.time, push, settings)
+        self._tell(f"forking at {self._timeline.time:g} s into {self._fork.directory} ...")
+
+    def cancel(self) -> None:
+        """End the fork that is being made."""
+        if self._fork is not None:
+            self._fork.cancel()
+            self._fork = None
+            self._tell("the fork is cancelled")
+
+    def _look_at_fork(self) -> None:
+        """Take the fork if it is done."""
+        fork = self._fork
+        if fork is None or not fork.has_ended:
+            return
+        self._fork = None
+        reason = fork.error
+        try:
+            if not reason:
+                other = read_run(fork.directory)
+                check_comparable(self._run, other)
+                self._ghosts[_name(other, self._run)] = other
+                self._panel.choose_ghosts(list(self._ghosts), _name(other, self._run))
+        except ActuatedCharactersError as error:
+            reason = f"error: {error}"
+        fork.cancel()
+        self._tell(reason or f"forked: {fork.directory}; the ghost")
+
+    def _tell(self, sentence: str) -> None:
+        """Say something in the panel and in the terminal."""
+        self._panel.tell(sentence)
+        print(sentence, flush=True)
+
+
+def _name(other: RecordedRun, run: RecordedRun) -> str:
+    """What another run is called beside a run."""
+    return other.name if other.name != run.name else str(other.path)

@@ -1,0 +1,97 @@
+"""A recorded run as the viewer shows it, state by state."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from actuated_characters.bags.recording import Recording, read_recordings
+from actuated_characters.render.scene import Scene, make_scene
+from actuated_characters.viewer.latest import CharacterSample
+from actuated_characters.viewer.recorded.timeline import row_at
+from msgs_config.arrays import FloatArray
+from msgs_config.errors import RecordingError
+from msgs_config.messages.projectiles import BallStates
+from msgs_config.messages.state import StampedState
+
+
+@dataclass(frozen=True)
+class RecordedRun:
+    """The characters of one world of a recording, over the ticks that there are of all."""
+
+    path: Path
+    scene: Scene
+
+    @property
+    def name(self) -> str:
+        """What it is called where there are several."""
+        return self.path.resolve().name
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """Those of its characters."""
+        return self.scene.recordings
+
+    @property
+    def times(self) -> FloatArray:
+        """Simulation time (t + 1,) of each state since the first one, s."""
+        return self.scene.times
+
+    def sample(self, character: int, row: int) -> CharacterSample:
+        """What is known of one character, by its number, in a state."""
+        recording = self.recordings[character]
+        effort, contacts, pushes = None, None, None
+        if row and not np.isnan(recording.effort[row - 1]).any():
+            effort = recording.effort[row - 1]
+            contacts = recording.contacts[row - 1] if recording.contacts else None
+            pushes = recording.applied_wrench[row - 1] if recording.applied_wrench else None
+        reference = recording.reference_position[row]
+        return CharacterSample(
+            StampedState(
+                int(recording.stamps_ns[row]),
+                recording.position[row],
+                recording.velocity[row],
+                effort,
+            ),
+            None if np.isnan(reference).any() else reference,
+            contacts,
+            pushes,
+        )
+
+    def position_at(self, character: int, time: float) -> FloatArray:
+        """Where a character was at a time in s, (n,), message form."""
+        position: FloatArray = self.recordings[character].position[row_at(self.times, time)]
+        return position
+
+    def balls(self, row: int) -> tuple[BallStates | None, list[float]]:
+        """The balls that are there in a state, and their radii, m."""
+        recording = self.recordings[0]
+        states = recording.balls[row] if recording.balls else None
+        count = 0 if states is None else len(states.names)
+        return states, self.scene.ball_radii(row, count)
+
+
+def read_run(path: Path) -> RecordedRun:
+    """Read a run's directory or a bag.
+
+    Raises:
+        RecordingError: there is no recording of a world, or none that can be read.
+    """
+    return RecordedRun(path, make_scene(read_recordings(path)))
+
+
+def check_comparable(run: RecordedRun, other: RecordedRun) -> None:
+    """Raise RecordingError unless two runs have the same characters."""
+    one, two = (
+        [(each.name, each.character.name, each.layout.dof_names) for each in either.recordings]
+        for either in (run, other)
+    )
+    if one != two:
+        names = [
+            ", ".join(each.name or each.character.name for each in either.recordings)
+            for either in (run, other)
+        ]
+        raise RecordingError(
+            f"{other.path} cannot be shown beside {run.path}: it has other characters or degrees "
+            f"of freedom ({names[1]}, not {names[0]})"
+        )
