@@ -4,6 +4,8 @@ from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 
+from rich.console import Console
+
 from actuated_characters.viewer.recorded.player import RecordedPlayer
 from actuated_characters.viewer.recorded.run import check_comparable, read_run
 from actuated_characters.viewer.web.request_check import RequestCheck
@@ -22,8 +24,9 @@ def show_recorded(
         ActuatedCharactersError: a recording cannot be read, the others are of other characters, or
             the port cannot be listened on.
     """
-    run = read_run(path)
-    beside = [read_run(other) for other in others]
+    with Console(stderr=True).status("reading ..."):
+        run = read_run(path)
+        beside = [read_run(other) for other in others]
     for other in beside:
         check_comparable(run, other)
     rejections: deque[str] = deque(maxlen=_MOST_REJECTIONS)
