@@ -23,6 +23,7 @@ from controller_node.control_laws import (
 from controller_node.controller_settings import (
     ControllerSettings,
     EffectiveGains,
+    check_planned,
     effective_gains,
 )
 from controller_node.effort_series import EffortSeries
@@ -30,6 +31,8 @@ from controller_node.model_check import check_agreement, check_inertia
 from controller_node.planner.base import Planner
 from controller_node.planner.outlook import Outlook
 from controller_node.references.base import Reference
+from controller_node.references.steering.reference import SteeredReference
+from controller_node.references.steering.velocity import VelocityCommand
 from controller_node.references.trajectory import TrajectoryPoints
 from controller_node.references.transformed import PlanarTransform
 from controller_node.strength import Strengths, StrengthSchedule
@@ -83,10 +86,11 @@ class Controller:
         self.check(settings)
         self._settings = settings
         self._limits = EffortLimits(self.layout, settings.gains.effort_limits)  # those met last
-        self._choice = choice = behaviour or BehaviourChoice()
-        self.needs_contacts = choice.needs_contacts  # of the tick before, to answer a state
-        self.opponent = choice.opponent  # the character whose place it needs as well; or none
+        self._choice = behaviour or BehaviourChoice()
+        self.needs_contacts = self._choice.needs_contacts  # of the tick before, to answer a state
+        self.opponent = self._choice.opponent  # the character whose place it needs too; or none
         self._own_reference = reference
+        self.is_steered = isinstance(reference, SteeredReference)  # by velocities
         self._no_contacts = np.zeros((len(character.links), 6))
         self.begin_episode(0)  # until a state says of which episode it is
 
@@ -146,14 +150,8 @@ class Controller:
             raise ConfigurationError(
                 f"parameter 'balance.enabled' needs the key 'feet' in {self._character.file}"
             )
-        if self.planner is not None and settings.law != "stable_pd":
-            raise ConfigurationError(
-                f"a planner foresees the law stable_pd alone; 'law' is {settings.law}"
-            )
-        if self.planner is not None and settings.balance is not None:
-            raise ConfigurationError(
-                "a planner keeps balance itself; 'balance.enabled' must be false"
-            )
+        if self.planner is not None:
+            check_planned(settings)
 
     def check_agreement(self, probe: DynamicsSample) -> None:
         """Raise CharacterError if a simulator's probe is not what the model expects."""
@@ -175,6 +173,18 @@ class Controller:
         self._tracked.replace(points, start_ns, now_ns, self._behaviour.carry)
         self._behaviour.carry = PlanarTransform()
         self._change_reference()
+
+    def steer(
+        self, velocity: tuple[float, float, float], *, start_ns: int, now_ns: int, episode_ns: int
+    ) -> VelocityCommand:
+        """Take a velocity (m/s ahead, m/s and rad/s to the left) from a stamp on; as it is taken,
+        within the limits. Raises MotionError if it cannot be.
+        """
+        self._enter_episode(episode_ns)
+        command = VelocityCommand(self._tracked.tick(start_ns), *velocity)
+        steered = self._tracked.steer(command, self._tracked.tick(now_ns))
+        self._change_reference(steered.since)
+        return steered.command
 
     def set_strengths(self, strengths: Strengths, *, episode_ns: int) -> None:
         """Take strengths that count from their stamp on, until the next ones or the episode's end.
@@ -204,7 +214,8 @@ class Controller:
         """
         self._enter_episode(episode_ns)
         tick, stamp_ns = self.clock.tick(state.stamp_ns), state.stamp_ns
-        acting = self._state_then(tick, state)
+        late = None if self.planner is None else self.planner.in_flight
+        acting = state if late is None else late.acting_state(tick, state, self.clock)
         seen = self._observe(acting, stamp_ns, Surroundings(contacts, opponent))
         output = self._behaviour.advance(seen)
         self._take(output, stamp_ns)
@@ -218,21 +229,12 @@ class Controller:
             offset=self._offset(acting, gains),
         )
         effort = self._effort(tracking, gains)
-        if self.planner is not None and self.planner.in_flight is not None:
-            self.planner.in_flight.send(tick, effort)
+        if late is not None:
+            late.send(tick, effort)
         now = tracking.now
         if acting is not state:  # the reference that is published is that of the state's stamp
             now = self._tracked.desired_at(self._tracked.tick(stamp_ns))
         return effort, StampedReference(stamp_ns, now.configuration.position, now.velocity)
-
-    def _state_then(self, tick: int, state: StampedState) -> StampedState:
-        """The state in which the answer to a tick's state acts, as far as it can be foreseen."""
-        late = None if self.planner is None else self.planner.in_flight
-        if late is None:
-            return state
-        position, velocity = late.state_then(tick, state.position, state.velocity)
-        stamp_ns = self.clock.stamp_ns(tick + late.delay_ticks)
-        return StampedState(stamp_ns, position, velocity, state.effort)
 
     def _observe(self, state: StampedState, stamp_ns: int, around: Surroundings) -> Observation:
         """The behaviour's view of a state, for the answer to a stamp."""
@@ -270,9 +272,9 @@ class Controller:
             self._tracked.target = output.target
             self._change_reference()
 
-    def _change_reference(self) -> None:
+    def _change_reference(self, since: int = 0) -> None:
         if self.planner is not None:
-            self.planner.change_reference()
+            self.planner.change_reference(since)
 
     def _effort(self, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
         """The effort (n,) of law and balance, within the limits."""

@@ -6,6 +6,7 @@ from controller_node.balance import BalanceGains
 from controller_node.control_laws import GainArrays, scale_gains
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
+from msgs_config.errors import ConfigurationError
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,16 @@ class ControllerSettings:
     follows_velocity: bool  # the reference's; else the desired velocity is zero
     balance: BalanceGains | None = None  # None: nothing but the law
     strengths: FloatArray | None = None  # (b,) shares of the gains that count; None: all of them
+
+
+def check_planned(settings: ControllerSettings) -> None:
+    """Raise ConfigurationError if a planner cannot work with settings."""
+    if settings.law != "stable_pd":
+        raise ConfigurationError(
+            f"a planner foresees the law stable_pd alone; 'law' is {settings.law}"
+        )
+    if settings.balance is not None:
+        raise ConfigurationError("a planner keeps balance itself; 'balance.enabled' must be false")
 
 
 @dataclass(frozen=True)

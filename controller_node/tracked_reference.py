@@ -7,9 +7,12 @@ import numpy as np
 
 from controller_node.behaviours.targets import Target
 from controller_node.references.base import Reference, ReferenceState, SampledTogether
+from controller_node.references.steering.reference import Steered, SteeredReference
+from controller_node.references.steering.velocity import VelocityCommand
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.character.model import Character
+from msgs_config.errors import MotionError
 from msgs_config.messages.clock import TickClock
 
 _TOGETHER = 16  # ticks; sampling more of them would be felt in the tick in which it is done
@@ -61,6 +64,21 @@ class TrackedReference:
         self._reference = before.replaced(points, start, now)
         self._together = _sampled_together(self._reference)
         self._known = []
+
+    def steer(self, command: VelocityCommand, now: int) -> Steered:
+        """Take a command; ticks are counted from the episode's first state.
+
+        Raises:
+            MotionError: the reference is not one that is steered, or the command cannot be taken.
+        """
+        if not isinstance(self._reference, SteeredReference):
+            raise MotionError(
+                "cmd_vel: the reference is not steered; parameter 'reference' must be 'steered', "
+                "and no trajectory may have replaced it"
+            )
+        steered = self._reference.steered(command, now)
+        self._reference, self._known = steered.reference, []
+        return steered
 
     def own(self, tick: int) -> tuple[TimedState, TimedState]:
         """The reference's states at a tick and at the next one, without the behaviour's target."""

@@ -36,6 +36,7 @@ from msgs_config.errors import ConfigurationError, one_of
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.runs.plan import RunPlan
     from actuated_characters.runs.planned_throws import PlannedThrow
+    from actuated_characters.runs.planned_velocities import PlannedVelocity
     from actuated_characters.runs.planned_wrenches import PlannedPush
     from controller_node.references.files.reconstructed import FoundWith
 
@@ -130,6 +131,7 @@ class PlannedRun:
     plan: "RunPlan"
     pushes: "Sequence[PlannedPush]"
     throws: "Sequence[PlannedThrow]"
+    velocities: "Sequence[PlannedVelocity]"
     warnings: Sequence[str]  # that the user should read
 
 
@@ -137,6 +139,7 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
     """Plan the run that the options describe; raises ActuatedCharactersError if it cannot be."""
     from actuated_characters.runs.plan import make_plan
     from actuated_characters.runs.planned_throws import plan_throws
+    from actuated_characters.runs.planned_velocities import plan_velocities
     from msgs_config.character.loading import load_character
     from msgs_config.shared_parameters import collides
 
@@ -156,9 +159,12 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
         options.character, duration, reference, simulator, controller, loaded=character
     )
     _check_options(options, plan)
+    velocities: list[PlannedVelocity] = []
+    if options.cmd_vel is not None:
+        plan, velocities = plan_velocities(plan, options.cmd_vel)
     pushes = _pushes(options.push, plan, found_in)
     throws, in_the_way = plan_throws(plan, options.throw)
-    return PlannedRun(plan, pushes, throws, [*plan.warnings, *in_the_way])
+    return PlannedRun(plan, pushes, throws, velocities, [*plan.warnings, *in_the_way])
 
 
 def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
@@ -242,6 +248,7 @@ def _run_plan(
             recording=_recording(options, plan),
             pushes=pushes,
             throws=throws,
+            velocities=run.velocities,
             composed=options.composed,
             viewer=server_parameters(options) if options.view else None,
         )
@@ -262,7 +269,8 @@ def _reference(options: argparse.Namespace) -> dict[str, object]:
         name = getattr(options, kind)
         if name is not None:
             return {"reference": kind, kind: name}
-    return {} if options.reference is None else {"reference": options.reference}
+    reference = options.reference if options.cmd_vel is None else "steered"
+    return {} if reference is None else {"reference": reference}
 
 
 def _pushes(texts: list[str], plan: "RunPlan", found_in: "FoundWith | None") -> "list[PlannedPush]":

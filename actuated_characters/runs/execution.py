@@ -9,8 +9,9 @@ from pathlib import Path
 from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.runs.in_process import Watch, ticks_in_process
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned_files import write_planned
+from actuated_characters.runs.planned_files import Planned, write_planned
 from actuated_characters.runs.planned_throws import PlannedThrow
+from actuated_characters.runs.planned_velocities import PlannedVelocity
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.processes import Child, Children
 from actuated_characters.runs.ros_domain import own_domain
@@ -52,6 +53,7 @@ def run_over_topics(
     recording: Mapping[str, object] = _NOTHING_GIVEN,
     pushes: Sequence[PlannedPush] = (),
     throws: Sequence[PlannedThrow] = (),
+    velocities: Sequence[PlannedVelocity] = (),
     composed: bool = False,
     fork: Mapping[str, object] | None = None,
     resets: int = 0,
@@ -60,9 +62,9 @@ def run_over_topics(
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
     With `composed`, controller and simulator are one process. `recording` has parameters of the
-    recorder. Pushes and throws are sent by one more process; in lockstep all are there before the
-    first tick. With parameters of the node `fork` that process repeats a recording, with so many
-    resets. With those of a `viewer` one more shows the characters in a browser.
+    recorder. Pushes, throws and velocities are sent by one more process; in lockstep all are there
+    before the first tick. With parameters of the node `fork` that process repeats a recording, with
+    so many resets. With those of a `viewer` one more shows the characters in a browser.
 
     Raises:
         RunError: one of the processes failed, or the simulator rejected a push or throw.
@@ -70,7 +72,8 @@ def run_over_topics(
     recording = {**recording, "directory": str(directory), "write_bag": write_bag}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
-    senders = _plan_senders(directory, pushes, throws, recording, fork)
+    planned = {"pushes": pushes, "throws": throws, "velocities": velocities}
+    senders = _plan_senders(directory, planned, recording, fork)
     with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             progress = watch(children.start_node("viewer", viewer), progress)
@@ -150,27 +153,25 @@ def _start_loop(
 
 def _plan_senders(
     directory: Path,
-    pushes: Sequence[PlannedPush],
-    throws: Sequence[PlannedThrow],
+    inputs: Mapping[str, Sequence[Planned]],
     recording: Mapping[str, object],
     fork: Mapping[str, object] | None,
 ) -> dict[str, dict[str, object]]:
     """The parameters of the node that sends what was planned, by its name; none if nothing was."""
-    if not (pushes or throws or fork is not None):
+    if not any(inputs.values()) and fork is None:
         return {}
-    planned = _write_planned(directory, pushes, throws, recording)
+    planned = _write_planned(directory, inputs, recording)
     return {"pusher": planned} if fork is None else {"fork": {**planned, **fork}}
 
 
 def _write_planned(
     directory: Path,
-    pushes: Sequence[PlannedPush],
-    throws: Sequence[PlannedThrow],
+    inputs: Mapping[str, Sequence[Planned]],
     recording: Mapping[str, object],
 ) -> dict[str, object]:
-    """Write the planned pushes and throws; returns the parameters of the process that sends them.
+    """Write what was planned; returns the parameters of the process that sends it.
 
-    It waits for the simulator, and for a recorder that keeps the topic in a bag.
+    It waits for the node that it is for, and for a recorder that keeps the topic in a bag.
     """
     excluded = recording.get("exclude", ())
     assert isinstance(excluded, Collection)
@@ -179,14 +180,17 @@ def _write_planned(
     def subscribers(topic: str) -> int:
         return 2 if recording["write_bag"] and topic not in left_out else 1
 
-    files = {what: directory / PARAMETERS / f"{what}.json" for what in ("pushes", "throws")}
-    write_planned(files["pushes"], pushes)
-    write_planned(files["throws"], throws)
+    files = {what: directory / PARAMETERS / f"{what}.json" for what in inputs}
+    for what, planned in inputs.items():
+        write_planned(files[what], planned)
+    steers = bool(inputs["velocities"])
     return {
         "file": str(files["pushes"]),
         "throws": str(files["throws"]),
+        **({"velocities": str(files["velocities"])} if steers else {}),
         "wait_for_subscribers": subscribers("external_wrench"),
         "throw_subscribers": subscribers("throw"),
+        **({"velocity_subscribers": subscribers("cmd_vel_stamped")} if steers else {}),
     }
 
 

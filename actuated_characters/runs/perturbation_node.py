@@ -1,4 +1,4 @@
-"""`pusher`: sends pushes and throws that were planned before a run, each for its tick."""
+"""`pusher`: sends pushes, throws and velocities that were planned before a run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,8 +6,10 @@ from pathlib import Path
 
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.serialization import serialize_message
 
 from actuated_characters.runs.planned_throws import read_throws
+from actuated_characters.runs.planned_velocities import read_velocities
 from actuated_characters.runs.planned_wrenches import read_pushes
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import ThrowCodec
@@ -22,10 +24,12 @@ from msgs_config.runtime.ros_parameters import declare, given_parameters
 PARAMETERS = [
     Parameter("file", "pushes.json", "the pushes, as a run writes them"),
     Parameter("throws", "", "the throws, as a run writes them; empty: none"),
+    Parameter("velocities", "", "the velocities, as a run writes them; empty: none"),
     Parameter(
         "wait_for_subscribers", 1, "send when this many subscribe to external_wrench", maximum=1000
     ),
     Parameter("throw_subscribers", 1, "likewise to throw", maximum=1000),
+    Parameter("velocity_subscribers", 1, "likewise to cmd_vel_stamped", maximum=1000),
     SESSION,
 ]
 
@@ -39,7 +43,7 @@ class PerturbationNode(Node):
     """
 
     def __init__(self) -> None:
-        """Read the pushes and the throws.
+        """Read the pushes, the throws and the velocities.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or a file cannot be read.
@@ -65,6 +69,16 @@ class PerturbationNode(Node):
                     topics.THROW,
                     [codec.encode(each.stamp_ns, each.throw) for each in throws],
                     values.integer("throw_subscribers"),
+                )
+            )
+        if values.text("velocities"):
+            velocities = read_velocities(Path(values.text("velocities")))
+            self._outgoing.append(
+                _PlannedPublisher(
+                    self,
+                    topics.CMD_VEL_STAMPED,
+                    [bytes(serialize_message(each.message())) for each in velocities],
+                    values.integer("velocity_subscribers"),
                 )
             )
         self._torques: DirectSubscription | None = None

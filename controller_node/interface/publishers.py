@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -14,6 +15,7 @@ from controller_node.actuation import net_wrench
 from controller_node.behaviours.base import ModeReport
 from controller_node.interface.plan_message import plan_message
 from controller_node.planner.outlook import Outlook
+from controller_node.references.steering.velocity import VelocityCommand
 from controller_node.strength import Strengths
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointLayout
@@ -57,6 +59,7 @@ class Publishers:
         self._torques = topics.create_publisher(node, topics.JOINT_TORQUES)
         self._configurations = topics.create_publisher(node, topics.CONFIGURATION)
         self._trajectories = topics.create_publisher(node, topics.ACTIVE_TRAJECTORY)
+        self._velocities = topics.create_publisher(node, topics.ACTIVE_CMD_VEL)
         self._strengths = topics.create_publisher(node, topics.ACTIVE_STRENGTH)
         self._modes = topics.create_publisher(node, topics.MODE)
         self._plans = topics.create_publisher(node, topics.PLAN)
@@ -119,6 +122,14 @@ class Publishers:
     def publish_trajectory(self, trajectory: JointTrajectory) -> None:
         """Publish a trajectory that was taken, with the stamp that it begins at."""
         self._trajectories.publish(trajectory)
+
+    def publish_velocity(self, command: VelocityCommand, start_ns: int) -> None:
+        """Publish a velocity as it was taken, with the stamp that it begins at."""
+        message = TwistStamped()
+        message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)
+        message.twist.linear.x, message.twist.linear.y = command.forward, command.left
+        message.twist.angular.z = command.turn
+        self._velocities.publish(message)
 
     def publish_strengths(self, strengths: Strengths) -> None:
         """Publish strengths that were taken, of every joint, with the stamp that they begin at."""

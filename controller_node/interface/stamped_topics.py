@@ -1,5 +1,8 @@
-"""Trajectories and strengths that come over topics, and count from their stamps on."""
+"""Trajectories, velocities and strengths that come over topics, and count from their stamps on."""
 
+from functools import partial
+
+from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
@@ -10,26 +13,33 @@ from controller_node.interface.stamped_message import decode_stamped, nanosecond
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import split_stamp
+from msgs_config.messages.cdr import decode, split_stamp
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.stamped_subscription import StampedSubscription
 
 
 class StampedTopics:
-    """Subscribes to `~/joint_trajectory` and `~/strength`, and publishes what was accepted."""
+    """Subscribes to what a controller is asked for, and publishes what was accepted.
+
+    That is `~/joint_trajectory` and `~/strength`; where the reference is steered, `cmd_vel` and
+    `cmd_vel_stamped` as well. They are two topics: no node can subscribe to two types on one.
+    """
 
     def __init__(
         self, node: Node, controller: Controller, outputs: Publishers, logger: OnceLogger
     ) -> None:
         self._controller = controller
         self._outputs = outputs
-        self._trajectories = StampedSubscription(
-            node, topics.JOINT_TRAJECTORY, "refused ", self._set_trajectory, logger
-        )
-        self._strengths = StampedSubscription(
-            node, topics.STRENGTH, "refused ", self._set_strengths, logger
-        )
+        subscribe = partial(StampedSubscription, node, rejection="refused ", logger=logger)
+        self._trajectories = subscribe(topics.JOINT_TRAJECTORY, use=self._set_trajectory)
+        self._velocities = []
+        if controller.is_steered:
+            self._velocities = [
+                subscribe(topics.CMD_VEL_STAMPED, use=self._steer_stamped),
+                subscribe(topics.CMD_VEL, use=self._steer),
+            ]
+        self._strengths = subscribe(topics.STRENGTH, use=self._set_strengths)
         self._now_ns = self._episode_ns = 0
 
     @property
@@ -37,6 +47,7 @@ class StampedTopics:
         """Numbers of rejected messages, for the diagnostics."""
         return {
             "refused_trajectories": self._trajectories.rejected,
+            **{f"refused_{each.topic}": each.rejected for each in self._velocities},
             "refused_strengths": self._strengths.rejected,
         }
 
@@ -48,6 +59,8 @@ class StampedTopics:
         """
         self._now_ns, self._episode_ns = state_ns, episode_ns
         self._trajectories.take()
+        for each in self._velocities:
+            each.take()
         self._strengths.take()
 
     def _set_trajectory(self, raw: bytes) -> None:
@@ -67,6 +80,26 @@ class StampedTopics:
         )
         message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)
         self._outputs.publish_trajectory(message)
+
+    def _steer_stamped(self, raw: bytes) -> None:
+        message, start_ns = decode_stamped(raw, TwistStamped, "cmd_vel", self._now_ns)
+        self._take_velocity(message.twist, start_ns)
+
+    def _steer(self, raw: bytes) -> None:
+        self._take_velocity(decode(raw, Twist), self._now_ns)
+
+    def _take_velocity(self, velocity: Twist, start_ns: int) -> None:
+        """Steer by the parts that a character on the ground has; the others do not count."""
+        clock = self._controller.clock
+        start_ns = clock.stamp_ns(clock.first_tick_from(start_ns))
+        linear, angular = velocity.linear, velocity.angular
+        command = self._controller.steer(
+            (linear.x, linear.y, angular.z),
+            start_ns=start_ns,
+            now_ns=self._now_ns,
+            episode_ns=self._episode_ns,
+        )
+        self._outputs.publish_velocity(command, start_ns)
 
     def _set_strengths(self, raw: bytes) -> None:
         message, start_ns = decode_stamped(raw, JointState, "strength", self._now_ns)

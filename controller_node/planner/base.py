@@ -29,8 +29,8 @@ class Planner(Protocol):
     def begin_episode(self, episode: int) -> None:
         """Forget all; `episode` is the tick of the episode's first state."""
 
-    def change_reference(self) -> None:
-        """Say that the reference is another one from now on."""
+    def change_reference(self, since: int = 0) -> None:
+        """Say that the reference is another one from a tick on."""
 
     def rest(self) -> None:
         """Say that nothing is tracked in this tick: what was planned is over."""

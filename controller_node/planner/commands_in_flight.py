@@ -15,6 +15,8 @@ from controller_node.planner.compiled.rollout import let_act
 from controller_node.planner.contact_model import ContactModel
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
+from msgs_config.messages.clock import TickClock
+from msgs_config.messages.state import StampedState
 
 
 class CommandsInFlight:
@@ -50,6 +52,12 @@ class CommandsInFlight:
         before = sorted(sent for sent in self._sent if sent < tick - self.delay_ticks)
         for old in before[:-1]:
             del self._sent[old]
+
+    def acting_state(self, tick: int, state: StampedState, clock: TickClock) -> StampedState:
+        """The state in which the answer to a tick's state acts, as far as it can be foreseen."""
+        position, velocity = self.state_then(tick, state.position, state.velocity)
+        stamp_ns = clock.stamp_ns(tick + self.delay_ticks)
+        return StampedState(stamp_ns, position, velocity, state.effort)
 
     def state_then(
         self, tick: int, position: FloatArray, velocity: FloatArray

@@ -125,10 +125,11 @@ class PredictivePlanner:
         if self.in_flight is not None:
             self.in_flight.restore(snapshot.sent)
 
-    def change_reference(self) -> None:
-        """Say that the reference is another one from now on; the plan in force stays."""
-        self._reference.clear()
-        self._abandon_search()
+    def change_reference(self, since: int = 0) -> None:
+        """Say that the reference is another one from a tick on; the plan in force stays."""
+        self._reference.clear(since)
+        if self._coming is not None and since <= self._coming.tick + self.settings.horizon:
+            self._abandon_search()
 
     def rest(self) -> None:
         """Forget the plan, and where the reference had given way to: nothing is tracked."""

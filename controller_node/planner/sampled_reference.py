@@ -31,7 +31,7 @@ class Foreseen:
 
 
 class SampledReference:
-    """Samples a reference, each tick of it once, until `clear` is called."""
+    """Samples a reference, each tick of it once, until `clear` is called for it."""
 
     def __init__(
         self, model: ContactModel, rollouts: RolloutPool, settings: PlannerSettings
@@ -39,9 +39,10 @@ class SampledReference:
         self._model, self._rollouts, self._settings = model, rollouts, settings
         self._targets: dict[int, ReferenceSample] = {}
 
-    def clear(self) -> None:
-        """Say that the reference may be another one."""
-        self._targets.clear()
+    def clear(self, since: int = 0) -> None:
+        """Say that the reference may be another one from a tick on."""
+        for known in [known for known in self._targets if known >= since]:
+            del self._targets[known]
 
     def target(self, tick: int, desired_at: DesiredAt, body: RolloutModel) -> ReferenceSample:
         """The reference at a tick."""

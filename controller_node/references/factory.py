@@ -2,6 +2,7 @@
 
 from controller_node.references import clip, hold, keyframes, signals  # noqa: F401  register their own
 from controller_node.references.base import REFERENCES, Motion
+from controller_node.references.steering import factory as steering  # noqa: F401  as well
 from msgs_config.character.model import Character
 from msgs_config.parameters import Parameter, Values
 
@@ -9,8 +10,8 @@ MOTION_PARAMETERS = [
     Parameter(
         "reference",
         "hold",
-        "what to track: the rest pose, keyframes, a motion clip, or a test signal from the rest "
-        "pose; a message on ~/joint_trajectory replaces it",
+        "what to track: the rest pose, keyframes, a motion clip, a test signal from the rest "
+        "pose, or a walk steered by cmd_vel; a message on ~/joint_trajectory replaces it",
         choices=REFERENCES.names,
     ),
     *REFERENCES.parameters,

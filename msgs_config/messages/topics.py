@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
@@ -131,6 +131,9 @@ REFERENCE = Topic("~/reference", JointState, STREAM_QOS)
 NET_WRENCH = Topic("~/net_wrench", WrenchStamped, STREAM_QOS)
 JOINT_TRAJECTORY = Topic("~/joint_trajectory", JointTrajectory, STREAM_QOS)
 ACTIVE_TRAJECTORY = Topic("~/active_trajectory", JointTrajectory, LATCHED_QOS)
+CMD_VEL = Topic("cmd_vel", Twist, STREAM_QOS)
+CMD_VEL_STAMPED = Topic("cmd_vel_stamped", TwistStamped, STREAM_QOS)
+ACTIVE_CMD_VEL = Topic("~/active_cmd_vel", TwistStamped, CHANGES_QOS)
 STRENGTH = Topic("~/strength", JointState, STREAM_QOS)
 ACTIVE_STRENGTH = Topic("~/active_strength", JointState, CHANGES_QOS)
 MODE = Topic("~/mode", String, CHANGES_QOS)

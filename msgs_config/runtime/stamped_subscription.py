@@ -57,7 +57,7 @@ class StampedSubscription:
         self._use = use
         self._once_logger = logger
         self._session = session
-        self._topic = topic
+        self.topic = topic.name
         self._messages = DirectSubscription(node, topic)
 
     def take(self) -> None:
@@ -73,14 +73,14 @@ class StampedSubscription:
                 self.accepted += 1
             except (CommandError, LayoutError, MessageError, MotionError) as error:
                 self.rejected += 1
-                kind = f"past {self._topic.name}" if isinstance(error, PastStampError) else ""
+                kind = f"past {self.topic}" if isinstance(error, PastStampError) else ""
                 self._once_logger.log_once(f"{self._rejection}{error}", kind)
 
     def _is_foreign(self, raw: bytes) -> bool:
         if self._session is None:
             return False
         try:
-            return self._session.rejects(self._topic.name, read_frame_id(raw))
+            return self._session.rejects(self.topic, read_frame_id(raw))
         except MessageError:
             return False  # a decoder says what is wrong with it
 

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rclpy.publisher import Publisher
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from msgs_config.arrays import FloatArray
@@ -18,7 +20,14 @@ from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from tests.support import physics
-from tests.support.ros import Processes, SimulatorClient, tick_of, wait_until, wrench_message
+from tests.support.ros import (
+    Processes,
+    ReceivedMessages,
+    SimulatorClient,
+    tick_of,
+    wait_until,
+    wrench_message,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -86,6 +95,33 @@ def test_an_example_ends_quietly_on_a_signal(
 
     assert started.wait() in (0, 1)  # 1 if what it was there for has not happened
     assert (started.stdout, started.stderr) == ("", "")
+
+
+def turn_at(
+    client: SimulatorClient, clock: Publisher, velocities: ReceivedMessages, second: int
+) -> float:
+    """The turn rate that the driver publishes at a simulated time."""
+    before, message = len(velocities), Clock()
+    message.clock.sec = second
+    client.spin_sending(
+        lambda: clock.publish(message), lambda: len(velocities) > before, "a velocity"
+    )
+    return float(velocities.last.angular.z)
+
+
+def test_the_driver_steers_by_simulated_time(processes: Processes, client: SimulatorClient) -> None:
+    velocities = client.listen(topics.CMD_VEL)
+    clock = client.speak(topics.CLOCK)
+    driver = processes.python(example("drive"))
+    client.spin_until(clock.get_subscription_count, "the driver, which hears the clock")
+    turns = [turn_at(client, clock, velocities, second) for second in (1, 5, 13, 26)]
+
+    driver.send(signal.SIGINT)
+
+    assert driver.wait() == 0
+    assert (driver.stdout, driver.stderr) == ("", "")
+    assert turns == [0.5, 0.5, -0.5, 0.5]  # circles of 12.6 s
+    assert velocities.last.linear.x == 0.8
 
 
 # The example, to which a signal comes in the moment between the look at the context and the wait.

@@ -21,8 +21,14 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     )
     tracked.add_argument(
         "--reference",
-        choices=["hold", "step", "sine"],
-        help="the rest pose (hold, the default), or a test signal from it",
+        choices=["hold", "step", "sine", "steered"],
+        help="the rest pose (hold, the default), a test signal from it, or a walk steered by the "
+        "topic cmd_vel",
+    )
+    tracked.add_argument(
+        "--cmd-vel",
+        metavar="'X,Y,TURN@S ...'",
+        help="steer: m/s ahead and to the left, rad/s to the left, each from a time in s on",
     )
     run.add_argument(
         "--behaviour",

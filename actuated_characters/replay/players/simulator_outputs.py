@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+from geometry_msgs.msg import TwistStamped
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
@@ -28,16 +29,18 @@ from msgs_config.messages.wrenches import decode_wrenches, encode_wrenches
 _TICK_TOPICS = (topics.CONTACTS, topics.APPLIED_WRENCH, topics.ODOM, topics.JOINT_STATES)
 
 REQUESTS = tuple(
-    topic.of(topics.CONTROLLER_NODE) for topic in (topics.JOINT_TRAJECTORY, topics.STRENGTH)
+    topic.of(topics.CONTROLLER_NODE)
+    for topic in (topics.JOINT_TRAJECTORY, topics.CMD_VEL_STAMPED, topics.STRENGTH)
 )
 """What a controller is asked for while it works."""
 
 _ACTIVE = tuple(  # what the controller publishes of each request that it has accepted
-    topic.of(topics.CONTROLLER_NODE) for topic in (topics.ACTIVE_TRAJECTORY, topics.ACTIVE_STRENGTH)
+    topic.of(topics.CONTROLLER_NODE)
+    for topic in (topics.ACTIVE_TRAJECTORY, topics.ACTIVE_CMD_VEL, topics.ACTIVE_STRENGTH)
 )
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
 
-Request: TypeAlias = "JointTrajectory | JointState"
+Request: TypeAlias = "JointTrajectory | TwistStamped | JointState"
 
 
 @dataclass
@@ -144,8 +147,8 @@ def _raw_stamp_ns(raw: bytes) -> int:
 def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
     """Read the messages of a recording that are not of each tick.
 
-    The trajectories and strengths are those that its controller accepted, each with the stamp that
-    it began at; of an older bag, which does not have these, those that were sent.
+    The trajectories, velocities and strengths are those that its controller accepted, each with the
+    stamp that it began at; of an older bag, which does not have these, those that were sent.
 
     Raises:
         RecordingError: the bag cannot be read.

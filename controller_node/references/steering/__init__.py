@@ -1,0 +1,1 @@
+"""A reference that is steered: walking and running at commanded velocities."""

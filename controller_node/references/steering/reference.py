@@ -1,0 +1,180 @@
+"""A character that goes where it is told to: walks and runs at commanded velocities."""
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.references.base import ReferenceState
+from controller_node.references.steering.gait import Gait
+from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
+from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.character.model import Character
+from msgs_config.errors import MotionError
+from msgs_config.geometry import rotations
+
+_WINDOW = 1024  # ticks that are remembered: many more than a planner's horizon
+_MOST_WAITING = 1000  # commands
+
+
+@dataclass(frozen=True)
+class Course:
+    """The motion over the ground at a tick; velocities in the character's own frame."""
+
+    x: float = 0.0  # m, world
+    y: float = 0.0
+    heading: float = 0.0  # rad
+    forward: float = 0.0  # m/s
+    left: float = 0.0  # m/s
+    turn: float = 0.0  # rad/s
+    phase: float = 0.0  # of the gait's cycle, from 0 to 1
+
+
+@dataclass(frozen=True)
+class Steered:
+    """What becomes of a reference by a command."""
+
+    reference: "SteeredReference"
+    command: VelocityCommand  # as it is taken: within the limits
+    since: int  # the first tick at which the reference may be another one
+
+
+_STOP = VelocityCommand(0, 0.0)
+
+
+class SteeredReference:
+    """A gait at commanded velocities. It is immutable but for what it remembers of its course.
+
+    Speed and turn rate follow the commands at the accelerations of the limits. The course is
+    integrated tick by tick, from `start` on; before it the character is where it is then.
+    """
+
+    def __init__(
+        self,
+        character: Character,
+        gait: Gait,
+        limits: SteeringLimits,
+        *,
+        rate_hz: int,
+        start: tuple[int, Course] = (0, Course()),
+        commands: Sequence[VelocityCommand] = (),
+    ) -> None:
+        """Begin at a tick on a course; commands are in the order of their ticks."""
+        self._character, self._gait = character, gait
+        self.limits = limits
+        self._rate = rate_hz
+        self._start, self._commands = start, commands
+        self._first, self._courses = start[0], [start[1]]
+        self._poses: dict[int, GeneralizedPosition] = {}
+        self._no_acceleration = np.zeros(character.layout.size)
+
+    @property
+    def repeat_ticks(self) -> int:
+        """After how many ticks a command is to be given again, so that it does not time out."""
+        return max(math.floor(0.5 * self.limits.timeout * self._rate), 1)
+
+    def sample(self, time: float) -> ReferenceState:
+        """The desired state at a tick, `time` s after the episode's first state."""
+        tick = round(time * self._rate)
+        here, next_one = self._pose(tick), self._pose(tick + 1)
+        velocity = self._rate * self._character.layout.difference(here, next_one)
+        return ReferenceState(here, velocity, self._no_acceleration)
+
+    def steered(self, command: VelocityCommand, now: int) -> "Steered":
+        """Take a command as well, instead of those of the same tick and of later ones.
+
+        `now` is the present tick, before which the reference is not asked for any more.
+
+        Raises:
+            MotionError: a number is not finite, or too many commands are yet to begin.
+        """
+        if not all(map(math.isfinite, (command.forward, command.left, command.turn))):
+            raise MotionError(
+                f"cmd_vel: the velocity is {command.forward:g}, {command.left:g} m/s and "
+                f"{command.turn:g} rad/s; it must be finite"
+            )
+        command = self.limits.clamped(command)
+        in_force = max(self._row(now), 0)
+        before = [each for each in self._commands[in_force:] if each.tick < command.tick]
+        if len(before) > _MOST_WAITING:
+            raise MotionError(f"cmd_vel: more than {_MOST_WAITING} are yet to begin")
+        reference = SteeredReference(
+            self._character,
+            self._gait,
+            self.limits,
+            rate_hz=self._rate,
+            start=(now, self.course(now)),
+            commands=[*before, command],
+        )
+        return Steered(reference, command, self._end_of_likeness(command))
+
+    def _end_of_likeness(self, command: VelocityCommand) -> int:
+        """The first tick at which a command makes a difference."""
+        row = self._row(command.tick)
+        if row == len(self._commands) - 1 and command.is_like(self._wanted(command.tick)):
+            last = self._commands[row].tick if row >= 0 else command.tick
+            return max(last + math.floor(self.limits.timeout * self._rate), command.tick)
+        return command.tick
+
+    def course(self, tick: int) -> Course:
+        """The motion over the ground at a tick."""
+        first, begin = self._start
+        if tick < self._first:
+            self._first, self._courses = first, [begin]
+        while len(self._courses) <= tick - self._first:
+            self._courses.append(
+                self._advanced(self._courses[-1], self._first + len(self._courses))
+            )
+            if len(self._courses) > 2 * _WINDOW:
+                self._first, self._courses = self._first + _WINDOW, self._courses[_WINDOW:]
+        return self._courses[max(tick - self._first, 0)]
+
+    def _advanced(self, course: Course, tick: int) -> Course:
+        """The course at a tick, from that of the tick before."""
+        limits, period, wanted = self.limits, 1.0 / self._rate, self._wanted(tick - 1)
+        change = limits.acceleration * period
+        forward = course.forward + within(wanted.forward - course.forward, change)
+        left = course.left + within(wanted.left - course.left, change)
+        turn = course.turn + within(wanted.turn - course.turn, limits.turn_acceleration * period)
+        heading = math.remainder(course.heading + turn * period, math.tau)
+        cosine, sine = math.cos(heading), math.sin(heading)
+        return Course(
+            course.x + period * (cosine * forward - sine * left),
+            course.y + period * (sine * forward + cosine * left),
+            heading,
+            forward,
+            left,
+            turn,
+            (course.phase + self._gait.frequency(forward) * period) % 1.0,
+        )
+
+    def _wanted(self, tick: int) -> VelocityCommand:
+        """The command in force at a tick."""
+        row = self._row(tick)
+        if row < 0 or tick - self._commands[row].tick >= self.limits.timeout * self._rate:
+            return _STOP
+        return self._commands[row]
+
+    def _row(self, tick: int) -> int:
+        """The last command's that is not after a tick; -1 if there is none."""
+        return bisect_right(self._commands, tick, key=lambda command: command.tick) - 1
+
+    def _pose(self, tick: int) -> GeneralizedPosition:
+        if tick not in self._poses:
+            if len(self._poses) > _WINDOW:
+                self._poses.clear()
+            self._poses[tick] = self._placed(self.course(tick))
+        return self._poses[tick]
+
+    def _placed(self, course: Course) -> GeneralizedPosition:
+        """The gait's pose where a course is."""
+        pose = self._gait.pose(course.forward, course.phase)
+        position, turns = pose.position.copy(), pose.orientations_xyzw.copy()
+        about_z = rotations.about_z(course.heading)
+        position[:3] = rotations.rotate(about_z, position[:3])
+        position[:2] += (course.x, course.y)
+        turns[0] = rotations.multiply(about_z, turns[0])
+        position[self._character.layout.rotation_entries] = rotations.log(turns)
+        return GeneralizedPosition(position, turns)

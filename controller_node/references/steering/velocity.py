@@ -1,0 +1,44 @@
+"""Commanded velocities, and the limits that they are kept within."""
+
+from dataclasses import dataclass, replace
+
+_BACKWARD, _SIDEWAYS = 0.6, 0.3  # m/s, at most
+
+
+@dataclass(frozen=True)
+class VelocityCommand:
+    """A velocity to reach, in the character's own frame, from a tick of the episode on."""
+
+    tick: int
+    forward: float  # m/s
+    left: float = 0.0  # m/s
+    turn: float = 0.0  # rad/s, to the left
+
+    def is_like(self, other: "VelocityCommand") -> bool:
+        """Whether another one asks for the same, whenever."""
+        return replace(self, tick=other.tick) == other
+
+
+@dataclass(frozen=True)
+class SteeringLimits:
+    """How fast it may go, how fast that changes, and how long a command holds."""
+
+    speed: float  # m/s
+    acceleration: float  # m/s^2
+    turn_rate: float  # rad/s
+    turn_acceleration: float  # rad/s^2
+    timeout: float  # s
+
+    def clamped(self, command: VelocityCommand) -> VelocityCommand:
+        """The nearest command within the limits."""
+        return VelocityCommand(
+            command.tick,
+            min(max(command.forward, -min(_BACKWARD, self.speed)), self.speed),
+            within(command.left, min(_SIDEWAYS, self.speed)),
+            within(command.turn, self.turn_rate),
+        )
+
+
+def within(value: float, most: float) -> float:
+    """The nearest value whose size is at most `most`."""
+    return min(max(value, -most), most)
