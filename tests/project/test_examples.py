@@ -338,14 +338,14 @@ def test_a_push_that_is_refused_is_told_to_have_had_no_effect(
 def test_the_step_response_in_real_time_is_near_to_what_theory_says(
     processes: Processes, tmp_path: Path
 ) -> None:
-    # at half speed: what a busy machine is late by is half as much of simulated time
+    # slowly: what a busy machine is late by is a fifth as much of simulated time
     processes.simulator(
-        "lift", mode="realtime", rate=500, real_time_factor=0.5, wait_for_subscribers=1
+        "lift", mode="realtime", rate=500, real_time_factor=0.2, wait_for_subscribers=1
     )
 
     measurement = processes.python(example("step_response"), "--damping", "8", "--csv", "step.csv")
 
-    assert measurement.wait() == 0
+    assert measurement.wait(60.0) == 0
     rows = re.findall(r"^([\w-]+).*?([\d.]+) +([\d.]+)$", measurement.stdout, re.MULTILINE)
     measured, theory = ({row[0]: float(row[side]) for row in rows} for side in (1, 2))
     ratio = 8.0 / (2.0 * math.sqrt(100.0 * 1.0))
