@@ -45,7 +45,7 @@ def test_the_plans_reference_goes_where_the_velocities_lead() -> None:
     plan, _ = plan_velocities(plan_of(5.0), "0.7,0,0@1 0,0,0@4")
 
     assert isinstance(plan.reference, SteeredReference)
-    # 1 s to 0.7 m/s, 2 s at it, 1 s to a stop: 0.35 + 1.4 + 0.35 m
+    # 3 s of 0.7 m/s; what it takes to get there is as long as what it takes to stop
     assert plan.reference.course(5 * RATE).x == pytest.approx(2.1, abs=0.01)
     assert plan.reference.course(5 * RATE).forward == 0.0
 

@@ -19,7 +19,7 @@ LASTING = {"steering.timeout": 1000.0}
 
 
 def make(name: str = "humanoid", **settings: object) -> SteeredReference:
-    given = {"reference": "steered", "rate": RATE, **settings}
+    given = {"reference": "steered", "rate": RATE, "steering.acceleration": 0.7, **settings}
     reference = make_motion(character(name), resolve(PARAMETERS, given)).reference
     assert isinstance(reference, SteeredReference)
     return reference
