@@ -21,6 +21,7 @@ from benchmarks.recorder import measure_recorder  # noqa: E402
 from benchmarks.replay import measure_replay  # noqa: E402
 from benchmarks.search import measure_search  # noqa: E402
 from benchmarks.support.ratios import compare, comparison_table, read_ratios, store_ratios  # noqa: E402
+from benchmarks.watching import measure_watching  # noqa: E402
 
 _WIDTH = 100  # characters; enough for every table
 _MEASUREMENTS = {
@@ -33,6 +34,7 @@ _MEASUREMENTS = {
     "reconstruction": measure_reconstruction,
     "recorder": measure_recorder,
     "replay": measure_replay,
+    "watching": measure_watching,
 }
 
 

@@ -135,6 +135,7 @@ class ControllerNode(ComposableNode):
             return AT_ONCE
         if self._pending_state is not None:
             self._take_state(self._pending_state)
+        self._outputs.make_up(self._last_reply)
         return UNTIL_A_MESSAGE
 
     def _next_state(self) -> bytes | None:

@@ -66,8 +66,7 @@ class SimNode(ComposableNode):
             self._once_logger.log_once,
             not self._settings.is_realtime,
         )
-        self._next_diagnostics = 0.0
-        self._timeouts, self._begun = 0, False
+        self._next_diagnostics, self._timeouts, self._begun = 0.0, 0, False
         self._control = RunControl()
         self._run_services = Services(self, self._control, self._resume, self._reset)
         LiveParameters(self, self._loaded.declared, values, self._change_parameters)
@@ -197,7 +196,7 @@ class SimNode(ComposableNode):
         pushes = [each.take_pushes() for each in characters]
         throws = self._world.take_throws()
         efforts = [each.take_effort() for each in characters]
-        simulation.watches_contacts = any(each.publishers.wants_contacts for each in characters)
+        simulation.watches_contacts = self._publisher.wants_contacts()
         try:
             simulation.step(efforts, pushes, throws)
         except SimulationError as error:
@@ -214,6 +213,7 @@ class SimNode(ComposableNode):
             self._raise_fault(describe_conflict(self, character.conflict, character.torques))
 
     def _run_watchdog(self) -> None:
+        self._publisher.make_up()
         now = time.monotonic()
         if now >= self._next_diagnostics:
             self._next_diagnostics = now + DIAGNOSTICS_PERIOD

@@ -34,6 +34,14 @@ def unacknowledged(topic: Topic, depth: int = 1) -> Topic:
     return replace(topic, qos=qos)
 
 
+def _for_display(node: Node, below: str, topic: Topic) -> Topic:
+    """A topic below a namespace, throttled unless its publisher has it in full alone."""
+    full = replace(topic, name=f"{below}/{topic.name}")
+    throttled = full.throttled
+    has_full_alone = node.count_publishers(full.name) and not node.count_publishers(throttled.name)
+    return full if has_full_alone else throttled
+
+
 class _Newest:
     """The newest message of a topic that is of one simulator."""
 
@@ -73,10 +81,11 @@ class CharacterReader:
         """Subscribe to the topics below a namespace, which begins with `/` or is empty."""
         self.sample = CharacterSample()
         self._layout = layout
-        self._decoder = JointStateDecoder()
+        # one each: a decoder is fast for messages of one form, and a reference has no efforts
+        self._state_decoder, self._reference_decoder = JointStateDecoder(), JointStateDecoder()
 
         def newest(topic: Topic) -> _Newest:
-            return _Newest(node, replace(topic, name=f"{below}/{topic.name}"), session)
+            return _Newest(node, _for_display(node, below, topic), session)
 
         self._states = newest(topics.JOINT_STATES)
         self._reference = newest(topics.REFERENCE.of(topics.CONTROLLER_NODE))
@@ -92,11 +101,11 @@ class CharacterReader:
             if (raw := self._pushes.take()) is not None:
                 sample.pushes = decode_wrenches(raw)
             if (raw := self._reference.take()) is not None:
-                arrays = self._decoder.decode(raw)
+                arrays = self._reference_decoder.decode(raw)
                 sample.reference = state_in_layout(self._layout, arrays).position
             if (raw := self._states.take()) is None:
                 return False
-            sample.state = state_in_layout(self._layout, self._decoder.decode(raw))
+            sample.state = state_in_layout(self._layout, self._state_decoder.decode(raw))
         except _UNUSABLE:
             return False  # of a node that is not ours; those that use it say so
         return True
@@ -112,9 +121,8 @@ class BallReader:
 
     def __init__(self, node: Node, below: str, session: str) -> None:
         """Subscribe to the topics below a simulator's namespace."""
-        thrown = replace(topics.THROWN, name=f"{below}/{topics.THROWN.name}")
         applied = replace(topics.APPLIED_THROW, name=f"{below}/{topics.APPLIED_THROW.name}")
-        self._balls = _Newest(node, thrown, session)
+        self._balls = _Newest(node, _for_display(node, below, topics.THROWN), session)
         self._throws = DirectSubscription(node, unacknowledged(applied, _THROWS))
         self._codec = ThrowCodec()
 

@@ -2,6 +2,7 @@
 
 import time
 from collections import deque
+from collections.abc import Mapping
 from queue import SimpleQueue
 from typing import Any
 
@@ -9,6 +10,7 @@ from rclpy.node import Node
 
 from actuated_characters.viewer.controls.hands import Action, Hands
 from actuated_characters.viewer.controls.panel import Panel, Subject
+from actuated_characters.viewer.controls.shown_parameters import Shown, shown_parameters
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
 from actuated_characters.viewer.parameters import PARAMETERS
@@ -60,6 +62,7 @@ class ViewerNode(Node):
         self._panel = Panel(self, self._server.gui, self._scene, self._hands, self._actions)
         self._simulators = Simulators(self, self.get_namespace().rstrip("/"), self._log)
         self._drawn: dict[str, LiveCharacter] = {}
+        self._parameters: dict[str, Mapping[str, tuple[Shown, ...]]] = {}
         self._balls: dict[str, DrawnBalls] = {}
         self._announce(host, listening.getsockname()[1])
 
@@ -71,12 +74,11 @@ class ViewerNode(Node):
 
     def run(self, stop: StopSignal) -> None:
         """Draw until `stop`."""
-        executor = PollingExecutor(self)
+        executor = PollingExecutor(self, service_period=_IDLE_PERIOD)
         next_search = before = 0.0
         try:
             while not stop:
                 now = time.monotonic()
-                executor.serve_pending()
                 if now >= next_search:
                     found = bool(self._simulators.characters)
                     next_search = now + (_SEARCH_PERIOD if found else _FIRST_SEARCH_PERIOD)
@@ -84,6 +86,7 @@ class ViewerNode(Node):
                 is_watched = bool(self._server.get_clients())
                 self._update(is_watched=is_watched, seconds=now - before)
                 before = now
+                executor.serve()  # now that no message waits to be drawn, which it would take first
                 rest = (self._period if is_watched else _IDLE_PERIOD) - (time.monotonic() - now)
                 time.sleep(max(rest, _LEAST_REST))
         finally:
@@ -136,6 +139,7 @@ class ViewerNode(Node):
                 each.simulator,
                 each.below,
                 each.readers_session,
+                self._parameters[each.below],
             )
             for each in self._simulators.characters
             if each.below in self._drawn and each.reader is not None
@@ -162,6 +166,7 @@ class ViewerNode(Node):
         name = f"{WORLD}/characters{below}/{_LEAF}"
         bind = self._hands.bind(below, lambda: self._drawn.get(below))
         self._hands.open_topics(below, watched.simulator)
+        self._parameters[below] = shown_parameters(rebuilt.character)
         try:
             with self._server.atomic():
                 self._drawn[below] = LiveCharacter(self._scene.api, name, rebuilt, bind)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
@@ -26,6 +27,7 @@ from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.topics import Outgoing
+from msgs_config.runtime.throttle import Throttle
 
 
 class Reply(NamedTuple):
@@ -55,6 +57,8 @@ class Publishers:
         self._wrench_encoder = DoublesEncoder(WORLD)
         self._initial_states = topics.create_publisher(node, topics.INITIAL_STATE)
         self._references = topics.create_publisher(node, topics.REFERENCE)
+        self._throttled_references = topics.create_publisher(node, topics.REFERENCE_THROTTLE)
+        self._throttle = Throttle()
         self._wrenches = topics.create_publisher(node, topics.NET_WRENCH)
         self._torques = topics.create_publisher(node, topics.JOINT_TORQUES)
         self._configurations = topics.create_publisher(node, topics.CONFIGURATION)
@@ -98,18 +102,23 @@ class Publishers:
         topics.publish_together([(self._torques, reply.torques)])
         topics.publish_together(self._beside_torques(reply))
 
+    def make_up(self, reply: Reply | None) -> None:
+        """Publish the last reply's reference on the throttled topic, too, if no other follows."""
+        if reply is not None and self._throttle.makes_up():
+            topics.publish_together(self._reference(self._throttled_references, reply.reference))
+
     def _beside_torques(self, reply: Reply) -> Iterator[Outgoing]:
         """The messages that the simulator does not wait for, where there are subscribers."""
-        if topics.has_subscribers(self._references):
-            reference = reply.reference
-            yield (
-                self._references,
-                self._reference_encoder.encode(
-                    reference.stamp_ns, reference.position, reference.velocity
-                ),
-            )
+        yield from self._reference(self._references, reply.reference)
+        if self._throttle.chooses():
+            yield from self._reference(self._throttled_references, reply.reference)
         if topics.has_subscribers(self._wrenches):
             yield self._wrenches, self._net_wrench(reply)
+
+    def _reference(self, publisher: Publisher, reference: StampedReference) -> Iterator[Outgoing]:
+        if topics.has_subscribers(publisher):
+            arrays = reference.position, reference.velocity
+            yield publisher, self._reference_encoder.encode(reference.stamp_ns, *arrays)
 
     def flush(self, seconds: float) -> None:
         """Wait until every subscriber has what was published, at the most `seconds`."""

@@ -70,6 +70,11 @@ class Topic:
         """The topic as another node names it: `~` is the node that publishes it."""
         return replace(self, name=self.name.replace("~", node_name))
 
+    @property
+    def throttled(self) -> "Topic":
+        """The topic with some of its messages, a few a second of wall time, for viewers."""
+        return replace(self, name=f"{self.name}_throttle", qos=DISPLAY_QOS)
+
     def under(self, namespace: str) -> "Topic":
         """The topic below a namespace; with an empty one it is the topic itself."""
         return replace(self, name=f"{namespace}/{self.name}") if namespace else self
@@ -142,6 +147,11 @@ CLOCK = Topic("/clock", Clock, STREAM_QOS)
 EPISODE = Topic("episode", Header, LATCHED_QOS)
 CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS)
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, STREAM_QOS)
+JOINT_STATES_THROTTLE = JOINT_STATES.throttled
+CONTACTS_THROTTLE = CONTACTS.throttled
+APPLIED_WRENCH_THROTTLE = APPLIED_WRENCH.throttled
+THROWN_THROTTLE = THROWN.throttled
+REFERENCE_THROTTLE = REFERENCE.throttled
 TRANSFORMS = (
     []
     if TFMessage is None

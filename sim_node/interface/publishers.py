@@ -48,6 +48,9 @@ class Publishers:
         self._states = create(topics.JOINT_STATES)
         self._contacts = create(topics.CONTACTS)
         self._wrenches = create(topics.APPLIED_WRENCH)
+        self._throttled_states = create(topics.JOINT_STATES_THROTTLE)
+        self._throttled_contacts = create(topics.CONTACTS_THROTTLE)
+        self._throttled_wrenches = create(topics.APPLIED_WRENCH_THROTTLE)
         self._sensors = SensorPublishers(node, character, settings)
         self._display = DisplayPublishers(node, character, settings)
 
@@ -62,13 +65,16 @@ class Publishers:
         """Number of subscribers of the states."""
         return int(self._states.get_subscription_count())
 
-    @property
-    def wants_contacts(self) -> bool:
-        """Whether the contacts have subscribers, their wrenches for viewers, or force sensors."""
+    def wants_contacts(self, *, throttled: bool) -> bool:
+        """Whether the contacts have subscribers, their wrenches for viewers, or force sensors.
+
+        Subscribers of the `throttled` ones count where the tick is one of theirs.
+        """
         return (
             topics.has_subscribers(self._contacts)
             or self._display.wants_contacts
             or self._sensors.wants_contacts
+            or (throttled and topics.has_subscribers(self._throttled_contacts))
         )
 
     def publish_configuration(
@@ -119,6 +125,17 @@ class Publishers:
         )
         return self._states, self._last_state
 
+    def throttled(self) -> Iterator[Outgoing]:
+        """The messages of the tick for those who do not need each one, the state last."""
+        if self._character.contacts is not None and topics.has_subscribers(
+            self._throttled_contacts
+        ):
+            yield self._throttled_contacts, self._encode_contacts()
+        if topics.has_subscribers(self._throttled_wrenches):
+            yield self._throttled_wrenches, self._encode_applied()
+        if topics.has_subscribers(self._throttled_states):
+            yield self._throttled_states, self._last_state
+
     def publish_display(self, tick: int) -> None:
         """Publish what shows a tick's state, while the controller works on that state."""
         self._display.publish(tick)
@@ -143,6 +160,7 @@ class Publishers:
         """The publishers of what comes again at each tick."""
         return [
             *(self._states, self._contacts, self._wrenches),
+            *(self._throttled_states, self._throttled_contacts, self._throttled_wrenches),
             *(*self._sensors.publishers, *self._display.streams),
         ]
 

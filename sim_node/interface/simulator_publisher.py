@@ -9,6 +9,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.topics import Outgoing
+from msgs_config.runtime.throttle import Throttle
 from sim_node.interface.publishers import Publishers
 from sim_node.interface.world_interface import WorldInterface
 from sim_node.parameters import SimulatorParameters
@@ -30,6 +31,8 @@ class SimulatorPublisher:
         self._world = world
         self.of_characters = of_characters
         self._clock_topic = topics.create_publisher(node, topics.CLOCK)
+        self._throttle = Throttle()
+        self._is_chosen = True  # whether the tick is published on the throttled topics
 
     def publish_configurations(
         self, parameters: SimulatorParameters, samples: Sequence[DynamicsSample]
@@ -50,12 +53,29 @@ class SimulatorPublisher:
         """Publish the present states again, for late subscribers, or the episode."""
         for each in self.of_characters:
             each.republish(with_state=with_states, with_episode=with_episode)
+        self._publish_throttled()
+
+    def wants_contacts(self) -> bool:
+        """Whether the contacts of the tick that begins now have to be found."""
+        self._is_chosen = self._throttle.chooses()
+        return any(each.wants_contacts(throttled=self._is_chosen) for each in self.of_characters)
 
     def publish_tick(self) -> None:
         """Publish the present tick; what is only displayed comes after the states."""
         topics.publish_together(self._messages())
         for each in self.of_characters:
             each.publish_display(self._simulation.tick)
+        if self._is_chosen:
+            self._publish_throttled()
+
+    def make_up(self) -> None:
+        """Publish the last tick on the throttled topics, too, where no other follows it."""
+        if self._throttle.makes_up():
+            self._publish_throttled()
+
+    def _publish_throttled(self) -> None:
+        own = chain.from_iterable(each.throttled() for each in self.of_characters)
+        topics.publish_together(chain(self._world.throttled(), own))
 
     def is_acknowledged(self, seconds: float) -> bool:
         """Wait at most `seconds` until every subscriber has the last tick; whether it has."""

@@ -32,7 +32,8 @@ class WorldInterface:
         )
         self._applied = topics.create_publisher(node, topics.APPLIED_THROW)
         self._thrown = topics.create_publisher(node, topics.THROWN)
-        self.publishers = (self._applied, self._thrown)
+        self._throttled = topics.create_publisher(node, topics.THROWN_THROTTLE)
+        self.publishers = (self._applied, self._thrown, self._throttled)
 
     def take_throws(self) -> list[ProjectileThrow]:
         """The throws that begin with the present state, with those just sent."""
@@ -54,9 +55,12 @@ class WorldInterface:
             for throw in simulation.throws:
                 yield self._applied, self._codec.encode(simulation.stamp_ns, throw)
         if topics.has_subscribers(self._thrown):
-            names = ball_names(len(simulation.balls))
-            balls = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
-            yield self._thrown, encode_balls(balls, self._own_session.session)
+            yield self._thrown, self._encode_balls()
+
+    def throttled(self) -> Iterator[Outgoing]:
+        """Where the balls are, if there are any, for those who do not need each tick's."""
+        if self._simulation.balls and topics.has_subscribers(self._throttled):
+            yield self._throttled, self._encode_balls()
 
     def report(self) -> dict[str, object]:
         """Diagnostics: counts of throws."""
@@ -65,6 +69,12 @@ class WorldInterface:
             "rejected_throws": self._messages.rejected,
             "foreign_throws": self._own_session.counts[topics.THROW.name],
         }
+
+    def _encode_balls(self) -> bytes:
+        simulation = self._simulation
+        names = ball_names(len(simulation.balls))
+        balls = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
+        return encode_balls(balls, self._own_session.session)
 
     def _add_throw(self, raw: bytes) -> None:
         stamp_ns, throw = self._codec.decode(raw)

@@ -1,7 +1,8 @@
 """The panel beside the scene: the run, what is shown, touch, and the controller's parameters."""
 
+import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
@@ -14,6 +15,7 @@ from actuated_characters.viewer.controls.hands import Action, Hands
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.controls.parameter_controls import ParameterControls
 from actuated_characters.viewer.controls.requests import Requests
+from actuated_characters.viewer.controls.shown_parameters import CONTROLLER, SIMULATOR, Shown
 from actuated_characters.viewer.drawing.drawn_character import SHOWN
 from actuated_characters.viewer.drawing.scene import BrowserScene
 from msgs_config.messages import topics
@@ -21,6 +23,7 @@ from msgs_config.messages import topics
 _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 1.0, "2": 2.0}
 _PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
 _HELP = "Drag a body to push it. Shift and click throws a ball at it."
+_TEXT_PERIOD = 0.2  # s between texts: the page lays each out
 _ALONE = "alone"  # the character of a simulator that has one, without a name
 
 
@@ -32,6 +35,8 @@ class Subject:
     simulator: str  # namespace, which begins with `/` or is empty
     below: str  # its own namespace, likewise
     session: str
+    parameters: Mapping[str, tuple[Shown, ...]] = field(default_factory=dict, compare=False)
+    """That the panel has of its nodes, by the titles of folders."""
 
 
 class Panel:
@@ -49,6 +54,7 @@ class Panel:
         self.requests = Requests(node)
         self.shows = dict.fromkeys(SHOWN, True)
         self._subject = Subject("", "", "", "")
+        self._next_text = 0.0
         self._names: tuple[str, ...] = ()
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
@@ -120,9 +126,11 @@ class Panel:
             self._subject = chosen
             node = f"{chosen.simulator}/{topics.SIM_NODE}"
             self.requests.get(node, ["real_time_factor", "wrench_duration"], self._take_settings)
-            self._controls.choose(f"{chosen.below}/{topics.CONTROLLER_NODE}")
-        stamp_ns = stamps_ns.get(chosen.below)
-        if stamp_ns is not None:
+            controller = f"{chosen.below}/{topics.CONTROLLER_NODE}"
+            self._controls.choose({SIMULATOR: node, CONTROLLER: controller}, chosen.parameters)
+        stamp_ns, now = stamps_ns.get(chosen.below), time.monotonic()
+        if stamp_ns is not None and now >= self._next_text:
+            self._next_text = now + _TEXT_PERIOD
             text = f"**{as_text(chosen.character)}**  \n{1e-9 * stamp_ns:.2f} s"
             if self._state.content != text:
                 self._state.content = text

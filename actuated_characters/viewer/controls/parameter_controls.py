@@ -1,63 +1,101 @@
-"""Controls of a few of a controller's parameters, of those that it has."""
+"""Controls of parameters of a character's nodes, of those that the nodes have."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
 import viser
 
 from actuated_characters.viewer.controls.requests import Requests
-from controller_node.control_laws import LAWS
-
-_LAW, _BALANCE = "law", "balance.enabled"
-_SLIDERS = {  # label, least, most, step
-    "gain_scale.p": ("Stiffness ×", 0.0, 3.0, 0.05),
-    "gain_scale.d": ("Damping ×", 0.0, 3.0, 0.05),
-    "balance.stiffness": ("Balance (N/m)", 0.0, 5000.0, 50.0),
-    "balance.damping": ("Balance (N s/m)", 0.0, 1000.0, 10.0),
-}
+from actuated_characters.viewer.controls.shown_parameters import AT_RESET, Shown
 
 Later = Callable[[Callable[..., None], Callable[[], Any]], Callable[..., Any]]
 
 
 class ParameterControls:
-    """A folder of controls, each of one live parameter; hidden where the node has none."""
+    """Folders of controls, each of one parameter; hidden where the node has none."""
 
     def __init__(
         self, gui: viser.GuiApi, requests: Requests, later: Later, tell: Callable[[str], None]
     ) -> None:
-        self._requests, self._tell = requests, tell
-        self._node = ""
-        self._handles: dict[str, Any] = {}
-        self._folder = gui.add_folder("Controller", visible=False)
-        with self._folder:
-            self._handles[_LAW] = gui.add_dropdown("Law", tuple(LAWS))
-            for name, (label, least, most, step) in _SLIDERS.items():
-                if name == "balance.stiffness":
-                    self._handles[_BALANCE] = gui.add_checkbox("Balance", initial_value=False)
-                self._handles[name] = gui.add_slider(label, least, most, step, initial_value=least)
-        for name, handle in self._handles.items():
-            handle.on_update(later(partial(self._set, name), partial(getattr, handle, "value")))
+        self._gui, self._requests, self._later, self._tell = gui, requests, later, tell
+        self._nodes: dict[str, str] = {}  # whole names by those in the contract
+        self._shown: Mapping[str, tuple[Shown, ...]] = {}
+        self._folders: dict[str, Any] = {}
+        self._controls: dict[str, tuple[Shown, Any]] = {}  # by the parameter's name
 
-    def choose(self, node: str) -> None:
-        """Be about a controller's node from now on."""
-        self._node = node
-        self._requests.get(node, list(self._handles), self._take)
+    def choose(self, nodes: dict[str, str], shown: Mapping[str, tuple[Shown, ...]]) -> None:
+        """Be about some nodes from now on, and about the parameters of each folder's title."""
+        self._nodes = nodes
+        if shown != self._shown:
+            self._shown = shown
+            self._build()
+        self._ask(self._controls)
+
+    def _build(self) -> None:
+        for folder in self._folders.values():
+            folder.remove()
+        self._folders, self._controls = {}, {}
+        for title, parameters in self._shown.items():
+            folder = self._gui.add_folder(title, visible=False, expand_by_default=not self._folders)
+            self._folders[title] = folder
+            with folder:
+                for shown in parameters:
+                    handle = self._add(shown)
+                    handle.on_update(
+                        self._later(partial(self._set, shown), partial(getattr, handle, "value"))
+                    )
+                    self._controls[shown.name] = shown, handle
+
+    def _add(self, shown: Shown) -> Any:
+        if shown.options:
+            return self._gui.add_dropdown(shown.label, shown.options, visible=False)
+        if shown.range is None:
+            return self._gui.add_checkbox(shown.label, initial_value=False, visible=False)
+        return self._gui.add_slider(
+            shown.label, *shown.range, initial_value=shown.range[0], visible=False
+        )
+
+    def _ask(self, names: Iterable[str]) -> None:
+        """Ask the nodes for the values in force of parameters."""
+        for node, whole in self._nodes.items():
+            own = [name for name in names if self._controls[name][0].nodes[0] == node]
+            if own:
+                self._requests.get(whole, own, self._take)
 
     def _take(self, values: dict[str, object]) -> None:
-        """Show the values of the parameters that the node has."""
-        self._folder.visible = bool(values)
-        for name, handle in self._handles.items():
-            handle.visible = name in values
-            if name in values and handle.value != values[name]:
-                handle.value = values[name]
+        """Show the values of the parameters that a node has."""
+        for name, value in values.items():
+            shown, handle = self._controls.get(name, (None, None))
+            if shown is not None:
+                self._show(shown, handle, value)
+        for title, parameters in self._shown.items():
+            self._folders[title].visible = any(
+                self._controls[shown.name][1].visible for shown in parameters
+            )
 
-    def _set(self, name: str, value: object) -> None:
-        self._requests.set(self._node, name, value, partial(self._told, name, value))
+    @staticmethod
+    def _show(shown: Shown, handle: Any, value: Any) -> None:
+        handle.visible = True
+        if shown.options and value not in handle.options:
+            handle.options = (*shown.options, value)
+        if shown.range is not None:
+            value = min(max(value, shown.range[0]), shown.range[1])
+        if handle.value != value:
+            handle.value = value
 
-    def _told(self, name: str, value: object, reason: str) -> None:
-        """Say what the node has said; where it has rejected a value, show the one in force."""
-        shown = f"{value:g}" if isinstance(value, float) else str(value)
-        self._tell(f"{name} {shown}: {reason or 'set'}")
+    def _set(self, shown: Shown, value: Any) -> None:
+        if shown.has_no_limit and shown.range is not None and value >= shown.range[1]:
+            value = math.inf
+        for node in shown.nodes:
+            told = partial(self._told, shown, value, node)
+            self._requests.set(self._nodes[node], shown.name, value, told)
+
+    def _told(self, shown: Shown, value: object, node: str, reason: str) -> None:
+        """Say what a node has said; where it has rejected a value, show the one in force."""
+        given = f"{value:g}" if isinstance(value, float) else str(value)
+        waits = shown in self._shown.get(AT_RESET, ())
+        self._tell(f"{shown.name} {given}: {reason or ('at the next reset' if waits else 'set')}")
         if reason:
-            self._requests.get(self._node, list(self._handles), self._take)
+            self._ask([shown.name])

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from rcl_interfaces.srv import GetParameters, SetParameters
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
 
-_PATIENCE = 5.0  # s
+_PATIENCE = 10.0  # s
 _NO_RESPONSE = "it does not respond"
 
 Respond = Callable[[Any | None], None]
@@ -50,22 +50,24 @@ class Requests:
     ) -> None:
         """Ask a node for parameters; `take` is given those that it has.
 
-        One by one: a node that lacks one of several says nothing of the others.
+        Of which it has any is asked first: a node that lacks one of several says nothing of others.
         """
-        found: dict[str, object] = {}
-        missing = set(names)
 
-        def respond(name: str, response: Any | None) -> None:
-            missing.discard(name)
-            for value in [] if response is None else response.values:
-                if (known := parameter_value_to_python(value)) is not None:
-                    found[name] = known
-            if not missing:
-                take(found)
+        def respond(known: Sequence[str], response: Any | None) -> None:
+            values = [] if response is None else response.values
+            pairs = zip(known, map(parameter_value_to_python, values), strict=False)
+            take({name: value for name, value in pairs if value is not None})
 
-        for name in names:
-            request = GetParameters.Request(names=[name])
-            self.call(GetParameters, f"{node}/get_parameters", request, partial(respond, name))
+        def ask(response: Any | None) -> None:
+            has = set() if response is None else set(response.result.names)
+            known = [name for name in names if name in has]
+            if not known:
+                take({})
+                return
+            request = GetParameters.Request(names=known)
+            self.call(GetParameters, f"{node}/get_parameters", request, partial(respond, known))
+
+        self.call(ListParameters, f"{node}/list_parameters", ListParameters.Request(), ask)
 
     def set(self, node: str, name: str, value: object, tell: Callable[[str], None]) -> None:
         """Set a parameter, of several values in a row the last; `tell` gets the node's reason.

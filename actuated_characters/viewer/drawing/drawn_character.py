@@ -9,6 +9,7 @@ import viser
 from actuated_characters.render.engine.camera_pose import Spheres
 from actuated_characters.render.engine.shape_meshes import triangles_of
 from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
+from actuated_characters.viewer.drawing.scene_poses import set_poses
 from actuated_characters.viewer.drawing.support import support_polygon
 from actuated_characters.viewer.latest import CharacterSample
 from msgs_config.arrays import FloatArray
@@ -143,11 +144,11 @@ class DrawnCharacter:
             return
         shown = sample.reference if self.shows["reference"] else None
         if shown is not None:
-            self._place(self._ghost_frames, *self._poses(shown))
+            set_poses(self._ghost_frames, *self._poses(shown))
         for frame in self._ghost_frames:
             frame.visible = shown is not None
         self.origins, self.turns_xyzw = self._poses(sample.state.position)
-        self._place(self._frames, self.origins, self.turns_xyzw)
+        set_poses(self._frames, self.origins, self.turns_xyzw)
         self._color(sample.state.effort)
         self._draw_balance(sample.contacts)
         self._draw_arrows("contacts", sample.contacts)
@@ -156,13 +157,6 @@ class DrawnCharacter:
     def _poses(self, position: FloatArray) -> tuple[FloatArray, FloatArray]:
         self._model.update(position, np.zeros_like(position))
         return self._model.link_poses()
-
-    @staticmethod
-    def _place(
-        frames: Sequence[viser.FrameHandle], origins: FloatArray, turns_xyzw: FloatArray
-    ) -> None:
-        for frame, origin, turn in zip(frames, origins, turns_xyzw, strict=True):
-            frame.position, frame.wxyz = origin, _wxyz(turn)
 
     def _color(self, effort: FloatArray | None) -> None:
         """Colour each link by the share of its joint's limit that the effort has."""

@@ -1,0 +1,63 @@
+"""Which parameters of the nodes the panel has, and as what it shows them."""
+
+from dataclasses import dataclass
+
+from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS
+from controller_node.control_laws import LAWS
+from controller_node.references.files.clip import available_clips
+from msgs_config.character.layout import ROOT
+from msgs_config.character.model import ROOT_TORQUE, Character
+from msgs_config.messages import topics
+
+SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
+
+AT_RESET = "At the next reset"
+
+_FORCE, _TORQUE = f"effort_limit.{ROOT}", f"effort_limit.{ROOT_TORQUE}"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A parameter as a menu of its options, a slider, or (with neither) a checkbox."""
+
+    name: str
+    label: str
+    options: tuple[str, ...] = ()
+    range: tuple[float, float, float] | None = None  # least, most, step
+    has_no_limit: bool = False  # the slider's largest value stands for infinity
+    nodes: tuple[str, ...] = (CONTROLLER,)  # that have it; the first one's value is shown
+
+
+_LAW = (
+    Shown("law", "Law", options=tuple(LAWS)),
+    Shown("gain_scale.p", "Stiffness ×", range=(0.0, 3.0, 0.05)),
+    Shown("gain_scale.d", "Damping ×", range=(0.0, 3.0, 0.05)),
+    Shown(f"effort_limit.{ROOT}", "Root force (N)", range=(0.0, 2000.0, 10.0), has_no_limit=True),
+    Shown(
+        f"effort_limit.{ROOT_TORQUE}",
+        "Root torque (N m)",
+        range=(0.0, 1000.0, 5.0),
+        has_no_limit=True,
+    ),
+    Shown("balance.enabled", "Balance"),
+    Shown("balance.stiffness", "Balance (N/m)", range=(0.0, 5000.0, 50.0)),
+    Shown("balance.damping", "Balance (N s/m)", range=(0.0, 1000.0, 10.0)),
+)
+_WORLD = (
+    Shown("gravity", "Gravity (m/s²)", range=(0.0, 20.0, 0.01), nodes=(SIMULATOR, CONTROLLER)),
+    Shown("friction", "Friction, ground", range=(0.0, 2.0, 0.05), nodes=(SIMULATOR,)),
+    Shown("link_friction", "Friction, links", range=(0.0, 2.0, 0.05), nodes=(SIMULATOR,)),
+)
+
+
+def shown_parameters(character: Character) -> dict[str, tuple[Shown, ...]]:
+    """Those of a character's nodes, by the titles of the panel's folders."""
+    motion = [Shown("behaviour", "Behaviour", options=BEHAVIOUR_PARAMETERS[0].choices)]
+    if clips := available_clips(character):
+        motion.insert(0, Shown("clip", "Clip", options=tuple(clips)))
+    strengths = tuple(
+        Shown(f"strength.{name}", name, range=(0.0, 1.0, 0.05))
+        for name in character.vector_names
+        if name not in (ROOT, ROOT_TORQUE)
+    )
+    return {"Controller": _LAW, "Strengths": strengths, AT_RESET: (*motion, *_WORLD)}
