@@ -134,6 +134,30 @@ class Browser:
         self.mouse("mouseMoved", x, y, keys=keys)
         self.mouse("mousePressed", x, y, pressed=True, keys=keys)
 
+    def key(self, name: str, *, repeated: bool = False, keys: int = 0) -> None:
+        """A key goes down, ArrowUp for instance, or is repeated by the system."""
+        self._key("rawKeyDown", name, autoRepeat=repeated, modifiers=keys)
+
+    def release(self, name: str, *, keys: int = 0) -> None:
+        """A key goes up."""
+        self._key("keyUp", name, modifiers=keys)
+
+    def _key(self, kind: str, name: str, **given: object) -> None:
+        key = " " if name == "Space" else name
+        self.call("Input.dispatchKeyEvent", type=kind, key=key, code=name, **given)
+
+    def place(self, label: str) -> tuple[float, float] | None:
+        """The pixel (x, y) in the middle of the button with a label, brought into view; if any."""
+        found = self.evaluate(f"""(() => {{
+            const found = [...document.querySelectorAll("button")].find(
+                each => each.innerText.trim() === {json.dumps(label)});
+            if (!found) return null;
+            found.scrollIntoView({{block: "center"}});
+            const box = found.getBoundingClientRect();
+            return [box.x + box.width / 2, box.y + box.height / 2];
+        }})()""")
+        return None if found is None else (found[0], found[1])
+
     def click(self, label: str) -> bool:
         """Click on the button with a label; whether there is one."""
         expression = f"""(() => {{

@@ -11,6 +11,7 @@ import viser
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
+from actuated_characters.viewer.controls.drive import Drive
 from actuated_characters.viewer.controls.hands import Action, Hands
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.controls.parameter_controls import ParameterControls
@@ -62,6 +63,7 @@ class Panel:
         self._which: Any = gui.add_dropdown("Character", (_ALONE,), visible=False)
         self._add_run()
         self._told = gui.add_markdown(_HELP)
+        self._drive = Drive(node, gui, actions)
         self._add_touch()
         self._add_shown()
         self._controls = ParameterControls(gui, self.requests, self._later, self.tell)
@@ -128,6 +130,7 @@ class Panel:
             self.requests.get(node, ["real_time_factor", "wrench_duration"], self._take_settings)
             controller = f"{chosen.below}/{topics.CONTROLLER_NODE}"
             self._controls.choose({SIMULATOR: node, CONTROLLER: controller}, chosen.parameters)
+        self._drive.update(chosen.below)
         stamp_ns, now = stamps_ns.get(chosen.below), time.monotonic()
         if stamp_ns is not None and now >= self._next_text:
             self._next_text = now + _TEXT_PERIOD

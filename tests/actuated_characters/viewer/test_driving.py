@@ -1,0 +1,206 @@
+"""Driving from a real browser: what its keys and its button do to a character that is steered."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from actuated_characters.bags.recording import read_recording
+from actuated_characters.replay.replay import replay
+from actuated_characters.replay.through_topics import replay_states
+from actuated_characters.viewer.web.server import open_socket
+from msgs_config.messages import topics
+from tests.support.browser import SHIFT, Browser, needs_chromium, one_browser
+from tests.support.physics import character
+from tests.support.ros import Processes, ReceivedMessages, SimulatorClient, wait_until
+from tests.support.runs import Run
+
+pytestmark = [pytest.mark.slow, pytest.mark.sharing, needs_chromium]
+
+SOON = 60.0  # s
+BUTTON = "Hold to drive"
+STEERED = {"reference": "steered", "root_assistance": True}
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Browser]:
+    with one_browser(tmp_path) as browser:
+        yield browser
+
+
+@pytest.fixture
+def velocities(client: SimulatorClient) -> ReceivedMessages:
+    return client.listen(topics.ACTIVE_CMD_VEL.of(topics.CONTROLLER_NODE))
+
+
+@pytest.fixture
+def reference(client: SimulatorClient) -> ReceivedMessages:
+    return client.listen(topics.REFERENCE.of(topics.CONTROLLER_NODE))
+
+
+def start(processes: Processes, **controller: object) -> None:
+    """A character in real time."""
+    joints = character("humanoid").layout.joint_names  # with the root
+    simulator = {"real_time_factor": 1.0, "commanded_joints": joints}
+    processes.composed(simulator, controller, character="humanoid")
+
+
+def open_page(processes: Processes, browser: Browser) -> None:
+    viewer = processes.node(topics.VIEWER_NODE, fresh=True)
+    browser.open(str(wait_until(lambda: viewer.stdout.strip(), "the viewer's address")))
+
+
+def shows_drive(browser: Browser) -> bool:
+    return browser.place(BUTTON) is not None
+
+
+class HeldKey:
+    """A key that is down, and repeated as a system does."""
+
+    def __init__(self, browser: Browser, name: str, keys: int = 0) -> None:
+        self._browser, self._name, self._keys = browser, name, keys
+        self._next = time.monotonic() + 0.4  # s
+        browser.key(name, keys=keys)
+
+    def until(self, client: SimulatorClient, condition: Callable[[], object], what: str) -> None:
+        """Hold it until a condition holds."""
+
+        def step() -> object:
+            self.repeat()
+            return condition()
+
+        client.spin_until(step, what, SOON)
+
+    def repeat(self) -> None:
+        """Repeat it if its time has come."""
+        if time.monotonic() >= self._next:
+            self._browser.key(self._name, repeated=True, keys=self._keys)
+            self._next = time.monotonic() + 0.03
+
+    def release(self) -> None:
+        self._browser.release(self._name, keys=self._keys)
+
+
+def last(velocities: ReceivedMessages) -> tuple[float, float, float]:
+    twist = velocities.last.twist
+    return twist.linear.x, twist.linear.y, twist.angular.z
+
+
+def seen(velocities: ReceivedMessages) -> set[tuple[float, float, float]]:
+    """All of them: on a busy machine repeats come late, and a held key has gaps."""
+    twists = [message.twist for message in velocities.messages]
+    return {(twist.linear.x, twist.linear.y, twist.angular.z) for twist in twists}
+
+
+def root(reference: ReceivedMessages, name: str) -> float:
+    message = reference.last
+    return float(message.position[list(message.name).index(name)])
+
+
+def test_keys_walk_run_turn_and_stop_when_they_are_let_go(
+    processes: Processes,
+    browser: Browser,
+    client: SimulatorClient,
+    velocities: ReceivedMessages,
+    reference: ReceivedMessages,
+) -> None:
+    start(processes, **STEERED)
+    open_page(processes, browser)
+    wait_until(lambda: shows_drive(browser), "the section Drive", SOON)
+    client.spin_until(lambda: reference.messages, "a reference")
+    assert not velocities.messages  # nobody has driven
+
+    up = HeldKey(browser, "ArrowUp")
+    up.until(client, lambda: root(reference, "root_x") > 0.5, "it walks ahead")
+    assert seen(velocities) <= {(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)}
+    assert abs(root(reference, "root_y")) < 0.1
+    left = HeldKey(browser, "ArrowLeft")  # the system repeats this one alone
+    left.until(client, lambda: root(reference, "root_rz") > 0.8, "it turns left")
+    assert (1.0, 0.0, 0.8) in seen(velocities)
+    left.release()
+    up.release()
+    client.spin_until(lambda: last(velocities) == (0.0, 0.0, 0.0), "it stops", SOON)
+
+    right = HeldKey(browser, "ArrowRight", SHIFT)
+    right.until(client, lambda: (0.0, 0.0, -0.8) in seen(velocities), "right")
+    right.release()
+    run = HeldKey(browser, "ArrowUp", SHIFT)
+    run.until(client, lambda: (2.2, 0.0, 0.0) in seen(velocities), "it runs")
+    browser.key("Space")
+    client.spin_until(lambda: last(velocities) == (0.0, 0.0, 0.0), "space stops it", SOON)
+
+
+def test_the_button_drives_at_the_sliders_velocities_until_it_is_let_go_or_the_browser_dies(
+    processes: Processes,
+    browser: Browser,
+    client: SimulatorClient,
+    velocities: ReceivedMessages,
+) -> None:
+    start(processes, **STEERED)
+    open_page(processes, browser)
+    wait_until(lambda: shows_drive(browser), "the section Drive", SOON)
+    published = client.listen(topics.CMD_VEL)
+
+    def hold() -> tuple[float, float]:
+        place, before = browser.place(BUTTON), len(published.messages)
+        assert place is not None
+        browser.press(*place)
+        client.spin_until(lambda: len(published.messages) > before + 10, "velocities", SOON)
+        assert seen(velocities) <= {(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)}
+        return place
+
+    browser.mouse("mouseReleased", *hold())
+    client.spin_until(lambda: last(velocities) == (0.0, 0.0, 0.0), "it stops", SOON)
+    hold()
+    browser.kill()
+    client.spin_until(lambda: last(velocities) == (0.0, 0.0, 0.0), "it stops", SOON)
+
+
+def test_a_character_that_follows_a_clip_cannot_be_driven(
+    processes: Processes, browser: Browser, client: SimulatorClient, reference: ReceivedMessages
+) -> None:
+    start(processes, reference="clip", clip="walk", root_assistance=True)
+    published = client.listen(topics.CMD_VEL)
+    open_page(processes, browser)
+    wait_until(lambda: browser.place("Pause") is not None, "the panel", SOON)
+    wait_until(lambda: "humanoid" in browser.evaluate("document.body.innerText"), "it", SOON)
+
+    ticks = len(reference.messages)
+    client.spin_until(lambda: len(reference.messages) > ticks + 2 * 240, "two seconds", SOON)
+    assert not shows_drive(browser)
+    assert not published.messages
+
+
+def test_a_driven_run_is_replayed_to_the_bit(
+    processes: Processes, browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_socket("127.0.0.1", 0) as free:
+        port = int(free.getsockname()[1])
+    directory = tmp_path / "run"
+    run = Run(
+        processes,
+        *("run", "--reference", "steered", "--duration", "20", "--output", str(directory)),
+        *("--view", "--port", str(port), "--set", "sim_node.real_time_factor:=1.0"),
+    )
+    wait_until(lambda: "watch it at http://127.0.0.1:" in run.process.stdout, "the page")
+    browser.open(f"http://127.0.0.1:{port}")
+    wait_until(lambda: shows_drive(browser), "the section Drive", SOON)
+    ends, run_key = time.monotonic() + 2.5, HeldKey(browser, "ArrowUp", SHIFT)
+    wait_until(lambda: time.monotonic() > ends, "the key", SOON, run_key.repeat)
+    run_key.release()
+    left = HeldKey(browser, "ArrowLeft")
+    ends += 1.5
+    wait_until(lambda: time.monotonic() > ends, "the key", SOON, left.repeat)
+    run.finish()
+
+    recording = read_recording(directory)
+    names = recording.character.layout.dof_names
+    x, y, turn = (recording.position[:, names.index(f"root_{axis}")] for axis in ("x", "y", "rz"))
+    assert math.hypot(float(x[-1]), float(y[-1])) > 1.0
+    assert float(turn[-1]) > 0.3
+    assert replay([recording]).identical
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    again = replay_states(directory, progress=lambda _: None, tell=lambda _: None)
+    assert again.identical
