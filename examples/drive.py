@@ -13,27 +13,20 @@ from geometry_msgs.msg import Twist
 from rclpy.executors import ExternalShutdownException
 from rclpy.parameter import Parameter
 
-SPEED, TURN, CIRCLE = 0.8, 0.5, 12.6  # m/s, rad/s, s
+rclpy.init()
+node = rclpy.create_node("driver", parameter_overrides=[Parameter("use_sim_time", value=True)])
+velocities = node.create_publisher(Twist, "cmd_vel", 10)
 
 
-def main():
-    """Publish velocities until a signal."""
-    rclpy.init()
-    by_simulated_time = [Parameter("use_sim_time", value=True)]
-    node = rclpy.create_node("driver", parameter_overrides=by_simulated_time)
-    velocities = node.create_publisher(Twist, "cmd_vel", 10)
-
-    def drive():
-        twist = Twist()
-        twist.linear.x = SPEED
-        is_first = node.get_clock().now().nanoseconds * 1e-9 % (2 * CIRCLE) < CIRCLE
-        twist.angular.z = TURN if is_first else -TURN
-        velocities.publish(twist)
-
-    node.create_timer(0.1, drive)  # again within the timeout, or it stops
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
-        rclpy.spin(node)
+def drive():
+    """Ask for a circle to the left and one to the right, in turns of 12.6 s."""
+    time = node.get_clock().now().nanoseconds * 1e-9  # s, simulated
+    twist = Twist()
+    twist.linear.x = 0.8  # m/s
+    twist.angular.z = 0.5 if time % 25.2 < 12.6 else -0.5  # rad/s
+    velocities.publish(twist)
 
 
-if __name__ == "__main__":
-    main()
+node.create_timer(0.1, drive)  # again within the timeout, or it stops
+with suppress(KeyboardInterrupt, ExternalShutdownException):
+    rclpy.spin(node)

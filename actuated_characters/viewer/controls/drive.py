@@ -101,7 +101,8 @@ class Drive:
     def __init__(self, node: Node, gui: viser.GuiApi, actions: "SimpleQueue[Action]") -> None:
         self._node, self._gui, self._actions = node, gui, actions
         self._below: str | None = None  # the namespace of the character that is driven, if any
-        self._publisher: Publisher | None = None
+        self._publisher: Publisher | None = None  # of its topic
+        self._publishers: dict[str, Publisher] = {}  # of all that were driven, by their namespaces
         self._commands: list[viser.CommandHandle] = []
         self._held = Held()
         self._moves = False  # the last velocity that was published is another one than zero
@@ -132,8 +133,8 @@ class Drive:
     def _press(self, key: Key, now: float) -> None:
         self._held = self._held.press(key, now)
 
-    def update(self, below: str) -> None:
-        """Be about the character in a namespace; publish what is asked for."""
+    def update(self, below: str | None) -> None:
+        """Be about the character in a namespace, or about none; publish what is asked for."""
         now = time.monotonic()
         if below != self._below or now >= self._next_search:
             self._next_search = now + _SEARCH_PERIOD
@@ -146,16 +147,18 @@ class Drive:
             self._next_velocity = now + _PERIOD
         self._moves = velocity != Velocity()
 
-    def _choose(self, below: str) -> None:
+    def _choose(self, below: str | None) -> None:
         """Open the topic of a character that is steered, and show the controls; or close both."""
-        is_steered = self._is_steered(below)
+        is_steered = below is not None and self._is_steered(below)
         if below == self._below and is_steered == self._folder.visible:
             return
         self._close()
         self._below, self._folder.visible = below, is_steered
-        if is_steered:
-            topic = replace(topics.CMD_VEL, name=f"{below}/{topics.CMD_VEL.name}")
-            self._publisher = topics.create_publisher(self._node, topic)
+        if below is not None and is_steered:
+            if below not in self._publishers:
+                topic = replace(topics.CMD_VEL, name=f"{below}/{topics.CMD_VEL.name}")
+                self._publishers[below] = topics.create_publisher(self._node, topic)
+            self._publisher = self._publishers[below]
             self._commands = [self._add_command(key) for key in KEYS]
 
     def _is_steered(self, below: str) -> bool:
@@ -168,10 +171,8 @@ class Drive:
 
     def _close(self) -> None:
         """Stop what was driven."""
-        if self._publisher is not None:
-            if self._moves:
-                self._publisher.publish(Twist())
-            self._node.destroy_publisher(self._publisher)
+        if self._publisher is not None and self._moves:
+            self._publisher.publish(Twist())
         for command in self._commands:
             command.remove()
         self._publisher, self._commands = None, []

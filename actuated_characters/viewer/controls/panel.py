@@ -122,6 +122,7 @@ class Panel:
             self._which.options = names
             self._which.visible = len(names) > 1
         chosen = dict(zip(names, known.values(), strict=True)).get(self._which.value)
+        self._drive.update(None if chosen is None else chosen.below)
         if chosen is None:
             return
         if chosen != self._subject:
@@ -130,7 +131,6 @@ class Panel:
             self.requests.get(node, ["real_time_factor", "wrench_duration"], self._take_settings)
             controller = f"{chosen.below}/{topics.CONTROLLER_NODE}"
             self._controls.choose({SIMULATOR: node, CONTROLLER: controller}, chosen.parameters)
-        self._drive.update(chosen.below)
         stamp_ns, now = stamps_ns.get(chosen.below), time.monotonic()
         if stamp_ns is not None and now >= self._next_text:
             self._next_text = now + _TEXT_PERIOD
