@@ -59,7 +59,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Drive:
+class DriveResult:
     """What has become of it; all numbers are of the time before a fall."""
 
     fell_at: float | None  # s
@@ -70,7 +70,7 @@ class Drive:
     wall: float  # s a simulated second
 
 
-def attempt(task: Task) -> Drive:
+def attempt(task: Task) -> DriveResult:
     """Drive to the end, or to a fall."""
     plan = _plan(task)
     begun = time.monotonic()
@@ -82,7 +82,7 @@ def attempt(task: Task) -> Drive:
     course = np.array([(each.x, each.y) for each in courses])
     errors = np.linalg.norm(roots - course, axis=1)
     ends = EIGHT_ENDS if task.is_eight else DRIVEN + reference.limits.timeout
-    return Drive(
+    return DriveResult(
         len(roots) / rate if fell else None,
         float(errors.max()),
         float(errors.mean()),
@@ -166,7 +166,7 @@ def main() -> int:
     return 0
 
 
-def _attempts(tasks: Sequence[Task], processes: int, console: Console) -> list[Drive]:
+def _attempts(tasks: Sequence[Task], processes: int, console: Console) -> list[DriveResult]:
     """What has become of each task; says so as soon as it is known."""
     done = []
     with (
@@ -184,14 +184,14 @@ def _attempts(tasks: Sequence[Task], processes: int, console: Console) -> list[D
     return done
 
 
-def _table(kind: str, drives: Sequence[Drive]) -> Table:
+def _table(kind: str, drives: Sequence[DriveResult]) -> Table:
     table = Table(*COLUMNS, title=kind, title_justify="left")
     for seed, drive in enumerate(drives, 1):
         table.add_row(str(seed), *_cells(drive))
     return table
 
 
-def _cells(drive: Drive) -> list[str]:
+def _cells(drive: DriveResult) -> list[str]:
     return [
         "-" if drive.fell_at is None else f"{drive.fell_at:.2f}",
         f"{drive.largest:.2f}",

@@ -28,8 +28,8 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     tracked.add_argument(
         "--cmd-vel",
         metavar="'X,Y,TURN@S ...'",
-        help="steer: m/s ahead and to the left, rad/s to the left, each from a time in s on; backward "
-        "at first: --cmd-vel='-0.4,0,0@1 ...'",
+        help="steer: m/s ahead and to the left, rad/s to the left, each from a time in s on; "
+        "backward at first: --cmd-vel='-0.4,0,0@1 ...'",
     )
     run.add_argument(
         "--behaviour",

@@ -71,7 +71,7 @@ KEYS = (
 
 
 @dataclass(frozen=True)
-class Held:
+class DrivingInput:
     """The velocity that is asked for, until a time in s by a steady clock."""
 
     velocity: Velocity = Velocity()
@@ -79,7 +79,7 @@ class Held:
     key: Key | None = None  # the last one, and when
     pressed: float = -math.inf
 
-    def press(self, key: Key, now: float) -> "Held":
+    def press(self, key: Key, now: float) -> "DrivingInput":
         """What is asked for by a key that goes down, or is repeated."""
         before = self.velocity if now < self.until else Velocity()
         forward = before.forward if key.forward is None else key.forward
@@ -88,14 +88,14 @@ class Held:
         turn = before.turn if key.turn is None else key.turn
         is_repeated = key == self.key and now - self.pressed < _REPEATED
         until = now + (_REPEATED if is_repeated else _FIRST)
-        return Held(Velocity(forward, 0.0, turn), until, key, now)
+        return DrivingInput(Velocity(forward, 0.0, turn), until, key, now)
 
-    def hold(self, velocity: Velocity, now: float) -> "Held":
+    def hold(self, velocity: Velocity, now: float) -> "DrivingInput":
         """What is asked for by the button, ten times a second while it is down."""
-        return Held(velocity, now + _REPEATED)
+        return DrivingInput(velocity, now + _REPEATED)
 
 
-class Drive:
+class DrivingControls:
     """A folder of the panel; hidden where no controller takes velocities."""
 
     def __init__(self, node: Node, gui: viser.GuiApi, actions: "SimpleQueue[Action]") -> None:
@@ -104,7 +104,7 @@ class Drive:
         self._publisher: Publisher | None = None  # of its topic
         self._publishers: dict[str, Publisher] = {}  # of all that were driven, by their namespaces
         self._commands: list[viser.CommandHandle] = []
-        self._held = Held()
+        self._input = DrivingInput()
         self._moves = False  # the last velocity that was published is another one than zero
         self._next_search = self._next_velocity = 0.0  # s
         self._folder = gui.add_folder("Drive", visible=False)
@@ -128,10 +128,10 @@ class Drive:
         return change
 
     def _hold_button(self, now: float) -> None:
-        self._held = self._held.hold(Velocity(*(slider.value for slider in self._sliders)), now)
+        self._input = self._input.hold(Velocity(*(slider.value for slider in self._sliders)), now)
 
     def _press(self, key: Key, now: float) -> None:
-        self._held = self._held.press(key, now)
+        self._input = self._input.press(key, now)
 
     def update(self, below: str | None) -> None:
         """Be about the character in a namespace, or about none; publish what is asked for."""
@@ -141,7 +141,7 @@ class Drive:
             self._choose(below)
         if self._publisher is None or now < self._next_velocity:
             return
-        velocity = self._held.velocity if now < self._held.until else Velocity()
+        velocity = self._input.velocity if now < self._input.until else Velocity()
         if self._moves or velocity != Velocity():  # of zeros only the first
             self._publisher.publish(velocity.message())
             self._next_velocity = now + _PERIOD
@@ -176,7 +176,7 @@ class Drive:
         for command in self._commands:
             command.remove()
         self._publisher, self._commands = None, []
-        self._held, self._moves = Held(), False
+        self._input, self._moves = DrivingInput(), False
 
     def _add_command(self, key: Key) -> viser.CommandHandle:
         command = self._gui.add_command(key.label, hotkey=key.key, modifier=key.modifier)

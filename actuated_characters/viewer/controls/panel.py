@@ -11,7 +11,7 @@ import viser
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from actuated_characters.viewer.controls.drive import Drive
+from actuated_characters.viewer.controls.drive import DrivingControls
 from actuated_characters.viewer.controls.hands import Action, Hands
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.controls.parameter_controls import ParameterControls
@@ -63,7 +63,7 @@ class Panel:
         self._which: Any = gui.add_dropdown("Character", (_ALONE,), visible=False)
         self._add_run()
         self._told = gui.add_markdown(_HELP)
-        self._drive = Drive(node, gui, actions)
+        self._drive = DrivingControls(node, gui, actions)
         self._add_touch()
         self._add_shown()
         self._controls = ParameterControls(gui, self.requests, self._later, self.tell)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from actuated_characters.viewer.controls.drive import KEYS, Held, Key, Velocity
+from actuated_characters.viewer.controls.drive import KEYS, DrivingInput, Key, Velocity
 
 
 def key(name: str, modifier: str | None = None) -> Key:
@@ -17,8 +17,8 @@ RUN = key("arrowup", "shift")
 STILL = Velocity()
 
 
-def held(presses: list[tuple[float, Key]]) -> Held:
-    found = Held()
+def pressed(presses: list[tuple[float, Key]]) -> DrivingInput:
+    found = DrivingInput()
     for time, each in presses:
         found = found.press(each, time)
     return found
@@ -37,14 +37,14 @@ def test_a_held_key_asks_without_a_gap_and_stops_soon_after_it_is_let_go(delay: 
     presses = repeated(AHEAD, 10.0, 13.0, delay=delay)
 
     for number, (time, _) in enumerate(presses[1:], 1):
-        assert held(presses[:number]).until > time
+        assert pressed(presses[:number]).until > time
     last = presses[-1][0]
-    assert held(presses).velocity == Velocity(1.0)
-    assert held(presses).until == pytest.approx(last + 0.4)
+    assert pressed(presses).velocity == Velocity(1.0)
+    assert pressed(presses).until == pytest.approx(last + 0.4)
 
 
 def test_keys_are_combined_and_the_repeats_of_the_last_one_keep_the_others() -> None:
-    both = held([*repeated(AHEAD, 0.0, 1.0), *repeated(LEFT, 1.0, 3.0)])
+    both = pressed([*repeated(AHEAD, 0.0, 1.0), *repeated(LEFT, 1.0, 3.0)])
 
     assert both.velocity == Velocity(1.0, 0.0, 0.8)
     assert both.until > 3.0
@@ -52,22 +52,22 @@ def test_keys_are_combined_and_the_repeats_of_the_last_one_keep_the_others() -> 
 
 
 def test_what_is_over_counts_no_more() -> None:
-    assert held([(0.0, AHEAD), (5.0, LEFT)]).velocity == Velocity(0.0, 0.0, 0.8)
+    assert pressed([(0.0, AHEAD), (5.0, LEFT)]).velocity == Velocity(0.0, 0.0, 0.8)
 
 
 def test_shift_runs_while_it_is_held_in_a_curve_too() -> None:
-    running = held([*repeated(RUN, 0.0, 1.0), (1.0, key("arrowleft", "shift"))])
+    running = pressed([*repeated(RUN, 0.0, 1.0), (1.0, key("arrowleft", "shift"))])
 
     assert running.velocity == Velocity(2.2, 0.0, 0.8)
     assert running.press(LEFT, 1.05).velocity == Velocity(1.0, 0.0, 0.8)
 
 
 def test_space_stops_at_once() -> None:
-    assert held([*repeated(RUN, 0.0, 1.0), (1.0, LEFT), (1.1, SPACE)]).velocity == STILL
+    assert pressed([*repeated(RUN, 0.0, 1.0), (1.0, LEFT), (1.1, SPACE)]).velocity == STILL
 
 
 def test_the_button_asks_for_a_velocity_while_it_sends() -> None:
-    found = Held().hold(Velocity(0.5, 0.1, -0.2), 4.0)
+    found = DrivingInput().hold(Velocity(0.5, 0.1, -0.2), 4.0)
 
     assert found.velocity == Velocity(0.5, 0.1, -0.2)
     assert 4.2 < found.until < 4.6  # two of its messages may be late
