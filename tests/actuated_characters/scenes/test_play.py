@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Twist
 
 from actuated_characters.bags.recording import read_recordings
 from actuated_characters.replay.replay import replay
@@ -181,6 +182,29 @@ def test_a_port_in_use_is_one_clear_line(processes: Processes) -> None:
         assert command.wait(LONG) == 1
     error = command.stderr.splitlines()[-1]
     assert error.startswith(f"error: viewer failed: cannot listen on 127.0.0.1, port {port}: ")
+
+
+def test_drive_goes_where_cmd_vel_says_and_replays(
+    processes: Processes, client: SimulatorClient, tmp_path: Path
+) -> None:
+    ticks, run, ahead = RATE, tmp_path / "run", Twist()
+    ahead.linear.x = 1.0
+    velocities = client.speak(topics.CMD_VEL)
+    command = processes.command(
+        *("play", "--scene", "drive", "--duration", "1", "--output", str(run)), *FAST
+    )
+
+    def is_over() -> bool:
+        velocities.publish(ahead)
+        return command.exit_code is not None
+
+    client.spin_until(is_over, "the end of the scene", LONG)
+
+    assert command.exit_code == 0, command.stderr
+    (recording,) = read_recordings(run)
+    assert recording.reference_position[-2, 0] > 0.2  # of the last state there is none
+    assert abs(recording.position[-1, 0] - recording.reference_position[-2, 0]) < 0.1
+    assert replay([recording]).state_hashes == {"": hash_of(run, ticks)}
 
 
 def test_what_a_node_refuses_is_one_clear_line(processes: Processes) -> None:
