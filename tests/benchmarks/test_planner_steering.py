@@ -36,7 +36,7 @@ def test_the_stop_is_from_the_largest_speed_and_by_the_timeout() -> None:
     silent = DRIVEN + reference.limits.timeout
 
     assert reference.course(round(silent * RATE)).forward == pytest.approx(2.5)
-    stands = silent + 2.5 / reference.limits.acceleration
+    stands = silent + 2.5 / reference.limits.braking
     assert reference.course(round(stands * RATE) - 2).forward > 0.0
     assert reference.course(round(stands * RATE) + 2).forward == 0.0
 

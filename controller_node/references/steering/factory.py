@@ -19,7 +19,15 @@ PARAMETERS = (
     Parameter("steering.run", "run", "the clip that it runs by"),
     Parameter("steering.speed", 2.5, "its largest speed ahead", unit="m/s", maximum=10.0),
     Parameter(
-        "steering.acceleration", 1.6, "of its speed", unit="m/s^2", minimum=0.01, maximum=100.0
+        "steering.acceleration", 1.3, "of its speed", unit="m/s^2", minimum=0.01, maximum=100.0
+    ),
+    Parameter(
+        "steering.braking",
+        1.6,
+        "likewise, while it slows down",
+        unit="m/s^2",
+        minimum=0.01,
+        maximum=100.0,
     ),
     Parameter("steering.turn_rate", 1.0, "its largest turn rate", unit="rad/s", maximum=10.0),
     Parameter(
@@ -61,6 +69,7 @@ def _steered(character: Character, values: Values) -> Motion:
     limits = SteeringLimits(
         values.number("steering.speed"),
         values.number("steering.acceleration"),
+        values.number("steering.braking"),
         values.number("steering.turn_rate"),
         values.number("steering.turn_acceleration"),
         values.number("steering.timeout"),

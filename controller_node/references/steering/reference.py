@@ -134,9 +134,8 @@ class SteeredReference:
     def _advanced(self, course: Course, tick: int) -> Course:
         """The course at a tick, from that of the tick before."""
         limits, period, wanted = self.limits, 1.0 / self._rate, self._wanted(tick - 1)
-        change = limits.acceleration * period
-        forward = course.forward + within(wanted.forward - course.forward, change)
-        left = course.left + within(wanted.left - course.left, change)
+        forward = limits.approach(course.forward, wanted.forward, period)
+        left = limits.approach(course.left, wanted.left, period)
         turn = course.turn + within(wanted.turn - course.turn, limits.turn_acceleration * period)
         heading = math.remainder(course.heading + turn * period, math.tau)
         cosine, sine = math.cos(heading), math.sin(heading)

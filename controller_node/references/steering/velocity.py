@@ -25,6 +25,7 @@ class SteeringLimits:
 
     speed: float  # m/s
     acceleration: float  # m/s^2
+    braking: float  # m/s^2, while it slows down
     turn_rate: float  # rad/s
     turn_acceleration: float  # rad/s^2
     timeout: float  # s
@@ -37,6 +38,11 @@ class SteeringLimits:
             within(command.left, min(_SIDEWAYS, self.speed)),
             within(command.turn, self.turn_rate),
         )
+
+    def approach(self, speed: float, wanted: float, period: float) -> float:
+        """The speed in m/s that is nearest to a wanted one after a period in s."""
+        most = self.braking if abs(wanted) < abs(speed) else self.acceleration
+        return speed + within(wanted - speed, most * period)
 
 
 def within(value: float, most: float) -> float:

@@ -109,10 +109,10 @@ def test_a_stamped_velocity_acts_from_its_tick_on(walker: Walker) -> None:
 
     while walker.tick < 300:
         assert list(walker.next().position) == still
-    # ahead at 1.6 m/s^2 for 60 ticks of 1/240 s; the root sways on its way
+    # ahead at 1.3 m/s^2 for 60 ticks of 1/240 s; the root sways on its way
     for _ in range(60):
         reference = walker.next()
-    assert reference.position[0] == pytest.approx(0.5 * 1.6 * 0.25**2, abs=0.03)
+    assert reference.position[0] == pytest.approx(0.5 * 1.3 * 0.25**2, abs=0.03)
     assert list(reference.position) == expected(360, VelocityCommand(299, 0.8))
 
 

@@ -178,3 +178,13 @@ def test_what_cannot_be_steered_is_rejected(
 ) -> None:
     with pytest.raises(ActuatedCharactersError, match=says):
         make(name, **settings)
+
+
+def test_it_brakes_at_another_rate_than_it_speeds_up() -> None:
+    settings = {"steering.acceleration": 0.5, "steering.braking": 2.0, **LASTING}
+    reference = steer(make(**settings), VelocityCommand(0, 1.0), VelocityCommand(3 * RATE, 0.0))
+
+    speeds = [reference.course(tick).forward for tick in range(4 * RATE)]
+    assert speeds[RATE] == pytest.approx(0.5)
+    assert speeds[3 * RATE + RATE // 4] == pytest.approx(0.5)
+    assert speeds[3 * RATE + RATE // 2 + 1] == 0.0
