@@ -108,7 +108,8 @@ def _parameters(options: argparse.Namespace) -> None:
     for parameter in parameters_of(options.node, options.character):
         value = f"{_shortened(parameter.default)} {parameter.unit}".rstrip()
         choices = f": {' | '.join(parameter.choices)}" if parameter.choices else ""
-        about = f"{parameter.description}{choices}{' (live)' if parameter.live else ''}"
+        change = f" ({parameter.when_changed})" if parameter.when_changed else ""
+        about = f"{parameter.description}{choices}{change}"
         if console.is_terminal:
             console.print(f"[bold]{escape(parameter.name)}[/bold]: {escape(value)}")
             console.print(Padding(escape(about), (0, 0, 0, 4)))

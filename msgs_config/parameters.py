@@ -32,6 +32,12 @@ class Parameter:
     choices: tuple[str, ...] = ()
     texts: bool = False  # an empty list as the default is one of texts, not of numbers
     live: bool = False  # may be changed while the node runs
+    at_reset: bool = False  # may be changed while the node runs, and counts from the next episode
+
+    @property
+    def when_changed(self) -> str:
+        """When a change counts: "live", "next reset", or empty for what cannot change."""
+        return "live" if self.live else "next reset" if self.at_reset else ""
 
     def checked(self, value: object) -> Value:
         """The value in the parameter's type; an integer is a fine float.

@@ -21,7 +21,9 @@ COLLISION = Parameter(
     choices=(FROM_FILE, NO_COLLISIONS),
 )
 RATE = Parameter("rate", 240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000)
-GRAVITY = Parameter("gravity", 9.81, "gravity along -z", unit="m/s^2", maximum=1000.0)
+GRAVITY = Parameter(
+    "gravity", 9.81, "gravity along -z", unit="m/s^2", maximum=1000.0, at_reset=True
+)
 COMMAND_DELAY = Parameter(
     "command_delay_ticks",
     0,

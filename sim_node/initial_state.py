@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from msgs_config.arrays import BoolArray
+from msgs_config.character.layout import JointLayout
 from msgs_config.character.lowest_points import describe_start_below_ground
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, MessageError
@@ -33,6 +34,7 @@ def initial_state_parameters(character: Character) -> list[Parameter]:
             "position of each degree of freedom at the start",
             unit="rad or m",
             minimum=-1e12,
+            at_reset=True,
         ),
         Parameter(
             VELOCITY,
@@ -40,6 +42,7 @@ def initial_state_parameters(character: Character) -> list[Parameter]:
             "velocity of each degree of freedom at the start",
             unit="rad/s or m/s",
             minimum=-1e12,
+            at_reset=True,
         ),
     ]
 
@@ -57,6 +60,15 @@ def check_given(values: Values, given: Mapping[str, object]) -> None:
                 f"parameter '{name}' is given, and '{INITIAL_STATE}' is {REFERENCE}; leave out "
                 f"'{name}', or set '{INITIAL_STATE}' to {GIVEN}"
             )
+
+
+def check_length(name: str, length: int, layout: JointLayout) -> None:
+    """Raise ConfigurationError unless a parameter has an entry for each degree of freedom."""
+    if length != layout.size:
+        raise ConfigurationError(
+            f"parameter '{name}' has {length} entries; it must have {layout.size}: "
+            f"{', '.join(layout.dof_names)}"
+        )
 
 
 def check_state(character: Character, state: StampedState, speed_limit: float) -> None:
@@ -98,6 +110,15 @@ def describe_start(character: Character, values: Values) -> tuple[str, ...]:
     if values.text("terrain") != PLANE:
         return ()
     return describe_start_below_ground(character, np.array(values.numbers(POSITION)))
+
+
+def changed_start(before: Values, after: Values) -> StampedState | None:
+    """The state in which a character begins by its values, where it is another than before."""
+    starts = [(each.numbers(POSITION), each.numbers(VELOCITY)) for each in (before, after)]
+    if starts[0] == starts[1]:
+        return None
+    position, velocity = starts[1]
+    return StampedState(0, np.array(position), np.array(velocity), None)
 
 
 def as_values(state: StampedState) -> dict[str, Value]:

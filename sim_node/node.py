@@ -12,9 +12,9 @@ from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPubli
 from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
-from sim_node.initial_state import as_values
+from msgs_config.runtime.ros_parameters import given_parameters
 from sim_node.interface.character_interface import CharacterInterface
+from sim_node.interface.episode_parameters import EpisodeParameters
 from sim_node.interface.initial_state_topic import InitialStates, log_warnings
 from sim_node.interface.publisher_diagnosis import (
     ConflictLog,
@@ -27,9 +27,9 @@ from sim_node.interface.services import Services
 from sim_node.interface.simulator_publisher import SimulatorPublisher
 from sim_node.interface.world_interface import WorldInterface
 from sim_node.node_settings import make_node_settings
-from sim_node.parameters import load_parameters
+from sim_node.parameters import SimulatorParameters, load_parameters
 from sim_node.physics.probe import probe_engine
-from sim_node.simulation_factory import make_simulation
+from sim_node.simulation_factory import change_world, make_simulation
 from sim_node.timing.flow_control import FlowControl
 from sim_node.timing.lockstep import CommandStatus
 from sim_node.timing.rate_limiter import RateLimiter
@@ -51,11 +51,10 @@ class SimNode(ComposableNode):
             ActuatedCharactersError: a parameter or a character cannot be used.
         """
         super().__init__(topics.SIM_NODE)
-        self._loaded = load_parameters(given_parameters(self))
-        values, unknown = self._loaded.values, self._loaded.open
-        self._settings = make_node_settings(values)
-        self._build_simulation()
-        declare(self, [each for each in self._loaded.declared if each not in unknown], values)
+        loaded = load_parameters(given_parameters(self))
+        self._settings = make_node_settings(loaded.values)
+        self._build_simulation(loaded)
+        self._given = EpisodeParameters(self, loaded, self._change_parameters)
         self._session = self._settings.session or make_session(self.get_fully_qualified_name())
         self._once_logger = OnceLogger(self)
         self._open_topics()
@@ -69,16 +68,14 @@ class SimNode(ComposableNode):
         self._next_diagnostics, self._timeouts, self._begun = 0.0, 0, False
         self._control = RunControl()
         self._run_services = Services(self, self._control, self._resume, self._reset)
-        LiveParameters(self, self._loaded.declared, values, self._change_parameters)
 
-    def _build_simulation(self) -> None:
+    def _build_simulation(self, loaded: SimulatorParameters) -> None:
         """Build the world, with the inverse mass matrices that the probes of the engine measure."""
-        values, loaded = self._loaded.values, self._loaded.characters
-        probes = [probe_engine(each.character, values.number("gravity")) for each in loaded]
+        gravity = loaded.values.number("gravity")
+        probes = [probe_engine(each.character, gravity) for each in loaded.characters]
         self._samples = [sample for sample, _ in probes]
-        inverse_masses = [inverse_mass for _, inverse_mass in probes]
-        self._simulation = make_simulation(self._loaded, inverse_masses)
-        self._initial_states = InitialStates(self, self._simulation.characters, self._loaded)
+        self._simulation = make_simulation(loaded, [inverse_mass for _, inverse_mass in probes])
+        self._initial_states = InitialStates(self, self._simulation.characters, loaded)
 
     def _open_topics(self) -> None:
         own_session = OwnSession(self._session, self._once_logger.log_once)
@@ -95,7 +92,9 @@ class SimNode(ComposableNode):
         ]
         self._world = WorldInterface(self, self._simulation, own_session, self._once_logger)
         publishers = [each.publishers for each in self._characters]
-        self._publisher = SimulatorPublisher(self, self._simulation, self._world, publishers)
+        self._publisher = SimulatorPublisher(
+            self, self._simulation, self._world, publishers, self._samples
+        )
         self._diagnostics = DiagnosticsPublisher(self)
         self._conflict_log = ConflictLog(self, self._once_logger)
         self._others = OtherSimulators(
@@ -134,15 +133,14 @@ class SimNode(ComposableNode):
     def _begin(self, stop: StopSignal) -> Turns:
         """Begin the first episode when initial states and subscribers are there."""
         states = yield from self._initial_states.wait(stop)
-        parameters = self._loaded.with_values({n: as_values(s) for n, s in states.items()})
         if stop:
             return
         if states:
             self._simulation.begin_in(states)
-            declare(self, self._loaded.open, parameters.values)
+            self._given.begin_in(states)
         if not self._settings.session:  # else a run has said so
-            log_warnings(self, parameters)
-        self._publisher.publish_configurations(parameters, self._samples)
+            log_warnings(self, self._given.in_force)
+        self._publisher.publish_configurations(self._given.in_force)
         count = self._settings.wait_for_subscribers
         yield from wait_for_subscribers(self, self._publisher.of_characters, count, stop)
         self._begin_episode()
@@ -267,10 +265,15 @@ class SimNode(ComposableNode):
 
     def _reset(self) -> None:
         """Begin a new episode, now or when all awaited subscribers are there."""
-        self._simulation.reset()
+        last_ns = self._simulation.stamp_ns
+        starts = self._given.begin_episode(self._initial_states.newest())
+        world = change_world(self._simulation.settings.world, self._given.in_force.values)
+        self._simulation.reset(world, starts or {})
         self._world.begin_episode()
         for each in self._characters:
             each.begin_episode()
+        if starts is not None:
+            self._publisher.change(self._given.in_force, last_ns if self._begun else None)
         if self._begun:
             self._begin_episode()
 

@@ -7,143 +7,24 @@ from dataclasses import dataclass, replace
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, LayoutError
-from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter, Value, Values, resolve
-from msgs_config.shared_parameters import (
-    CHARACTER,
-    COLLISION,
-    COMMAND_DELAY,
-    GRAVITY,
-    PLACEMENT,
-    PLANE,
-    RATE,
-    collides,
-    placed,
-)
-from sim_node.frames import BASE_FRAME_PARAMETER, ODOM_FRAME, FrameNames
+from msgs_config.shared_parameters import CHARACTER, COLLISION, PLACEMENT, collides, placed
+from sim_node.frames import FrameNames
 from sim_node.initial_state import (
+    INITIAL_STATE,
     POSITION,
+    REFERENCE,
     VELOCITY,
     begins_with_reference,
     check_given,
+    check_length,
     initial_state_parameters,
 )
+from sim_node.world_parameters import WORLD_PARAMETERS
 
-_LARGEST_COUNT = 2**62
 _FIRST = (CHARACTER, COLLISION, PLACEMENT)  # the others depend on them
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
-CONTACT_BREAKING_THRESHOLD = "contact_breaking_threshold"
-STEADY_CONTACTS = {CONTACT_BREAKING_THRESHOLD: 0.1}
-"""Parameters of a world in which a loaded foot stands on all of its sole."""
-
-WORLD_PARAMETERS = [
-    RATE,
-    Parameter("substeps", 1, "engine steps a tick", minimum=1, maximum=1000),
-    GRAVITY,
-    Parameter(
-        "friction",
-        0.9,
-        "friction of the ground; a contact's is its product with the link's",
-        maximum=100.0,
-    ),
-    Parameter("link_friction", 0.5, "friction of every link", maximum=100.0),
-    Parameter("terrain", PLANE, "the ground: plane, none, or the path of a URDF"),
-    Parameter("solver_iterations", 10, "contact solver iterations a step", minimum=1, maximum=1000),
-    Parameter(
-        CONTACT_BREAKING_THRESHOLD,
-        0.02,
-        "how far apart a contact's points may be until the engine drops them, as a share of the "
-        "smaller shape's size; with the engine's own, 0.02, a loaded foot trembles on its edges",
-        minimum=1e-3,
-        maximum=1.0,
-    ),
-    Parameter("speed_limit", 500.0, "a speed beyond it is a divergence", unit="rad/s or m/s"),
-    COMMAND_DELAY,
-    Parameter(
-        "mode",
-        "lockstep",
-        "wait for the answer to each state, or go on with the wall clock",
-        choices=("lockstep", "realtime"),
-    ),
-    Parameter(
-        "real_time_factor",
-        0.0,
-        "simulated time over wall time; 0: lockstep as fast as it can, realtime at 1",
-        maximum=1000.0,
-        live=True,
-    ),
-    Parameter(
-        "command_timeout",
-        0.2,
-        "realtime: a command is held this long, then zero",
-        unit="s",
-        minimum=0.001,
-        live=True,
-    ),
-    Parameter(
-        "max_ticks", 0, "end after this many ticks; 0: never", unit="ticks", maximum=_LARGEST_COUNT
-    ),
-    Parameter(
-        "wait_for_subscribers",
-        0,
-        "publish the first state when this many subscribe to joint_states",
-        maximum=1000,
-    ),
-    Parameter(
-        "initial_state_timeout",
-        60.0,
-        "longest wait for a controller that publishes where a character begins; 0: no limit",
-        unit="s",
-    ),
-    Parameter("republish_period", 0.5, "an unanswered state is sent again", unit="s", minimum=0.01),
-    Parameter("lockstep_timeout", 0.0, "longest wait for a command; 0: forever", unit="s"),
-    Parameter(
-        "on_timeout",
-        "abort",
-        "what a timeout does: end, pause, or go on with the last command or zero",
-        choices=("abort", "pause", "hold", "zero"),
-    ),
-    Parameter(
-        "on_fault",
-        "pause",
-        "what a conflict of commands or a divergence does",
-        choices=("abort", "pause"),
-    ),
-    Parameter(
-        "wrench_duration", 0.1, "a push is held this long, at least a tick", unit="s", live=True
-    ),
-    Parameter(
-        "ball_lifetime", 0.0, "a thrown ball is taken out of the way after it; 0: never", unit="s"
-    ),
-    Parameter(
-        "step_count",
-        1,
-        "ticks of one call of ~/step",
-        unit="ticks",
-        minimum=1,
-        maximum=1_000_000_000,
-        live=True,
-    ),
-    Parameter(
-        "display_rate",
-        30.0,
-        "`visualization`, `/tf`, `description_joint_states` and `contact_wrenches` a second of "
-        "simulated time",
-        unit="Hz",
-        minimum=0.001,
-        maximum=1000.0,
-    ),
-    Parameter(
-        "sensor_seed",
-        0,
-        "of the noise that a character's file gives its sensors",
-        maximum=_LARGEST_COUNT,
-    ),
-    ODOM_FRAME,
-    BASE_FRAME_PARAMETER,
-    SESSION,
-]
 CHARACTERS = Parameter(
     "characters",
     [],
@@ -210,6 +91,43 @@ class SimulatorParameters:
             characters.append(replace(each, values=Values(each.values | own)))
             values |= {each.prefix + name: value for name, value in own.items()}
         return replace(self, characters=tuple(characters), values=Values(values))
+
+    def at_reset(self, values: Values) -> "SimulatorParameters":
+        """The same, as they are from a reset on at which the parameters have these values.
+
+        Only those change that may at a reset.
+        """
+        new = {each.name: values[each.name] for each in self.declared if each.at_reset}
+        characters = [
+            replace(
+                each,
+                values=Values(
+                    {
+                        name: new.get(each.prefix + name, new.get(name, value))
+                        for name, value in each.values.items()
+                    }
+                ),
+            )
+            for each in self.characters
+        ]
+        return replace(self, characters=tuple(characters), values=Values(self.values | new))
+
+    def check_starts(self, values: Values) -> None:
+        """Raise ConfigurationError if values do not say where each character begins.
+
+        Where it begins with its reference, the controller alone changes it.
+        """
+        for each in self.characters:
+            for name in (POSITION, VELOCITY):
+                value, full_name = values[each.prefix + name], each.prefix + name
+                if begins_with_reference(each.values) and value != each.values[name]:
+                    raise ConfigurationError(
+                        f"parameter '{full_name}' is not to be set, because "
+                        f"'{each.prefix}{INITIAL_STATE}' is {REFERENCE}; set the controller's "
+                        "reference"
+                    )
+                assert isinstance(value, list)
+                check_length(full_name, len(value), each.character.layout)
 
 
 def load_parameters(given: Mapping[str, object]) -> SimulatorParameters:

@@ -1,6 +1,7 @@
 """Makes the simulation that the parameters of `sim_node` say."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from msgs_config import files
@@ -11,11 +12,12 @@ from msgs_config.errors import CharacterError
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
 from sim_node.initial_state import POSITION, VELOCITY
-from sim_node.parameters import CONTACT_BREAKING_THRESHOLD, SimulatorParameters
+from sim_node.parameters import SimulatorParameters
 from sim_node.physics.probe import measure_inverse_mass
 from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.world import WorldSettings
+from sim_node.world_parameters import CONTACT_BREAKING_THRESHOLD
 
 
 def make_simulation(
@@ -67,16 +69,26 @@ def make_settings(values: Values) -> SimulationSettings:
         speed_limit=values.number("speed_limit"),
         command_delay_ticks=values.integer("command_delay_ticks"),
         ball_ticks=max(round(lifetime * rate), 1) if lifetime else 0,
-        world=WorldSettings(
-            step_s=1.0 / (rate * substeps),
-            gravity=values.number("gravity"),
-            friction=values.number("friction"),
-            link_friction=values.number("link_friction"),
-            solver_iterations=values.integer("solver_iterations"),
-            contact_breaking_threshold=values.number(CONTACT_BREAKING_THRESHOLD),
-            ground=terrain == PLANE,
-            terrain=None if terrain in (PLANE, NO_GROUND) else _read_terrain(terrain),
+        world=change_world(
+            WorldSettings(
+                step_s=1.0 / (rate * substeps),
+                ground=terrain == PLANE,
+                terrain=None if terrain in (PLANE, NO_GROUND) else _read_terrain(terrain),
+            ),
+            values,
         ),
+    )
+
+
+def change_world(world: WorldSettings, values: Values) -> WorldSettings:
+    """A world's settings with those of the parameters' values that may change at a reset."""
+    return replace(
+        world,
+        gravity=values.number("gravity"),
+        friction=values.number("friction"),
+        link_friction=values.number("link_friction"),
+        solver_iterations=values.integer("solver_iterations"),
+        contact_breaking_threshold=values.number(CONTACT_BREAKING_THRESHOLD),
     )
 
 

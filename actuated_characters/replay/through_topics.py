@@ -28,7 +28,8 @@ from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
 from msgs_config.shared_parameters import CHARACTER, COLLISION, PLACEMENT
-from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
+from sim_node.parameters import CHARACTERS
+from sim_node.world_parameters import WORLD_PARAMETERS
 
 _OF_A_CHARACTER = (
     COLLISION.name,

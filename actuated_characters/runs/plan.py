@@ -20,6 +20,7 @@ from msgs_config.shared_parameters import collides, placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, as_values, describe_start
 from sim_node.physics.probe import measure_probe
+from sim_node.world_parameters import STEADY_CONTACTS
 
 SHARED = ("rate", "gravity", "placement", "collision", "command_delay_ticks")
 """The same on both sides; set on one, they count on both."""
@@ -85,7 +86,7 @@ def make_plan(
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
     if controller.text("planner") == PREDICTIVE:
-        defaults |= simulator_parameters.STEADY_CONTACTS
+        defaults |= STEADY_CONTACTS
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)
     _check_engines(character, simulator.number("gravity"))

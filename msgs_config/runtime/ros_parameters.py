@@ -49,12 +49,19 @@ class LiveParameters:
 
         `check` may refuse them before, by an ActuatedCharactersError.
         """
+        self._node = node
         self._check_values = check
         self._parameters = list(parameters)
         self._values = values
         self._take = take
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._changed)
+
+    def declare(self, parameters: Iterable[Parameter], values: Values) -> None:
+        """Declare parameters whose values were not known before."""
+        late = list(parameters)
+        self._values = Values(self._values | {each.name: values[each.name] for each in late})
+        declare(self._node, late, values)
 
     def _check(self, changes: list[RosParameter]) -> SetParametersResult:
         try:
@@ -78,7 +85,7 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
         name=parameter.name,
         description=parameter.description + unit,
         additional_constraints=" | ".join(parameter.choices),
-        read_only=not parameter.live,
+        read_only=not parameter.when_changed,
     )
     bounds = {"from_value": parameter.minimum, "to_value": parameter.maximum}
     if type(parameter.default) is float and abs(parameter.maximum) != float("inf"):

@@ -1,4 +1,4 @@
-"""Asks controllers for the states in which their references begin, before the first state."""
+"""The states in which references begin, as their controllers publish them."""
 
 import time
 from collections.abc import Generator, Iterable
@@ -41,6 +41,7 @@ class InitialStates:
         self._node = node
         self._timeout = parameters.values.number("initial_state_timeout")
         speed_limit = parameters.values.number("speed_limit")
+        self._complete = False
         self._subscriptions = [
             _Subscription(node, each, speed_limit)
             for each, own in zip(characters, parameters.characters, strict=True)
@@ -66,7 +67,18 @@ class InitialStates:
                         f"no initial state within {self._timeout:g} s; {sentence}; {_REMEDY}"
                     )
                 self._node.get_logger().warning(f"waiting for the initial state; {sentence}")
-        return {each.name: each.close() for each in self._subscriptions}
+        self._complete = True
+        return self.newest()
+
+    def newest(self) -> dict[str, StampedState]:
+        """The states that were published last, by the characters' names.
+
+        Empty before all have been there; without those that cannot be, which are logged.
+        """
+        if not self._complete:
+            return {}
+        found = {each.name: each.look() for each in self._subscriptions}
+        return {name: state for name, state in found.items() if state is not None}
 
 
 class _Subscription:
@@ -119,12 +131,6 @@ class _Subscription:
             nodes = ", ".join(publisher_names(self._node, self._topic))
             return f"several controllers publish on '{self._topic.name}': {nodes}; one must remain"
         return self._rejection or describe_publishers(self._node, self._topic)
-
-    def close(self) -> StampedState:
-        """End the subscription; its state."""
-        self._messages.close()
-        assert self._state is not None
-        return self._state
 
 
 def log_warnings(node: Node, parameters: SimulatorParameters) -> None:

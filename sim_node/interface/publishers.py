@@ -23,6 +23,7 @@ from sim_node.interface.display import DisplayPublishers
 from sim_node.interface.sensors import SensorPublishers
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
+from sim_node.sensors.readers import SensingSettings
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 
@@ -83,11 +84,13 @@ class Publishers:
         sample: DynamicsSample,
         terrain: UrdfOptions | None,
         characters: Sequence[str],
+        since_ns: int | None,
     ) -> None:
         """Publish all that the character's run depends on, as a bag needs it to repeat the run.
 
         `values` are the character's parameters, its initial state among them; `characters` are the
-        names of all in the world, where there are several.
+        names of all in the world, where there are several. `since_ns` is the stamp of the last
+        state before the parameters were in force, None from the start.
 
         Raises:
             CharacterError: a mesh of the character or of the terrain cannot be read.
@@ -95,6 +98,7 @@ class Publishers:
         text = configuration.describe(
             self._character.character,
             values,
+            since_ns,
             probe=sample,
             terrain=terrain,
             name=self._character.setup.name,
@@ -102,6 +106,10 @@ class Publishers:
             session=self._session,
         )
         self._configuration.publish(String(data=text))
+
+    def change_sensing(self, settings: SensingSettings) -> None:
+        """Read the sensors by other settings from now on."""
+        self._sensors.change(settings)
 
     def publish_episode(self, number: int, stamp_ns: int) -> None:
         """Publish that an episode begins with the state of this stamp."""

@@ -13,7 +13,7 @@ from msgs_config.messages.cdr import DoublesEncoder
 from msgs_config.messages.topics import Outgoing
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
-from sim_node.sensors.readers import SensorReader, make_readers
+from sim_node.sensors.readers import SensingSettings, SensorReader, make_readers
 
 _NO_WRENCH = np.zeros(6)
 
@@ -46,6 +46,14 @@ class SensorPublishers:
                     sensor.type is SensorType.FORCE,
                 )
             )
+
+    def change(self, settings: SensingSettings) -> None:
+        """Read by other settings from now on."""
+        readers = [reader for _, reader in make_readers(self._character, settings)]
+        self._sensors = [
+            each._replace(reader=reader)
+            for each, reader in zip(self._sensors, readers, strict=True)
+        ]
 
     def messages(self) -> Iterator[Outgoing]:
         """The readings of a tick, which are the same whenever they are asked for.

@@ -12,7 +12,9 @@ from msgs_config.messages.topics import Outgoing
 from msgs_config.runtime.throttle import Throttle
 from sim_node.interface.publishers import Publishers
 from sim_node.interface.world_interface import WorldInterface
+from sim_node.node_settings import make_node_settings
 from sim_node.parameters import SimulatorParameters
+from sim_node.physics.probe import measure_probe
 from sim_node.physics.simulation import Simulation
 
 
@@ -25,24 +27,40 @@ class SimulatorPublisher:
         simulation: Simulation,
         world: WorldInterface,
         of_characters: Sequence[Publishers],
+        samples: Sequence[DynamicsSample],
     ) -> None:
-        """Offer the clock."""
+        """Offer the clock. `samples` are the dynamics that the engine has for each character."""
         self._simulation = simulation
         self._world = world
         self.of_characters = of_characters
+        self._samples = samples
+        self._is_configured = False
         self._clock_topic = topics.create_publisher(node, topics.CLOCK)
         self._throttle = Throttle()
         self._is_chosen = True  # whether the tick is published on the throttled topics
 
     def publish_configurations(
-        self, parameters: SimulatorParameters, samples: Sequence[DynamicsSample]
+        self, parameters: SimulatorParameters, since_ns: int | None = None
     ) -> None:
-        """Publish each character's parameters, and the dynamics that the engine has for it."""
+        """Publish each character's parameters, and the dynamics that the engine has for it.
+
+        `since_ns` is the stamp of the last state before, None from the start.
+        """
+        self._is_configured = True
         terrain = self._simulation.settings.world.terrain
         for each, own, sample in zip(
-            self.of_characters, parameters.characters, samples, strict=True
+            self.of_characters, parameters.characters, self._samples, strict=True
         ):
-            each.publish_configuration(own.values, sample, terrain, parameters.names)
+            each.publish_configuration(own.values, sample, terrain, parameters.names, since_ns)
+
+    def change(self, parameters: SimulatorParameters, since_ns: int | None) -> None:
+        """Go on with other parameters, which are published before the next episode's messages."""
+        gravity = parameters.values.number("gravity")
+        for each in self.of_characters:
+            each.change_sensing(make_node_settings(parameters.values).sensing)
+        self._samples = [measure_probe(each.character, gravity) for each in parameters.characters]
+        if self._is_configured:
+            self.publish_configurations(parameters, since_ns)
 
     def publish_episode(self) -> None:
         """Publish that the present tick is the first of an episode."""

@@ -9,8 +9,9 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.effort_limits import EffortLimits
 from msgs_config.character.model import Character
-from msgs_config.errors import ConfigurationError, SimulationError
+from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
+from sim_node.initial_state import check_length
 from sim_node.physics.body import Body
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.projectiles import Projectiles
@@ -196,10 +197,6 @@ class SimulatedCharacter:
         self.state = StampedState(stamp_ns, position, velocity, effort)
 
     def _initial(self, name: str, values: tuple[float, ...]) -> FloatArray:
-        if len(values) != self.layout.size:
-            below = f"{self.setup.name}." if self.setup.name else ""
-            raise ConfigurationError(
-                f"parameter '{below}{name}' has {len(values)} entries; it must have "
-                f"{self.layout.size}: {', '.join(self.layout.dof_names)}"
-            )
+        below = f"{self.setup.name}." if self.setup.name else ""
+        check_length(f"{below}{name}", len(values), self.layout)
         return np.array(values)

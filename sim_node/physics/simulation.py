@@ -1,7 +1,8 @@
 """The simulation of characters in one world: efforts for one tick, then the next states."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
@@ -153,16 +154,24 @@ class Simulation:
             self._world.balls.add(throw)
         self._thrown_at += (self.tick,) * len(throws)
 
-    def reset(self) -> None:
+    def reset(
+        self,
+        world: WorldSettings | None = None,
+        states: Mapping[str, StampedState] = MappingProxyType({}),
+    ) -> None:
         """Begin a new episode in a new world, whose first states have the next tick's stamp.
 
-        All that follows is what would follow in a fresh simulation, to the bit.
+        All that follows is what would follow in a fresh simulation, to the bit. This and all later
+        episodes are in a world of other settings, and begin in other states, by the characters'
+        names, where they are given; the engine's step stays.
         """
+        if world is not None:
+            assert world.step_s == self.settings.world.step_s
+            self.settings = replace(self.settings, world=world)
         self.tick += 1
         self.episode += 1
         self.throws, self._thrown_at = (), ()
-        self._world.close()  # first: two engines at a time would take twice the memory
-        self._world = self._fresh_world()
+        self.begin_in(states)
 
     def begin_in(self, states: Mapping[str, StampedState]) -> None:
         """Begin this and all later episodes in other states, by the characters' names.
@@ -172,7 +181,7 @@ class Simulation:
         for character in self.characters:
             if (state := states.get(character.setup.name)) is not None:
                 character.begin_in(state.position, state.velocity)
-        self._world.close()
+        self._world.close()  # first: two engines at a time would take twice the memory
         self._world = self._fresh_world()
 
     def snapshot(self) -> Snapshot:

@@ -15,8 +15,9 @@ HEAD = """\
 # Parameters
 
 `run --set NODE.NAME:=VALUE`, `--ros-args -p NAME:=VALUE` and parameter files set them; those
-marked *live* may change while the node runs. With several `characters`, those of one are set below
-its name. `actuated_characters parameters NODE --character NAME` prints the defaults of a character.
+marked *live* may change while the node runs, as may those marked *next reset*, which count from the
+first state of the next episode on. With several `characters`, those of one are set below its name.
+`actuated_characters parameters NODE --character NAME` prints the defaults of a character.
 """
 
 
@@ -24,9 +25,9 @@ def section(title: str, parameters: Sequence[Parameter]) -> str:
     rows = [f"## {title}", "", "| name | default | meaning |", "| --- | --- | --- |"]
     for each in parameters:
         choices = f": {', '.join(f'`{choice}`' for choice in each.choices)}" if each.choices else ""
-        live = " (*live*)" if each.live else ""
+        change = f" (*{each.when_changed}*)" if each.when_changed else ""
         name = each.name.replace(JOINT, "JOINT")
-        about = each.description.replace(f"'{JOINT}'", "the joint") + choices + live
+        about = each.description.replace(f"'{JOINT}'", "the joint") + choices + change
         rows.append(f"| `{name}` | {default(each)} | {about.replace('|', '/')} |")
     return "\n".join(rows) + "\n"
 

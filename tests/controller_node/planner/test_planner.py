@@ -38,7 +38,7 @@ from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import resolve
-from sim_node.parameters import CONTACT_BREAKING_THRESHOLD as THRESHOLD
+from sim_node.world_parameters import CONTACT_BREAKING_THRESHOLD as THRESHOLD
 from tests.support.physics import character
 from tests.support.ros import stamp_ns
 

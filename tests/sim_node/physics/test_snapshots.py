@@ -9,9 +9,9 @@ import pytest
 from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
-from sim_node.parameters import STEADY_CONTACTS
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.world_parameters import STEADY_CONTACTS
 
 TICKS = 36
 CASES: dict[str, tuple[str, dict[str, object], dict[str, object]]] = {

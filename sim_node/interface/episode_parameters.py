@@ -1,0 +1,75 @@
+"""The simulator's parameters: those in force, and those that wait for the next episode."""
+
+from collections.abc import Callable, Mapping
+
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from msgs_config.messages.state import StampedState
+from msgs_config.parameters import Values
+from msgs_config.runtime.ros_parameters import LiveParameters, declare
+from sim_node.initial_state import POSITION, VELOCITY, as_values, changed_start
+from sim_node.parameters import SimulatorParameters
+
+
+class EpisodeParameters:
+    """The parameters of a node that counts episodes.
+
+    In `in_force` the live ones keep the values that they began with.
+    """
+
+    def __init__(
+        self, node: Node, loaded: SimulatorParameters, take: Callable[[Values], None]
+    ) -> None:
+        """Declare the node's parameters, and hand their values to `take` after each change.
+
+        Those that wait for controllers are declared when these have published them.
+        """
+        self.in_force = loaded
+        self._node, self._take = node, take
+        self._upcoming = loaded.values
+        unknown = loaded.open
+        declare(node, [each for each in loaded.declared if each not in unknown], loaded.values)
+        self._live = LiveParameters(node, loaded.declared, loaded.values, self._change, self._check)
+
+    def begin_in(self, states: Mapping[str, StampedState]) -> None:
+        """Let characters begin in the first states of their references, by their names."""
+        waited_for = self.in_force.open
+        self.in_force = self.in_force.with_values({n: as_values(s) for n, s in states.items()})
+        self._live.declare(waited_for, self.in_force.values)
+
+    def begin_episode(self, states: Mapping[str, StampedState]) -> dict[str, StampedState] | None:
+        """Put what was changed into force; characters of these names begin in these states.
+
+        Returns the starts that are others than before, by name; None if nothing has changed.
+        """
+        before = self.in_force
+        after = before.at_reset(self._upcoming)
+        after = after.with_values({name: as_values(state) for name, state in states.items()})
+        if after.values == before.values:
+            return None
+        self.in_force = after
+        if states:
+            self._show_starts(states)
+        starts = {
+            each.name: changed_start(each.values, own.values)
+            for each, own in zip(before.characters, after.characters, strict=True)
+        }
+        return {name: start for name, start in starts.items() if start is not None}
+
+    def _show_starts(self, names: Mapping[str, object]) -> None:
+        """Give the node's parameters the values that came from controllers."""
+        shown = [
+            RosParameter(name, value=self.in_force.values[name])
+            for each in self.in_force.characters
+            if each.name in names
+            for name in (each.prefix + POSITION, each.prefix + VELOCITY)
+        ]
+        self._node.set_parameters_atomically(shown)
+
+    def _check(self, values: Values) -> None:
+        self.in_force.check_starts(values)
+
+    def _change(self, values: Values) -> None:
+        self._upcoming = values
+        self._take(values)
