@@ -2,27 +2,23 @@
 
 import time
 from collections import Counter
+from collections.abc import Callable, Iterable
 from contextlib import suppress
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import Surroundings
+from controller_node.controller import Controller
+from controller_node.controller_setups import ControllerSetups
 from controller_node.interface.awaited_messages import AwaitedMessages
 from controller_node.interface.publishers import Publishers, Reply
 from controller_node.interface.simulators import Simulators, check_simulator
 from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.interface.state_decoder import StateDecoder
-from controller_node.parameters import (
-    PARAMETERS,
-    character_parameters,
-    commanded_joints,
-    make_controller,
-    make_settings,
-)
-from controller_node.references.factory import make_motion
+from controller_node.parameters import PARAMETERS, character_parameters, check_world
+from msgs_config.arrays import IntArray
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
@@ -59,13 +55,13 @@ class ControllerNode(ComposableNode):
         self._character = placed(loaded, given)
         self._layout = self._character.layout
         declared = PARAMETERS + character_parameters(self._character, given)
-        self._values = resolve(declared, given)
-        declare(self, declared, self._values)
-        motion = make_motion(self._character, self._values)
-        for warning in self._character.warnings + self._values.warnings + motion.warnings:
-            self.get_logger().warning(warning)
-        self._controller = make_controller(self._character, motion.reference, self._values)
+        values = resolve(declared, given)
+        declare(self, declared, values)
+        self._setups = ControllerSetups(self._character, declared, values)
+        self._log_warnings(self._character.warnings + values.warnings)
+        self._log_warnings(self._setups.in_force.warnings)
         self._last_reply: Reply | None = None
+        self._published_first: StampedState | None = None
         self._is_answering = False
         self._upcoming: Values | None = None
         self._episode_ns: int | None = None
@@ -74,9 +70,14 @@ class ControllerNode(ComposableNode):
         self._next_report = 0.0
         self._counts: Counter[str] = Counter(answered=0, repeated=0, ignored=0, overtaken=0)
         self._answer_times = Durations()
+        self._serve: Callable[[], None] = lambda: None
         self._open_topics()
-        self._outputs.publish_initial_state(motion.first_state())
-        LiveParameters(self, declared, self._values, self._take_parameters, self._check_parameters)
+        self._publish_first_state()
+        LiveParameters(self, declared, values, self._take_parameters, self._check_parameters)
+
+    def _log_warnings(self, warnings: Iterable[str]) -> None:
+        for warning in warnings:
+            self.get_logger().warning(warning)
 
     def _open_topics(self) -> None:
         controller, logger = self._controller, self._once_logger
@@ -85,28 +86,44 @@ class ControllerNode(ComposableNode):
             self,
             given_session(self._values),
             controller.clock,
-            partial(check_simulator, controller, self._character, self._values),
+            lambda found: check_simulator(self._controller, self._character, self._values, found),
             logger,
         )
         self._awaited = AwaitedMessages(self, controller, self._character, self._simulators, logger)
         self._pending_state: bytes | None = None  # a state, for what is awaited with it
         # after them: a simulator that has found this subscription has found the others as well
         self._states = DirectSubscription(self, topics.JOINT_STATES)
-        joints = commanded_joints(self._character, self._values)
-        commanded = np.flatnonzero(self._layout.mask(joints))
-        self._actuation = describe_actuation(len(commanded), self._layout.size)
-        self._outputs = Publishers(self, self._layout, commanded, self._simulators.bound)
+        self._outputs = Publishers(self, self._layout, self._driven, self._simulators.bound)
         self._stamped_topics = StampedTopics(self, controller, self._outputs, logger)
         self._publish_configuration()
+
+    @property
+    def _controller(self) -> Controller:
+        return self._setups.in_force.controller
+
+    @property
+    def _values(self) -> Values:
+        return self._setups.in_force.values
+
+    @property
+    def _driven(self) -> IntArray:
+        """The entries of the effort that the controller drives."""
+        return np.flatnonzero(self._layout.mask(self._setups.in_force.commanded))
 
     def _publish_configuration(self) -> None:
         """Publish the parameters in force, and since which state they are."""
         since_ns = None if self._last_reply is None else self._last_reply.state.stamp_ns
+        actuation = describe_actuation(len(self._driven), self._layout.size)
         self._outputs.publish_configuration(
-            configuration.describe(
-                self._character, self._values, since_ns, actuation=self._actuation
-            )
+            configuration.describe(self._character, self._values, since_ns, actuation=actuation)
         )
+
+    def _publish_first_state(self) -> None:
+        """Publish where the next episode's reference begins, if that is new."""
+        first = self._setups.first_state
+        if first is not self._published_first:
+            self._published_first = first
+            self._outputs.publish_initial_state(first)
 
     def turns(self, stop: StopSignal, executor: PollingExecutor) -> Turns:
         """Answer states until `stop`.
@@ -115,7 +132,8 @@ class ControllerNode(ComposableNode):
             ActuatedCharactersError: the simulator simulates something else than this controller
                 was made for.
         """
-        self._controller.while_planning(executor.serve)
+        self._serve = executor.serve
+        self._controller.while_planning(self._serve)
         try:
             while not stop:
                 yield self._spin_once(executor)
@@ -179,6 +197,9 @@ class ControllerNode(ComposableNode):
         episode_ns = self._episode_of(state)
         if episode_ns is None:
             return  # the simulator publishes the state again
+        if self._simulators.disagrees():
+            self._pending_state = raw
+            return
         surroundings = self._awaited.until(state.stamp_ns, episode_ns)
         if surroundings is None:
             self._pending_state = raw
@@ -256,10 +277,22 @@ class ControllerNode(ComposableNode):
 
     def _begin_episode(self, stamp_ns: int) -> None:
         """Forget the episode before; a first state that waits for its contacts may do it again."""
+        if self._setups.begin_episode():
+            self._use_controller()
         self._episode_ns = stamp_ns
         self._controller.begin_episode(stamp_ns)
         self._outputs.begin_episode()
         self._awaited.begin()
+
+    def _use_controller(self) -> None:
+        """Go on with another controller, in force from the first state of an episode on."""
+        controller = self._controller
+        controller.while_planning(self._serve)
+        self._awaited.use(controller)
+        self._stamped_topics.use(controller)
+        self._outputs.drive(self._driven)
+        self._simulators.check_again()
+        self._publish_configuration()
 
     def _report(self, *, at_once: bool = False) -> None:
         """Publish the diagnostics if they are due and there is a subscriber."""
@@ -280,14 +313,21 @@ class ControllerNode(ComposableNode):
             )
 
     def _check_parameters(self, values: Values) -> None:
-        self._controller.check(make_settings(self._character, values))
+        coming = self._setups.check(values)
+        if coming is not None:
+            self._awaited.check(coming.controller)
+            simulator = self._simulators.configuration
+            check_world(values, {} if simulator is None else simulator.parameters)
 
     def _take_parameters(self, values: Values) -> None:
         """Take changed settings, all at once; they count from the next state on."""
         if self._is_answering:  # services are answered while a plan is waited for
             self._upcoming = values
             return
-        self._upcoming = None
-        self._values = values
-        self._controller.settings = make_settings(self._character, values)
+        self._upcoming, before = None, self._setups.upcoming
+        self._setups.take(values)
+        coming = self._setups.upcoming
+        if coming is not None and coming is not before:
+            self._log_warnings(coming.warnings)
+        self._publish_first_state()
         self._publish_configuration()

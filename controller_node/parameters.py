@@ -1,6 +1,7 @@
 """The parameters of `controller_node`, and the controller that they make."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -41,13 +42,18 @@ PARAMETERS = [
     COMMAND_DELAY,
     Parameter("law", "stable_pd", "the control law", choices=LAWS, live=True),
     Parameter(
-        "feedforward", "", "the law feedforward's CSV file: time_s and degrees of freedom's efforts"
+        "feedforward",
+        "",
+        "the law feedforward's CSV file: time_s and degrees of freedom's efforts",
+        at_reset=True,
     ),
-    *MOTION_PARAMETERS,
-    *BEHAVIOUR_PARAMETERS,
+    *(replace(each, at_reset=True) for each in (*MOTION_PARAMETERS, *BEHAVIOUR_PARAMETERS)),
     *planner_settings.PLANNER_PARAMETERS,
     Parameter(
-        "root_assistance", True, "drive a floating base by the lecture's root force and torque"
+        "root_assistance",
+        True,
+        "drive a floating base by the lecture's root force and torque",
+        at_reset=True,
     ),
     Parameter(
         "wait_for_subscribers", 1, "answer when this many subscribe to joint_torques", maximum=1000

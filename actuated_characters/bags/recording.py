@@ -9,6 +9,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from actuated_characters.bags.format.storage import SUFFIXES
+from actuated_characters.bags.node_parameters import NodeParameters, in_force
 from actuated_characters.bags.plans import PlanArrays
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rebuilding import RecordedWorld
@@ -16,7 +17,6 @@ from actuated_characters.bags.tracks import (
     CONFIGURATION,
     CharacterTimeline,
     CommandArrays,
-    ControllerSettings,
     ModeChange,
     States,
     WorldTimeline,
@@ -34,8 +34,8 @@ from msgs_config.messages.wrenches import WrenchArrays
 
 __all__ = [
     "CommandArrays",
-    "ControllerSettings",
     "ModeChange",
+    "NodeParameters",
     "RecordedWorld",
     "Recording",
     "read_recording",
@@ -56,7 +56,9 @@ class Recording:
 
     character: Character  # as it stood there, made from the texts in the bag
     name: str = ""  # its topics' namespace without the leading slash
-    parameters: Mapping[str, Any] = field(repr=False)  # the simulator's
+    parameters: Mapping[str, Any] = field(repr=False)  # the simulator's, in the first state
+    # the simulator's, one after another; empty where they never changed
+    simulator: tuple[NodeParameters, ...] = ()
     versions: Mapping[str, str] = field(default_factory=dict, repr=False)  # it ran with them
     stamps_ns: IntArray  # (t + 1,): each state once, in order, no tick left out
     published_ns: IntArray  # (t + 1,): wall time of each state, as the bag has it ...
@@ -69,7 +71,7 @@ class Recording:
     contacts: Wrenches  # (t,): in each tick, None where no message came; () if never
     applied_wrench: Wrenches  # likewise: pushes
     commands: tuple[tuple[CommandArrays, ...], ...]  # (t + 1,): that answer each state, in order
-    controller: tuple[ControllerSettings, ...] = ()  # one after another
+    controller: tuple[NodeParameters, ...] = ()  # one after another
     modes: tuple[ModeChange, ...] = ()  # of the controller, one after another
     plans: tuple[PlanArrays, ...] = ()  # of a planner, one after another
     unstamped_commands: tuple[CommandArrays, ...] = ()  # that answer no state, in real time
@@ -100,6 +102,12 @@ class Recording:
         resets = np.flatnonzero(np.isnan(self.effort).all(axis=1)) + 1
         return np.concatenate(([0], resets))
 
+    def parameters_at(self, row: int) -> Mapping[str, Any]:
+        """The simulator's parameters in the state of a row."""
+        if not self.simulator:
+            return self.parameters
+        return in_force(self.simulator, int(self.stamps_ns[row]))
+
     def rows(self, rows: slice) -> "Recording":
         """Return the recording of some of its states, and of the ticks between them.
 
@@ -113,7 +121,8 @@ class Recording:
         )
         by_tick = ("effort", "contacts", "applied_wrench", "throws")
         cut = {name: getattr(self, name)[rows] for name in by_state}
-        return replace(self, **cut, **{name: getattr(self, name)[ticks] for name in by_tick})
+        cut |= {name: getattr(self, name)[ticks] for name in by_tick}
+        return replace(self, parameters=self.parameters_at(rows.start), **cut)
 
 
 def read_recording(path: Path, character: str | None = None) -> Recording:
@@ -249,11 +258,13 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
     stamps = states.integers("stamps_ns")
     stamp_list = stamps.tolist()
     ends, plans = stamp_list[1:], timeline.plans
+    simulator = timeline.simulator.parameters
     reference_position, reference_velocity = _references(stamps, timeline.references, size)
     return Recording(
         character=rebuilt.character,
         name=timeline.namespace,
-        parameters=known.parameters,
+        parameters=in_force(simulator, stamp_list[0]),
+        simulator=tuple(simulator) if len(simulator) > 1 else (),
         versions=known.versions,
         stamps_ns=stamps,
         published_ns=states.integers("published_ns"),

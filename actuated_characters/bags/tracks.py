@@ -10,13 +10,15 @@ from typing import Any, ClassVar
 import numpy as np
 from std_msgs.msg import String
 
+from actuated_characters.bags.node_parameters import NodeParameters, SimulatorConfigurations
 from actuated_characters.bags.plans import PlanArrays, decode_plan
-from actuated_characters.bags.rebuilding import Rebuilt, rebuild
+from actuated_characters.bags.rebuilding import Rebuilt
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import CommandError, LayoutError, MessageError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import TickClock
+from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
 from msgs_config.messages.session import ANONYMOUS, read_session
@@ -42,14 +44,6 @@ class CommandArrays:
     names: tuple[str, ...]  # (m,)
     efforts: FloatArray  # (m,) N m or N
     published_ns: int  # wall time
-
-
-@dataclass(frozen=True)
-class ControllerSettings:
-    """A controller's parameters, and since when they are in force."""
-
-    parameters: dict[str, Any]
-    after_stamp_ns: int | None  # in force for states after that stamp; None: from the start
 
 
 @dataclass(frozen=True)
@@ -140,19 +134,19 @@ class CharacterTimeline:
         """`namespace` is without the leading slash."""
         self.namespace = namespace
         self.has_wall_times = True  # else times of publishing are simulated log times
-        self.rebuilt: Rebuilt | None = None
+        self.simulator = SimulatorConfigurations(namespace)
         self.states, self.references = States(), States()
         self.wrenches: dict[str, dict[int, WrenchArrays]] = {  # by topic and stamp
             topics.CONTACTS.name: {},
             topics.APPLIED_WRENCH.name: {},
         }
         self.commands: dict[int, list[CommandArrays]] = {}  # by stamp
-        self.controller: list[ControllerSettings] = []
+        self.controller: list[NodeParameters] = []
         self.modes: list[ModeChange] = []
         self.plans: dict[int, PlanArrays] = {}  # by stamp
         self.pushes_sent = 0
         self.skipped_states = 0  # before the first one of an episode
-        self._configuration_text = self._controller_text = ""
+        self._controller_text = ""
         self._early: list[tuple[str, bytes, int]] = []
         self._early_lost = False
         self._gaps: list[tuple[int, int]] = []
@@ -166,6 +160,11 @@ class CharacterTimeline:
             _MODE: self._take_mode,
             _PLAN: self._take_plan,
         }
+
+    @property
+    def rebuilt(self) -> Rebuilt | None:
+        """The simulator's first configuration, and what is built from it; None before it."""
+        return self.simulator.rebuilt
 
     def take(self, name: str, raw: bytes, published_ns: int) -> None:
         """Take a message on one of `TOPICS`.
@@ -206,17 +205,17 @@ class CharacterTimeline:
             tail = f" and {more} more times" if more > 0 else ""
             raise RecordingError(f"the states of ticks {', '.join(ranges)}{tail} are missing")
         assert self.rebuilt is not None
+        self.simulator.check_start(self.states.stamps_ns[0])
         return self.rebuilt
 
     def _configure(self, raw: bytes) -> None:
-        text = decode(raw, String).data
-        if self.rebuilt is not None:
-            if text != self._configuration_text:
-                raise RecordingError("several simulators, or one restarted")
-            return
-        if self._early_lost:
+        is_first = self.rebuilt is None
+        if is_first and self._early_lost:
             raise RecordingError(f"'{CONFIGURATION}' comes only after {_MOST_EARLY} other messages")
-        self.rebuilt, self._configuration_text = rebuild(text, self.namespace), text
+        self.simulator.take(decode(raw, String).data)
+        if not is_first:
+            return
+        assert self.rebuilt is not None
         known = self.rebuilt.known
         rate = known.parameters.get(RATE.name)
         if not isinstance(rate, int):
@@ -282,8 +281,8 @@ class CharacterTimeline:
         with suppress(*_UNREADABLE):
             content = json.loads(text)
             parameters = with_present_names(dict(content["parameters"]))
-            since_ns = content.get("parameters_after_stamp_ns")
-            self.controller.append(ControllerSettings(parameters, since_ns))
+            since_ns = content.get(SINCE)
+            self.controller.append(NodeParameters(parameters, since_ns))
 
     def _take_plan(self, raw: bytes, published_ns: int) -> None:
         with suppress(MessageError):  # of another controller

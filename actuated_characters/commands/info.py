@@ -133,7 +133,7 @@ def _run_rows(run: "RunFacts") -> Iterator[tuple[str, str]]:
     yield "episodes", _listed(episodes)
     yield "resets", str(run.resets)
     yield "law", run.law or "not recorded"
-    changes = (f"{c.name}: {c.before} to {c.after} after {c.time:.4g} s" for c in run.changes)
+    changes = (f"{c.line} after {c.time:.4g} s" for c in run.changes)
     yield "changed meanwhile", _listed(changes)
     pushes = (
         f"{push.link} at {push.start:.4g} s for {push.duration:.3g} s: up to "

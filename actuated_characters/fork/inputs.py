@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.replay.players.controller_parameters import parameter_changes
+from actuated_characters.replay.players.controller_parameters import (
+    parameter_changes,
+    reset_changes,
+)
 from actuated_characters.replay.world import (
     check_pushes,
     check_throws,
@@ -68,10 +71,12 @@ def recorded_stops(recording: Recording, point: ForkPoint) -> Stops:
     for row, changes in parameter_changes(recording).items():
         if point.repeats(row + 1):
             stops[row + 1].settings += [(topics.CONTROLLER_NODE, change) for change in changes]
-    begins = recording.episode_rows.tolist()
+    begins, simulator = recording.episode_rows.tolist(), reset_changes([recording])
     for row in begins[1:]:
         if row <= (point.ticks if point.with_later else point.row):
             stops[row].resets = True
+            if row in simulator:
+                stops[row].settings.append((topics.SIM_NODE, simulator[row]))
     ends = [*(row - 1 for row in begins[1:]), len(recording.effort)]  # a reset is a tick
     for first, end in zip(begins, ends, strict=True):
         pushes = [each for each in begun_pushes(recording, first, end) if point.repeats(each[0])]

@@ -16,7 +16,6 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.client import Client
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
 from std_srvs.srv import SetBool, Trigger
 
@@ -45,7 +44,7 @@ from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, Values, resolve
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.ros_parameters import declare, given_parameters
+from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 from msgs_config.versions import describe_changes, installed_versions
 
 PARAMETERS = [
@@ -207,11 +206,7 @@ class ForkNode(Node):
 
     def _set(self, node: str, settings: dict[str, Any]) -> None:
         """Set parameters of a node. Raises RunError if it rejects one."""
-        parameters = [
-            RosParameter(name, value=v).to_parameter_msg() for name, v in settings.items()
-        ]
-        request = SetParametersAtomically.Request(parameters=parameters)
-        response = self._ask(self._setters[node], request)
+        response = self._ask(self._setters[node], set_request(settings))
         if response is not None and not response.result.successful:
             raise RunError(f"{node} rejected {', '.join(settings)}: {response.result.reason}")
 

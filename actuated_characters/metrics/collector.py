@@ -11,6 +11,7 @@ from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
+from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference
 
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
@@ -38,12 +39,14 @@ class MetricsCollector:
     before it are kept until then.
     """
 
+    _measurement: Measurement
+
     def __init__(self, simulator: str = topics.SIM_NODE) -> None:
         """`simulator` is the name of its status in the diagnostics."""
         self._simulator = simulator
         self._decoder = JointStateDecoder()
         self._configuration: RunConfiguration | None = None
-        self._configuration_text = ""
+        self._texts: set[str] = set()  # of configurations
         self._early: list[tuple[str, bytes, int | None]] = []
         self._early_bytes = 0
         self._counts: dict[str, int | None] = dict.fromkeys(COUNTS.values())
@@ -110,12 +113,16 @@ class MetricsCollector:
         return (last_ns - (self._first_command_ns or last_ns)) / NANOSECONDS_PER_SECOND
 
     def _configure(self, text: str) -> None:
-        if self._configuration is not None:
-            if text != self._configuration_text:
-                raise RecordingError("another simulator, or the same one restarted, was heard")
+        if text in self._texts:  # latched, it may come again
             return
-        found = configuration.parse(text)
-        self._configuration, self._configuration_text = found, text
+        self._texts.add(text)
+        found, known = configuration.parse(text), self._configuration
+        if known is not None:
+            if found.session == ANONYMOUS or found.session != known.session:
+                raise RecordingError("another simulator, or the same one restarted, was heard")
+            self._measurement.change(found.parameters)  # a reset has changed them
+            return
+        self._configuration = found
         self._measurement = Measurement(found)
         self._assembler = TickAssembler(self._measurement, int(found.parameters["rate"]))
         early, self._early = self._early, []

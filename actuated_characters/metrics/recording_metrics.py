@@ -91,6 +91,14 @@ def contact_series(character: Character, contacts: Wrenches) -> ContactSeries | 
     return ContactSeries(names, touching[:, ever], vertical)
 
 
+def gravities(recording: Recording) -> FloatArray:
+    """Gravity (t,) in each tick, m/s^2; NaN where it is not known."""
+    begins, found = recording.episode_rows.tolist(), np.full(len(recording.effort), np.nan)
+    for row in begins:
+        found[row:] = float(recording.parameters_at(row).get("gravity", np.nan))
+    return found
+
+
 def measure_recording(recording: Recording) -> tuple[dict[str, object], Series]:
     """The figures of a run and its series, as a recorder measures them: see `Measurement`."""
     character = recording.character
@@ -103,6 +111,8 @@ def measure_recording(recording: Recording) -> tuple[dict[str, object], Series]:
             parameters=dict(recording.parameters),
         )
     )
+    for later in recording.simulator:
+        measurement.change(later.parameters)
     before: StampedState | None = None
     for row, state in enumerate(_states(recording)):
         measurement.add_state(state)

@@ -1,9 +1,9 @@
 """The figures of a run, measured tick by tick."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -75,6 +75,7 @@ class Measurement:
 
     def __init__(self, configuration: RunConfiguration) -> None:
         self._configuration = configuration
+        self._has_one_weight = True
         self._layout = layout = configuration.layout
         self._hash = StateHash()
         self._block: list[Tick] = []
@@ -88,6 +89,11 @@ class Measurement:
         self._columns = [*COLUMNS]
         for joint in self._sliders:
             self._columns += slider_columns(joint.name)
+
+    def change(self, parameters: Mapping[str, Any]) -> None:
+        """Go on with other parameters of the simulator; two gravities have no one weight."""
+        if parameters.get("gravity") != self._configuration.parameters.get("gravity"):
+            self._has_one_weight = False
 
     def add_state(self, state: StampedState) -> None:
         """Add a state to the hash; each once, in order."""
@@ -121,6 +127,13 @@ class Measurement:
         rows = np.vstack([np.empty((0, len(self._columns))), *self._rows])
         return dict(zip(self._columns, rows.T, strict=True))
 
+    def _weight(self) -> float | None:
+        """The weight, N; None where gravity was changed."""
+        if not self._has_one_weight:
+            return None
+        gravity = float(self._configuration.parameters.get("gravity", np.nan))
+        return self._configuration.mass * gravity
+
     def summary(self, wall_time: float | None) -> dict[str, object]:
         """The figures by name, None if not measurable; `wall_time` is that of all ticks, s."""
         series, layout = self.series(), self._layout
@@ -146,7 +159,7 @@ class Measurement:
             "root_error_mean_m": _of_known(np.mean, series["root_error_m"]),
             "root_error_max_m": _of_known(np.max, series["root_error_m"]),
             "assist_force_mean_n": _of_known(np.mean, series["assist_force_n"]),
-            "body_weight_n": self._configuration.mass * float(parameters.get("gravity", np.nan)),
+            "body_weight_n": self._weight(),
             "saturated_fraction": self._saturated / vectors if vectors else None,
             "state_hash": self.state_hash,
         }

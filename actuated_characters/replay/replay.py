@@ -24,6 +24,7 @@ from actuated_characters.replay.world import (
     cut_world,
     make_pushes,
     make_simulation,
+    reset_changes,
     worlds,
 )
 from msgs_config.errors import SimulationError
@@ -133,7 +134,7 @@ class _ReplayedWorld:
         resets = set(self._lead.episode_rows[1:].tolist())
         for row in range(last + 1):
             if row in resets:
-                self._simulation.reset()
+                self._reset(row)
             elif row and (diverged := self._step(row - 1)) is not None:
                 return diverged
             for _, simulated, states in self._characters:
@@ -143,6 +144,15 @@ class _ReplayedWorld:
             if row % _PROGRESS_TICKS == 0 or row == last:
                 progress(row)
         return None
+
+    def _reset(self, row: int) -> None:
+        """Begin the episode whose first state is that of a row."""
+        recordings = [recording for recording, _, _ in self._characters]
+        changes = reset_changes(recordings, row, self._simulation.settings.world)
+        if changes is None:
+            self._simulation.reset()
+        else:
+            self._simulation.reset(changes.world, changes.states)
 
     def _step(self, row: int) -> Difference | None:
         """Take the tick that begins with the state of a row; a difference if it diverges."""

@@ -1,7 +1,7 @@
 """Builds the world of a recording again, and checks that the recording has what that needs."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 
@@ -11,13 +11,16 @@ from actuated_characters.bags.recording import Recording, read_recordings
 from actuated_characters.replay.comparison import clock_of
 from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.messages.clock import TickClock
+from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
 from msgs_config.versions import describe_changes, installed_versions
+from sim_node.initial_state import changed_start
 from sim_node.parameters import PARAMETERS, character_parameters
 from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
+from sim_node.physics.world import WorldSettings
 from sim_node.physics.wrenches import ExternalWrench
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import change_world, make_character_setup, make_settings
 
 _GROUNDS = ("plane", "none")
 _MOST_BEHIND = 1  # states by which a recorder that is stopped may have more of one than of another
@@ -46,19 +49,46 @@ def worlds(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
     return [tuple(together) for together in found.values()]
 
 
-def simulator_values(recording: Recording) -> Values:
-    """All parameters of the simulator, as if the character were alone.
+def simulator_values(recording: Recording, row: int = 0) -> Values:
+    """All parameters of the simulator in the state of a row, as if the character were alone.
 
     Raises:
         RecordingError: this simulator has no such parameters.
     """
-    given = {name: value for name, value in recording.parameters.items() if value is not None}
+    recorded = recording.parameters_at(row)
+    given = {name: value for name, value in recorded.items() if value is not None}
     try:
         return resolve(PARAMETERS + character_parameters(recording.character), given)
     except ActuatedCharactersError as error:
         reason = f"the recording's simulator cannot be built again: {error}"
         changes = describe_changes(recording.versions, installed_versions())
         raise RecordingError("; ".join(filter(None, (reason, changes)))) from error
+
+
+@dataclass(frozen=True)
+class ResetChanges:
+    """What is different from an episode on."""
+
+    world: WorldSettings
+    states: Mapping[str, StampedState]  # in which characters begin, by their names in the world
+
+
+def reset_changes(
+    together: Sequence[Recording], row: int, world: WorldSettings
+) -> ResetChanges | None:
+    """What the reset that led to a row has changed in a world of these settings; None: nothing.
+
+    Raises:
+        RecordingError: this simulator has no such parameters.
+    """
+    if not any(recording.simulator for recording in together):
+        return None
+    states = {}
+    for recording in together:
+        before, after = (simulator_values(recording, each) for each in (row - 1, row))
+        if (state := changed_start(before, after)) is not None:
+            states[recording.world.name] = state
+    return ResetChanges(change_world(world, simulator_values(together[0], row)), states)
 
 
 def of_character(recording: Recording) -> str:

@@ -3,22 +3,38 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
-from actuated_characters.bags.recording import Recording
+from actuated_characters.bags.recording import NodeParameters, Recording
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
+_MOST_SHOWN = 3  # numbers of a list
+
 
 @dataclass(frozen=True)
 class Change:
-    """A controller's parameter that was changed while it ran."""
+    """A node's parameter that was changed while it ran."""
 
-    time: float  # s since the first state, of the last state that the old value answered
+    time: float  # s since the first state, of the last state with the old value
     name: str
     before: object
     after: object
+
+    @property
+    def line(self) -> str:
+        """The change in words."""
+        return f"{self.name}: {_shortened(self.before)} to {_shortened(self.after)}"
+
+
+def _shortened(value: object) -> str:
+    """A value, a long list by its first entries."""
+    if isinstance(value, list) and len(value) > _MOST_SHOWN:
+        first = ", ".join(f"{each:.4g}" for each in value[:_MOST_SHOWN])
+        return f"[{first}, ... {len(value)} in all]"
+    return str(value)
 
 
 @dataclass(frozen=True)
@@ -33,10 +49,15 @@ class GainsInForce:
 
 
 def live_changes(recording: Recording) -> list[Change]:
-    """The controllers' parameters that were changed in the course of a recording."""
-    changes: list[Change] = []
+    """The nodes' parameters that were changed in the course of a recording, in their order."""
     start = int(recording.stamps_ns[0])
-    for earlier, later in zip(recording.controller, recording.controller[1:], strict=False):
+    both = [_changes(settings, start) for settings in (recording.simulator, recording.controller)]
+    return sorted((*both[0], *both[1]), key=lambda change: change.time)
+
+
+def _changes(settings: Sequence[NodeParameters], start: int) -> list[Change]:
+    changes: list[Change] = []
+    for earlier, later in pairwise(settings):
         # None: another controller, or the same one restarted
         after = start if later.after_stamp_ns is None else later.after_stamp_ns
         for name, values in differences(earlier.parameters, later.parameters).items():

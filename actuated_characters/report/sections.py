@@ -16,6 +16,7 @@ from actuated_characters.metrics.error_measures import (
 )
 from actuated_characters.metrics.recording_metrics import (
     contact_series,
+    gravities,
     measure_recording,
     tracking_errors,
 )
@@ -180,8 +181,9 @@ class CharacterReport:
             return Section("contacts", remarks=[remark])
         if not series.links:
             return Section("contacts", remarks=["No link touched anything."])
-        weight = recording.character.mass * float(recording.parameters.get("gravity", np.nan))
-        force = series.vertical_force / (weight if weight > 0.0 else np.nan)
+        gravity = gravities(recording)
+        weight = recording.character.mass * np.where(gravity > 0.0, gravity, np.nan)
+        force = series.vertical_force / weight
         curve = charts.Panel("vertical force / weight", {"vertical force / weight": force})
         chart = charts.contact_chart(self._timeline, series.touching, series.links)
         pictures = [
@@ -214,7 +216,7 @@ class CharacterReport:
         ]
         rows += [(throw.start, thrown_line(throw)) for throw in facts.throws]
         rows += [(span.start, mode_line(span)) for span in self._modes]
-        rows += [(c.time, f"{c.name}: {c.before} to {c.after}") for c in facts.changes]
+        rows += [(c.time, c.line) for c in facts.changes]
         rows += [
             (float(recording.times[row]), f"pause of {steps[row]:.3g} s of wall time")
             for row in self._pauses

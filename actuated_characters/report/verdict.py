@@ -33,7 +33,7 @@ def tiles(metrics: Mapping[str, object]) -> list[tuple[str, str]]:
     """Name and value of the metrics that support the verdict, as far as they were measured."""
     known = {name: value for name, value in metrics.items() if isinstance(value, float)}
     shown = [(title, f"{known[key]:.3g} {unit}") for title, key, unit in _TILES if key in known]
-    force, weight = known.get("assist_force_mean_n"), known["body_weight_n"]
+    force, weight = known.get("assist_force_mean_n"), known.get("body_weight_n", 0.0)
     if force is not None and weight > 0.0:
         shown.append(("mean root force / weight", f"{force / weight:.3g}"))
     if "saturated_fraction" in known:

@@ -5,7 +5,7 @@ from rclpy.node import Node
 from controller_node.behaviours.base import Surroundings
 from controller_node.controller import Controller
 from controller_node.interface.contact_subscription import ContactSubscription
-from controller_node.interface.opponent_subscription import OpponentSubscription
+from controller_node.interface.opponent_subscription import OpponentSubscription, states_of
 from controller_node.interface.simulators import Simulators
 from msgs_config.character.model import Character
 from msgs_config.runtime.once_logger import OnceLogger
@@ -23,10 +23,29 @@ class AwaitedMessages:
         logger: OnceLogger,
     ) -> None:
         """Subscribe. Raises ConfigurationError if an opponent is needed, and there can be none."""
-        self._contacts = self._opponent = None
-        if controller.needs_contacts:
-            self._contacts = ContactSubscription(node, character, simulators, logger)
+        self._node, self._simulators, self._logger = node, simulators, logger
+        self._character = character
+        self._contacts: ContactSubscription | None = None
+        self._opponent: OpponentSubscription | None = None
+        self.use(controller)
+
+    def check(self, controller: Controller) -> None:
+        """Raise ConfigurationError if a controller needs an opponent, and there can be none."""
         if controller.opponent:
+            states_of(self._node, controller.opponent)
+
+    def use(self, controller: Controller) -> None:
+        """Take what this controller needs from now on. Raises as `check` does."""
+        node, simulators, logger = self._node, self._simulators, self._logger
+        if self._contacts is not None and not controller.needs_contacts:
+            self._contacts.close()
+            self._contacts = None
+        elif self._contacts is None and controller.needs_contacts:
+            self._contacts = ContactSubscription(node, self._character, simulators, logger)
+        if self._opponent is not None and self._opponent.opponent != controller.opponent:
+            self._opponent.close()
+            self._opponent = None
+        if self._opponent is None and controller.opponent:
             self._opponent = OpponentSubscription(node, controller.opponent, simulators, logger)
 
     def begin(self) -> None:

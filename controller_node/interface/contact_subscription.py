@@ -32,6 +32,10 @@ class ContactSubscription:
         self._newest_ns = -1
         self._wrenches = dict[int, FloatArray]()  # by stamp
 
+    def close(self) -> None:
+        """End the subscription."""
+        self._inbox.close()
+
     def begin(self) -> None:
         """An episode begins, whose stamps may be those of another simulator's episode before."""
         self._until_ns = -1

@@ -11,6 +11,7 @@ from msgs_config.character.layout import ROOT
 from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder
+from msgs_config.messages.topics import Topic
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
@@ -18,6 +19,17 @@ _AXES = tuple(f"{ROOT}_{axis}" for axis in "xyz")
 _MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the own states waiting
 _EXPLAIN_AFTER = 2.0  # s of wall time
 _MOST_KEPT = 5000  # ticks whose own states are yet to come, as of contacts
+
+
+def states_of(node: Node, opponent: str) -> Topic:
+    """The topic of an opponent's states; raises ConfigurationError if there can be none."""
+    world, _, own = node.get_namespace().rpartition("/")
+    if not own or own == opponent:
+        raise ConfigurationError(
+            f"parameter 'opponent' is {opponent}: it must be another character of the world, "
+            "and this node in the namespace of its own"
+        )
+    return topics.JOINT_STATES.under(f"{world}/{opponent}")
 
 
 class OpponentSubscription:
@@ -30,18 +42,16 @@ class OpponentSubscription:
         self, node: Node, opponent: str, simulators: Simulators, logger: OnceLogger
     ) -> None:
         """Subscribe. Raises ConfigurationError if the node is in no character's namespace."""
-        world, _, own = node.get_namespace().rpartition("/")
-        if not own or own == opponent:
-            raise ConfigurationError(
-                f"parameter 'opponent' is {opponent}: it must be another character of the world, "
-                "and this node in the namespace of its own"
-            )
-        topic = topics.JOINT_STATES.under(f"{world}/{opponent}")
+        self.opponent, topic = opponent, states_of(node, opponent)
         self._inbox = DirectSubscription(node, topic)
         self._simulators, self._once_logger = simulators, logger
         self._name, self._decoder = topic.name, JointStateDecoder()
         self._places = dict[int, FloatArray]()  # by stamp
         self._waits_since: float | None = None
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._inbox.close()
 
     def restart(self) -> None:
         """Forget all: what comes from now on is another simulator's."""

@@ -53,6 +53,7 @@ class Publishers:
         """
         self._layout = layout
         self._commanded = commanded
+        self._undriven = commanded[:0]
         self.bind(session or ANONYMOUS)
         self._wrench_encoder = DoublesEncoder(WORLD)
         self._initial_states = topics.create_publisher(node, topics.INITIAL_STATE)
@@ -85,6 +86,10 @@ class Publishers:
         )
         self._reference_encoder = JointStateEncoder(names, session)
 
+    def drive(self, entries: IntArray) -> None:
+        """Command nothing to the commanded entries that are not among these, from now on."""
+        self._undriven = np.setdiff1d(self._commanded, entries)
+
     @property
     def torque_subscribers(self) -> int:
         """How many subscribe to the torques."""
@@ -94,6 +99,9 @@ class Publishers:
         self, raw: bytes, state: StampedState, effort: FloatArray, reference: StampedReference
     ) -> Reply:
         """The reply with an effort (n,) to a state, ready to be published."""
+        if len(self._undriven):
+            effort = effort.copy()
+            effort[self._undriven] = 0.0
         torques = self._torque_encoder.encode(state.stamp_ns, effort=effort[self._commanded])
         return Reply(raw, state, effort, torques, self._session, reference)
 

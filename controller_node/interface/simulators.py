@@ -74,6 +74,7 @@ class Simulators:
         self._now = 0.0
         self._lacks_episode_since: float | None = None
         self._unusable_since: float | None = None
+        self._disagrees_since: float | None = None
         depth = 2 * _MOST_KNOWN  # one of the one must not push out one of the other
         self._episodes = DirectSubscription(node, topics.EPISODE.for_listener(depth))
         self._configurations = DirectSubscription(node, _CONFIGURATION.for_listener(depth))
@@ -138,8 +139,7 @@ class Simulators:
 
         None if it is not known yet; after a while that is logged.
         """
-        session = self._binding.bound
-        known = None if session is None else self._known.get(session)
+        session, known = self._binding.bound, self._bound_one
         if known is not None and known.episode_ns is not None and known.episode_ns <= stamp_ns:
             self._lacks_episode_since = None
             return known.episode_ns
@@ -151,6 +151,40 @@ class Simulators:
                 f"the state of {stamp_ns} ns began; its session must be {named(session)}"
             )
         return None
+
+    @property
+    def configuration(self) -> RunConfiguration | None:
+        """What the bound simulator has published of itself last; None if nothing."""
+        known = self._bound_one
+        return None if known is None else known.configuration
+
+    def disagrees(self) -> bool:
+        """Whether the bound simulator is not, or not any more, what the controller is made for.
+
+        After a while, in which its configuration may be on its way, that is logged.
+        """
+        known = self._bound_one
+        if known is None or known.error is None:
+            self._disagrees_since = None
+            return False
+        self._disagrees_since = self._disagrees_since or self._now
+        if self._now > self._disagrees_since + _ALONE_AFTER:
+            self._once_logger.log_once(
+                f"no state is answered: {known.error}; set the parameter on either side to the "
+                "other's, and reset"
+            )
+        return True
+
+    def check_again(self) -> None:
+        """Compare another controller with all simulators."""
+        for known in self._known.values():
+            if known.configuration is not None:
+                known.error = self._error_of(known.configuration)
+
+    @property
+    def _bound_one(self) -> _KnownSimulator | None:
+        session = self._binding.bound
+        return None if session is None else self._known.get(session)
 
     def _admits(self, raw: bytes) -> bool:
         try:
@@ -209,7 +243,9 @@ class Simulators:
         known.configuration, known.error = found, self._error_of(found)
         if self._binding.bound != found.session:
             return
-        if is_first and known.error is not None and self._binding.release():
+        if not is_first:
+            return  # a reset has changed it; `disagreement` tells
+        if known.error is not None and self._binding.release():
             return  # its first state came before it, and another simulator may be there
         self._judge(known)
 

@@ -29,18 +29,26 @@ class StampedTopics:
     def __init__(
         self, node: Node, controller: Controller, outputs: Publishers, logger: OnceLogger
     ) -> None:
-        self._controller = controller
         self._outputs = outputs
-        subscribe = partial(StampedSubscription, node, rejection="refused ", logger=logger)
-        self._trajectories = subscribe(topics.JOINT_TRAJECTORY, use=self._set_trajectory)
-        self._velocities = []
-        if controller.is_steered:
-            self._velocities = [
-                subscribe(topics.CMD_VEL_STAMPED, use=self._steer_stamped),
-                subscribe(topics.CMD_VEL, use=self._steer),
-            ]
-        self._strengths = subscribe(topics.STRENGTH, use=self._set_strengths)
+        self._subscribe = partial(StampedSubscription, node, rejection="refused ", logger=logger)
+        self._trajectories = self._subscribe(topics.JOINT_TRAJECTORY, use=self._set_trajectory)
+        self._velocities: list[StampedSubscription] = []
+        self._strengths = self._subscribe(topics.STRENGTH, use=self._set_strengths)
         self._now_ns = self._episode_ns = 0
+        self.use(controller)
+
+    def use(self, controller: Controller) -> None:
+        """Ask this controller from now on."""
+        self._controller = controller
+        if controller.is_steered and not self._velocities:
+            self._velocities = [
+                self._subscribe(topics.CMD_VEL_STAMPED, use=self._steer_stamped),
+                self._subscribe(topics.CMD_VEL, use=self._steer),
+            ]
+        elif not controller.is_steered:
+            for each in self._velocities:
+                each.close()
+            self._velocities = []
 
     @property
     def refused(self) -> dict[str, int]:

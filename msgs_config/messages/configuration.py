@@ -20,6 +20,8 @@ from msgs_config.parameters import Value, Values, with_present_names
 from msgs_config.versions import installed_versions, read_versions
 
 _CHARACTER = ("urdf", "urdf_path", "meshes")  # keys of a URDF's text, path and meshes
+SINCE = "parameters_after_stamp_ns"
+"""The key of the stamp of the last state before the parameters were in force; null at first."""
 _TERRAIN = ("terrain_urdf", "terrain_path", "terrain_meshes")
 
 
@@ -36,8 +38,8 @@ def describe(
 ) -> str:
     """The JSON text: the character with its files, the parameters in force, and the versions.
 
-    `since_ns` is the stamp of the last state answered with other parameters; `probe` and `terrain`
-    are a simulator's, `actuation` a controller's. `name` is the character's among several,
+    `since_ns` is the stamp of the last state with other parameters; `probe` and `terrain` are a
+    simulator's, `actuation` a controller's. `name` is the character's among several,
     `characters` in their world's order. `session`, the simulator's, is no parameter here.
 
     Raises:
@@ -57,7 +59,7 @@ def describe(
         **_describe_urdf(_TERRAIN, terrain),
         "probe": None if probe is None else probe.content(),
         "actuation": None if actuation is None else dict(actuation),
-        "parameters_after_stamp_ns": since_ns,
+        SINCE: since_ns,
         "parameters": {key: _finite(values[key]) for key in values if key != SESSION.name},
         "versions": installed_versions(),
     }

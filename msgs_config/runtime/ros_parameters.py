@@ -1,6 +1,8 @@
 """Parameters at the edge: taken from a node's command line, and declared on it."""
 
-from collections.abc import Callable, Iterable
+from array import array
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -8,6 +10,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
@@ -22,8 +25,13 @@ def given_parameters(node: Node) -> dict[str, object]:
     misspelt parameter must not pass unseen.
     """
     overrides = node._parameter_overrides
-    empty = RosParameter.Type.NOT_SET  # what an empty list arrives as
-    return {name: [] if p.type_ is empty else p.value for name, p in overrides.items()}
+    return {name: _value(parameter) for name, parameter in overrides.items()}
+
+
+def set_request(values: Mapping[str, Any]) -> SetParametersAtomically.Request:
+    """The request that sets parameters of a node, all or none."""
+    parameters = [RosParameter(n, value=value).to_parameter_msg() for n, value in values.items()]
+    return SetParametersAtomically.Request(parameters=parameters)
 
 
 def declare(node: Node, parameters: Iterable[Parameter], values: Values) -> None:
@@ -75,8 +83,15 @@ class LiveParameters:
         self._take(self._values)
 
     def _with(self, changes: list[RosParameter]) -> Values:
-        given = {change.name: change.value for change in changes}
+        given = {change.name: _value(change) for change in changes}
         return resolve(self._parameters, {**self._values, **given})
+
+
+def _value(parameter: RosParameter) -> Any:
+    """The value; a message brings lists of numbers as arrays, and an empty one without a type."""
+    if parameter.type_ is RosParameter.Type.NOT_SET:
+        return []
+    return list(parameter.value) if isinstance(parameter.value, array) else parameter.value
 
 
 def _descriptor(parameter: Parameter) -> ParameterDescriptor:
@@ -86,6 +101,8 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
         description=parameter.description + unit,
         additional_constraints=" | ".join(parameter.choices),
         read_only=not parameter.when_changed,
+        # an empty list has no type of its own, and may become one of texts
+        dynamic_typing=isinstance(parameter.default, list),
     )
     bounds = {"from_value": parameter.minimum, "to_value": parameter.maximum}
     if type(parameter.default) is float and abs(parameter.maximum) != float("inf"):

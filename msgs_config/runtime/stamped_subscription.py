@@ -84,6 +84,10 @@ class StampedSubscription:
         except MessageError:
             return False  # a decoder says what is wrong with it
 
+    def close(self) -> None:
+        """End the subscription."""
+        self._messages.close()
+
     def discard(self) -> None:
         """Discard the messages that have come and were not taken."""
         self._messages.discard()

@@ -1,12 +1,14 @@
-"""The parameters of a recorded controller: at its start, and their changes."""
+"""The parameters of a recorded controller at its start, and the changes of both nodes'."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from actuated_characters.bags.recording import Recording
 from msgs_config.errors import RecordingError
+from sim_node.initial_state import POSITION, VELOCITY
 
+_OF_A_CHARACTER = (POSITION, VELOCITY)  # of what a reset may change
 _WITHOUT_LIMIT = "effort_limit."  # infinite ones are null in a configuration
 
 
@@ -48,6 +50,20 @@ def parameter_changes(
         changed = {name: value for name, value in changed.items() if name not in fixed}
         if row is not None and changed:
             changes.setdefault(row, []).append(changed)
+    return changes
+
+
+def reset_changes(together: Sequence[Recording]) -> dict[int, dict[str, Any]]:
+    """The parameters of a world's simulator that count from an episode on, by its first row."""
+    changes: dict[int, dict[str, Any]] = {}
+    for recording in together:
+        prefix = f"{recording.world.name}." if recording.world.name else ""
+        for row in recording.episode_rows.tolist()[1:]:
+            before, now = recording.parameters_at(row - 1), recording.parameters_at(row)
+            for name in now:
+                if now[name] != before.get(name):
+                    full_name = prefix + name if name in _OF_A_CHARACTER else name
+                    changes.setdefault(row, {})[full_name] = now[name]
     return changes
 
 

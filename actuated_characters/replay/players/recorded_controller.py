@@ -3,14 +3,17 @@
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.duration import Duration
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.replay.comparison import EFFORT, POSITION, VELOCITY, clock_of
+from actuated_characters.replay.players.controller_parameters import reset_changes
 from actuated_characters.replay.players.processes import PlayerReport
 from actuated_characters.replay.players.simulator_inputs import SimulatorInputs, make_inputs
 from actuated_characters.replay.world import read_world
@@ -26,7 +29,7 @@ from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.ros_parameters import declare, given_parameters
+from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 
 PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
@@ -54,6 +57,10 @@ class RecordedController(Node):
         world, _ = read_world(Path(values.text("recording")), values.integer("world"))
         self._tick_clock, self._throws = clock_of(world[0]), world[0].throws
         self._reset_client = self.create_client(Trigger, f"{topics.SIM_NODE}/reset")
+        self._changes = reset_changes(world)
+        self._setter = self.create_client(
+            SetParametersAtomically, f"{topics.SIM_NODE}/set_parameters_atomically"
+        )
         session = given_session(values)
         self._throw_codec = ThrowCodec(session)
         self._throw_topic = topics.create_publisher(self, topics.THROW)
@@ -85,7 +92,7 @@ class RecordedController(Node):
     def _is_subscribed(self) -> bool:
         """Whether the simulator receives all that it will be sent."""
         publishers = [self._throw_topic, *(p for each in self._characters for p in each.publishers)]
-        is_ready = self._reset_client.service_is_ready()
+        is_ready = self._reset_client.service_is_ready() and self._setter.service_is_ready()
         return is_ready and all(each.get_subscription_count() for each in publishers)
 
     def _play(self, stop: StopSignal, executor: PollingExecutor) -> None:
@@ -102,14 +109,16 @@ class RecordedController(Node):
                 self._report.tell_wait(lambda: f"the state of tick {FIRST_TICK + self._played}")
             if min(len(each.states) for each in self._characters) > self._played:
                 if self._played < self._ticks:
-                    self._replay_tick(self._played)
+                    self._replay_tick(self._played, stop, executor)
                 self._played += 1
                 self._report.tell_state(self._played)
                 self._report.begin_wait()
 
-    def _replay_tick(self, tick: int) -> None:
+    def _replay_tick(self, tick: int, stop: StopSignal, executor: PollingExecutor) -> None:
         """Let the simulator do what it did in a tick, counted from 0."""
         if tick in self._resets:
+            if change := self._changes.get(tick + 1):
+                self._set(change, stop, executor)
             self._reset_client.call_async(Trigger.Request())  # the next state is its answer
             for each in self._characters:
                 each.last_sent = []  # that answers a state before the reset
@@ -120,6 +129,17 @@ class RecordedController(Node):
             each.push(tick)
         for each in self._characters:
             each.command(tick)
+
+    def _set(self, change: dict[str, Any], stop: StopSignal, executor: PollingExecutor) -> None:
+        """Change parameters of the simulator, which count from the reset that follows."""
+        future = self._setter.call_async(set_request(change))
+        self._report.begin_wait()
+        while not stop and not future.done():
+            executor.rest()
+            self._report.tell_wait(lambda: f"sim_node to accept {', '.join(change)}")
+        response = future.result() if future.done() else None
+        if response is not None and not response.result.successful:
+            raise RunError(f"sim_node rejected {', '.join(change)}: {response.result.reason}")
 
     def _throw(self, tick: int) -> None:
         """Send what was thrown as a tick began; returns when the simulator has it."""

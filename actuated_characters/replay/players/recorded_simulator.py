@@ -10,7 +10,6 @@ import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.parameter import Parameter as RosParameter
 
 from actuated_characters.bags.recording import CommandArrays, read_recording
 from actuated_characters.replay.command_comparison import merge_commands, recorded_commands
@@ -41,7 +40,7 @@ from msgs_config.parameters import Parameter, resolve
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.ros_parameters import declare, given_parameters
+from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 
 PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
@@ -125,7 +124,7 @@ class RecordedSimulator(Node):
         """
         self._stop, self._executor = stop, PollingExecutor(self)
         try:
-            self._publish(topics.CONFIGURATION, self._rare.configuration)
+            self._publish(topics.CONFIGURATION, self._rare.configurations[0])
             self._wait(
                 self._is_subscribed,
                 lambda: (
@@ -171,6 +170,8 @@ class RecordedSimulator(Node):
             return  # the controller never saw it: it took the newest one
         if self._repeats:
             self._send_requests(row)
+        if row and (configuration := self._rare.configurations.get(row)) is not None:
+            self._publish(topics.CONFIGURATION, configuration)
         if begins:
             self._publish(topics.EPISODE, self._rare.episodes[row])
         stamp_ns = int(self._recording.stamps_ns[row])
@@ -236,11 +237,7 @@ class RecordedSimulator(Node):
 
     def _set(self, change: dict[str, Any]) -> None:
         """Change parameters of the controller, as they were changed then."""
-        parameters = [
-            RosParameter(name, value=value).to_parameter_msg() for name, value in change.items()
-        ]
-        request = SetParametersAtomically.Request(parameters=parameters)
-        future = self._parameter_client.call_async(request)
+        future = self._parameter_client.call_async(set_request(change))
         names = _some(list(change))
         self._wait(future.done, lambda: f"controller_node to accept {names}")
         response = future.result() if future.done() else None  # not done when it is to stop

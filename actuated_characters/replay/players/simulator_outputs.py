@@ -21,6 +21,7 @@ from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topics import Topic
@@ -47,7 +48,7 @@ Request: TypeAlias = "JointTrajectory | TwistStamped | JointState"
 class RareMessages:
     """The messages that are not of each tick, by the row of the state that they come before."""
 
-    configuration: bytes = b""  # the simulator's, before all states
+    configurations: dict[int, bytes] = field(default_factory=dict)  # the simulator's
     episodes: dict[int, bytes] = field(default_factory=dict)
     requests: dict[int, list[tuple[str, Request]]] = field(default_factory=dict)  # topic, message
 
@@ -157,7 +158,9 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
     types = {_name(recording, topic): topic.message_type for topic in (*REQUESTS, *_ACTIVE)}
     for message in read_messages(find_bag(path)):
         if message.topic == _name(recording, _CONFIGURATION):
-            rare.configuration = message.raw
+            since_ns = json.loads(decode(message.raw, String).data).get(SINCE)
+            row = 0 if since_ns is None else np.searchsorted(recording.stamps_ns, since_ns, "right")
+            rare.configurations[int(row)] = message.raw
         elif message.topic == _name(recording, topics.EPISODE):
             stamp_ns = _raw_stamp_ns(message.raw)
             rare.episodes[int(np.searchsorted(recording.stamps_ns, stamp_ns))] = message.raw

@@ -9,8 +9,8 @@ import av
 import numpy as np
 import pytest
 
+from actuated_characters.bags.node_parameters import NodeParameters
 from actuated_characters.bags.recording import RecordedWorld, Recording
-from actuated_characters.bags.tracks import ControllerSettings
 from actuated_characters.render.captions import write_on
 from actuated_characters.render.drawing import SceneSettings, draw
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
@@ -297,8 +297,8 @@ def test_a_caption_says_when_it_is_and_what_is_in_force() -> None:
     recording = standing(ticks=60)
     effort = recording.effort.copy()
     effort[49] = np.nan
-    changed = ControllerSettings({"law": "pd"}, int(recording.stamps_ns[24]))
-    first = ControllerSettings({"law": "stable_pd"}, None)
+    changed = NodeParameters({"law": "pd"}, int(recording.stamps_ns[24]))
+    first = NodeParameters({"law": "stable_pd"}, None)
     scene = make_scene(
         [
             replace(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuated_characters.bags.recording import CommandArrays, ControllerSettings, Recording
+from actuated_characters.bags.recording import CommandArrays, NodeParameters, Recording
 from actuated_characters.replay.players.character_files import write_character
 from actuated_characters.replay.players.controller_parameters import (
     first_parameters,
@@ -103,11 +103,11 @@ def settings_of(**values: float | None) -> dict[str, Any]:
 def test_a_controllers_parameters_are_those_before_its_first_answer(walk: Recording) -> None:
     stamps = walk.stamps_ns.tolist()
     configuration = (
-        ControllerSettings(settings_of(), None),
-        ControllerSettings(settings_of(**{"gains.a.p": 2.0}), None),
-        ControllerSettings(settings_of(**{"gains.a.p": 3.0}), stamps[5]),
-        ControllerSettings(settings_of(**{"gains.a.p": 4.0, "effort_limit.a": 9.0}), stamps[5]),
-        ControllerSettings(settings_of(**{"gains.a.p": 4.0, "effort_limit.a": None}), stamps[9]),
+        NodeParameters(settings_of(), None),
+        NodeParameters(settings_of(**{"gains.a.p": 2.0}), None),
+        NodeParameters(settings_of(**{"gains.a.p": 3.0}), stamps[5]),
+        NodeParameters(settings_of(**{"gains.a.p": 4.0, "effort_limit.a": 9.0}), stamps[5]),
+        NodeParameters(settings_of(**{"gains.a.p": 4.0, "effort_limit.a": None}), stamps[9]),
     )
     changing = replace(walk, controller=configuration)
 

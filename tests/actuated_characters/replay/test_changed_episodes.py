@@ -1,0 +1,147 @@
+"""Parameters that were changed at resets: recorded, replayed, forked, and told, to the last bit."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rclpy.context import Context
+from std_msgs.msg import String
+
+from actuated_characters.bags.recording import Recording, read_recording, read_recordings
+from actuated_characters.cli import main
+from actuated_characters.metrics.equation_of_motion import EquationOfMotion
+from actuated_characters.replay.replay import replay
+from actuated_characters.replay.through_topics import replay_commands, replay_states
+from actuated_characters.report.changes import live_changes
+from controller_node import parameters as controller
+from controller_node.references.factory import make_motion
+from msgs_config.messages.configuration import SINCE
+from msgs_config.parameters import resolve
+from tests.support.changed_episodes import BEGINS, MOON, TICKS, record_changed_episodes
+from tests.support.physics import character
+from tests.support.runs import summary_of
+
+pytestmark = [pytest.mark.slow, pytest.mark.sharing]
+
+
+@pytest.fixture(scope="module")
+def folder(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    del domain  # the nodes inherit it
+    return tmp_path_factory.mktemp("runs")
+
+
+@pytest.fixture(scope="module")
+def changed(folder: Path, context: Context) -> tuple[Path, list[String]]:
+    return record_changed_episodes(folder, context)
+
+
+@pytest.fixture(scope="module")
+def run(changed: tuple[Path, list[String]]) -> Path:
+    return changed[0]
+
+
+@pytest.fixture(scope="module")
+def recording(run: Path) -> Recording:
+    return read_recording(run)
+
+
+def nothing(*_: object) -> None:
+    """Hears, and does nothing."""
+
+
+def begin_of(clip: str) -> np.ndarray:
+    """The position (n,) in which a clip of the humanoid begins."""
+    humanoid = character("humanoid")
+    given = {"character": "humanoid", "reference": "clip", "clip": clip}
+    values = resolve(controller.PARAMETERS + controller.character_parameters(humanoid), given)
+    return make_motion(humanoid, values).first_state().position
+
+
+def test_each_episode_begins_where_its_reference_does(recording: Recording) -> None:
+    assert tuple(recording.episode_rows) == BEGINS
+
+    for row, clip in zip(BEGINS, ("walk", "run", "run", "walk"), strict=True):
+        np.testing.assert_allclose(recording.position[row], begin_of(clip), atol=1e-9)
+        assert (recording.parameters_at(row)["initial_position"] == begin_of(clip)).all()
+
+
+def test_the_simulator_says_before_each_episode_what_holds_in_it(
+    changed: tuple[Path, list[String]], recording: Recording
+) -> None:
+    told = [json.loads(message.data) for message in changed[1]]
+
+    assert [each[SINCE] for each in told] == [
+        None,
+        recording.stamps_ns[BEGINS[1] - 1],
+        recording.stamps_ns[BEGINS[3] - 1],
+    ]
+    shown = [(p["gravity"], p["friction"]) for p in (each["parameters"] for each in told)]
+    assert shown == [(9.81, 0.9), (MOON, 0.4), (9.81, 0.4)]
+    assert told[0]["probe"] != told[1]["probe"]
+
+
+def residual(recording: Recording, row: int, gravity: float) -> float:
+    """The residual of the equation of motion in the tick that begins in a row, as a share."""
+    humanoid, found = recording.character, recording.contacts[row]
+    assert found is not None
+    names, contacts = [link.name for link in humanoid.links], np.zeros((len(humanoid.links), 6))
+    for link, wrench in zip(found.links, found.wrenches, strict=True):
+        contacts[names.index(link)] += wrench
+    position, velocity = recording.position[row], recording.velocity[row : row + 2]
+    equation = EquationOfMotion(humanoid, gravity, 240)
+    return equation.balance(
+        position, velocity[0], recording.effort[row], velocity[1], contacts
+    ).relative
+
+
+def test_characters_move_by_the_gravity_of_their_episode(recording: Recording) -> None:
+    for begin, end in pairwise((*BEGINS, TICKS)):
+        gravity = recording.parameters_at(begin)["gravity"]
+        for row in range(begin, end - 1, 5):
+            assert residual(recording, row, gravity) < 1e-4
+            assert residual(recording, row, gravity + 1.0) > 1e-3
+
+
+def test_a_ragdoll_is_not_driven_and_neither_is_its_root(recording: Recording) -> None:
+    assert recording.effort[: BEGINS[1] - 1, :6].any(axis=1).all()
+    assert not recording.effort[BEGINS[2] : BEGINS[3] - 1].any()
+    assert recording.effort[BEGINS[3] :, :6].any()
+
+
+@pytest.mark.parametrize("way", ["in process", "commands", "states"])
+def test_a_replay_is_identical(run: Path, recording: Recording, way: str) -> None:
+    if way == "in process":
+        result = replay(read_recordings(run))
+        assert result.identical and result.episodes == len(BEGINS)
+    elif way == "commands":
+        result = replay_commands(run, progress=nothing, tell=nothing)
+        assert result.identical and result.episodes == len(BEGINS)
+    else:
+        assert replay_states(run, progress=nothing, tell=nothing).identical
+
+
+def test_a_fork_without_a_change_is_the_original(run: Path) -> None:
+    directory = run.parent / "forked"
+    at = (BEGINS[3] + 10) / 240
+
+    assert main(["fork", str(run), "--at", f"{at!r}", "--output", str(directory)]) == 0
+
+    assert summary_of(directory)["state_hash"] == summary_of(run)["state_hash"]
+
+
+def test_changes_are_listed(recording: Recording) -> None:
+    found = [(each.name, each.before, each.after) for each in live_changes(recording)]
+
+    for change in (
+        ("gravity", 9.81, MOON),
+        ("gravity", MOON, 9.81),
+        ("friction", 0.9, 0.4),
+        ("clip", "walk", "run"),
+        ("behaviour", "tracking", "ragdoll"),
+        ("library", [], ["walk"]),
+    ):
+        assert change in found
+    times = {each.name: each.time for each in live_changes(recording)}
+    assert times["solver_iterations"] == pytest.approx((BEGINS[3] - 1) / 240)

@@ -1,0 +1,64 @@
+"""A recorded run whose parameters were changed at its resets."""
+
+from pathlib import Path
+
+from rclpy.context import Context
+from std_msgs.msg import String
+
+from msgs_config.messages import topics
+from tests.support.physics import character
+from tests.support.recorded_nodes import recorded
+from tests.support.ros import SimulatorClient
+
+BEGINS = (0, 31, 72, 113)
+"""The rows of the first states of the episodes."""
+TICKS = 150
+MOON = 1.62  # m/s^2
+SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
+
+
+def record_changed_episodes(folder: Path, context: Context) -> tuple[Path, list[String]]:
+    """A walk; a run on the moon; a limp fall there; a reactive walk from a place of its own.
+
+    Returns the run, and the configurations that the simulator has published.
+    """
+    client = SimulatorClient(context)
+
+    def step(count: int) -> None:
+        change(SIMULATOR, step_count=count)
+        steps = client.step()
+        client.spin_until(steps.done, f"{count} steps")
+        assert steps.result().success, steps.result().message
+
+    def change(node: str, **values: object) -> None:
+        for name, value in values.items():
+            assert client.set_parameter(node, name, value) == (True, ""), name
+
+    with recorded(folder / "changed") as processes:
+        simulator = processes.simulator(
+            "humanoid",
+            commanded_joints=["root", *character("humanoid").layout.actuated_joint_names],
+            initial_state="reference",
+            max_ticks=TICKS,
+            wait_for_subscribers=4,
+        )
+        processes.controller("humanoid", reference="clip", wait_for_subscribers=2)
+        assert client.pause(True).success
+        client.listen(topics.JOINT_STATES)  # is the fourth, without whom nothing begins
+        client.spin_until(lambda: client.states.messages, "the first state")
+        step(BEGINS[1] - 1)
+        change(SIMULATOR, gravity=MOON, friction=0.4)
+        change(CONTROLLER, gravity=MOON, clip="run")
+        assert client.reset().success
+        step(BEGINS[2] - BEGINS[1] - 1)
+        change(CONTROLLER, behaviour="ragdoll")
+        assert client.reset().success
+        step(BEGINS[3] - BEGINS[2] - 1)
+        change(SIMULATOR, gravity=9.81, link_friction=0.6, solver_iterations=20)
+        change(CONTROLLER, behaviour="reactive", library=["walk"], gravity=9.81, clip="walk")
+        assert client.reset().success
+        assert client.pause(False).success
+        assert simulator.wait() == 0
+    configurations = list(client.configuration.messages)
+    client.close()
+    return folder / "changed" / "run", configurations
