@@ -1,7 +1,6 @@
 """`controller_node`: answers each state with joint torques, the state's stamp echoed."""
 
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Any
@@ -12,6 +11,7 @@ from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import Surroundings
 from controller_node.controller import Controller
 from controller_node.controller_setups import ControllerSetups
+from controller_node.interface.answer_report import AnswerReport
 from controller_node.interface.awaited_messages import AwaitedMessages
 from controller_node.interface.publishers import Publishers, Reply
 from controller_node.interface.simulators import Simulators, check_simulator
@@ -27,8 +27,6 @@ from msgs_config.messages.session import ANONYMOUS, given_session
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
 from msgs_config.runtime.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns
-from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
-from msgs_config.runtime.durations import Durations
 from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
@@ -66,10 +64,7 @@ class ControllerNode(ComposableNode):
         self._upcoming: Values | None = None
         self._episode_ns: int | None = None
         self._once_logger = OnceLogger(self)
-        self._diagnostics = DiagnosticsPublisher(self)
-        self._next_report = 0.0
-        self._counts: Counter[str] = Counter(answered=0, repeated=0, ignored=0, overtaken=0)
-        self._answer_times = Durations()
+        self._report = AnswerReport(self, self._character.name)
         self._serve: Callable[[], None] = lambda: None
         self._open_topics()
         self._publish_first_state()
@@ -138,12 +133,12 @@ class ControllerNode(ComposableNode):
             while not stop:
                 yield self._spin_once(executor)
         finally:
-            self._report(at_once=True)
+            self._report.publish(self._other_counts, at_once=True)
             self._outputs.flush(_FLUSH_TIME)
 
     def _spin_once(self, executor: PollingExecutor) -> float:
         """Answer a state if there is one; the turn's result."""
-        self._report()
+        self._report.publish(self._other_counts)
         self._simulators.look(time.monotonic())
         raw = self._next_state()
         if raw is not None:
@@ -171,7 +166,7 @@ class ControllerNode(ComposableNode):
 
     def _overtake(self, raw: bytes) -> None:
         """Leave a state without an answer, except that it may be the first of an episode."""
-        self._counts["overtaken"] += 1
+        self._report.counts["overtaken"] += 1
         if self._is_answered(raw):
             return
         with suppress(MessageError, LayoutError, ClockError):
@@ -184,13 +179,13 @@ class ControllerNode(ComposableNode):
             return  # the simulator publishes the state again
         if self._is_answered(raw):
             assert self._last_reply is not None
-            self._counts["repeated"] += 1
+            self._report.counts["repeated"] += 1
             self._outputs.publish(self._last_reply)
             return
         try:
             state, frame_id = self._decoder.decode(raw)
         except (MessageError, LayoutError, ClockError) as error:
-            self._counts["ignored"] += 1
+            self._report.counts["ignored"] += 1
             self._once_logger.log_once(f"state ignored: {error}")
             return
         self._bind(frame_id)
@@ -217,8 +212,8 @@ class ControllerNode(ComposableNode):
         effort, reference = self._controller.compute_effort(state, episode_ns, *surroundings)
         self._is_answering = False
         self._last_reply = self._outputs.make_reply(raw, state, effort, reference)
-        self._answer_times.add(time.perf_counter() - started)
-        self._counts["answered"] += 1
+        self._report.answer_times.add(time.perf_counter() - started)
+        self._report.counts["answered"] += 1
         mode, outlook = self._controller.mode, self._controller.outlook
         self._outputs.publish_changes(mode, outlook, state.stamp_ns)
         self._outputs.publish(self._last_reply)
@@ -294,23 +289,10 @@ class ControllerNode(ComposableNode):
         self._simulators.check_again()
         self._publish_configuration()
 
-    def _report(self, *, at_once: bool = False) -> None:
-        """Publish the diagnostics if they are due and there is a subscriber."""
-        now = time.monotonic()
-        if now < self._next_report and not at_once:
-            return
-        self._next_report = now + DIAGNOSTICS_PERIOD
-        if self._diagnostics.is_heard:
-            self._diagnostics.publish(
-                {
-                    **self._counts,
-                    **self._simulators.counts,
-                    **self._stamped_topics.refused,
-                    UNLOGGED: self._once_logger.unlogged,
-                    **self._answer_times.percentiles_us("answer", (50, 99)),
-                },
-                character=self._character.name,
-            )
+    def _other_counts(self) -> dict[str, object]:
+        """What else the diagnostics tell."""
+        unlogged = {UNLOGGED: self._once_logger.unlogged}
+        return {**self._simulators.counts, **self._stamped_topics.refused, **unlogged}
 
     def _check_parameters(self, values: Values) -> None:
         coming = self._setups.check(values)

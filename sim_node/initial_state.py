@@ -27,6 +27,7 @@ def initial_state_parameters(character: Character) -> list[Parameter]:
             f"where it begins: given by {POSITION} and {VELOCITY}, or reference: in the state in "
             "which the reference of its controller_node begins",
             choices=(GIVEN, REFERENCE),
+            at_reset=True,
         ),
         Parameter(
             POSITION,

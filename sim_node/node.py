@@ -137,7 +137,7 @@ class SimNode(ComposableNode):
             return
         if states:
             self._simulation.begin_in(states)
-            self._given.begin_in(states)
+        self._given.begin_in(states)
         if not self._settings.session:  # else a run has said so
             log_warnings(self, self._given.in_force)
         self._publisher.publish_configurations(self._given.in_force)
@@ -284,6 +284,7 @@ class SimNode(ComposableNode):
             self._rate_limiter.change(self._settings.tick_period, time.monotonic())
         for each in self._characters:
             each.change(self._settings)
+        self._initial_states.watch(self._given.in_force, values)
 
     def _publish_diagnostics(self) -> None:
         if not self._diagnostics.is_heard:

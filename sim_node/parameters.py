@@ -112,15 +112,17 @@ class SimulatorParameters:
         ]
         return replace(self, characters=tuple(characters), values=Values(self.values | new))
 
-    def check_starts(self, values: Values) -> None:
-        """Raise ConfigurationError if values do not say where each character begins.
+    def check_starts(self, before: Values, after: Values) -> None:
+        """Raise ConfigurationError if changed values do not say where each character begins.
 
-        Where it begins with its reference, the controller alone changes it.
+        Where it begins with its reference, the controller alone says it.
         """
         for each in self.characters:
+            with_reference = after.text(each.prefix + INITIAL_STATE) == REFERENCE
             for name in (POSITION, VELOCITY):
-                value, full_name = values[each.prefix + name], each.prefix + name
-                if begins_with_reference(each.values) and value != each.values[name]:
+                full_name = each.prefix + name
+                value = after[full_name]
+                if with_reference and value != before[full_name]:
                     raise ConfigurationError(
                         f"parameter '{full_name}' is not to be set, because "
                         f"'{each.prefix}{INITIAL_STATE}' is {REFERENCE}; set the controller's "

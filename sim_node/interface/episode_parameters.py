@@ -5,10 +5,18 @@ from collections.abc import Callable, Mapping
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
+from msgs_config.errors import ConfigurationError
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values
 from msgs_config.runtime.ros_parameters import LiveParameters, declare
-from sim_node.initial_state import POSITION, VELOCITY, as_values, changed_start
+from sim_node.initial_state import (
+    INITIAL_STATE,
+    POSITION,
+    VELOCITY,
+    as_values,
+    begins_with_reference,
+    changed_start,
+)
 from sim_node.parameters import SimulatorParameters
 
 
@@ -28,23 +36,33 @@ class EpisodeParameters:
         self.in_force = loaded
         self._node, self._take = node, take
         self._upcoming = loaded.values
+        self._begun = False
         unknown = loaded.open
         declare(node, [each for each in loaded.declared if each not in unknown], loaded.values)
         self._live = LiveParameters(node, loaded.declared, loaded.values, self._change, self._check)
 
     def begin_in(self, states: Mapping[str, StampedState]) -> None:
         """Let characters begin in the first states of their references, by their names."""
-        waited_for = self.in_force.open
+        waited_for, self._begun = self.in_force.open, True
         self.in_force = self.in_force.with_values({n: as_values(s) for n, s in states.items()})
+        known = {each.name: self.in_force.values[each.name] for each in waited_for}
+        self._upcoming = Values(self._upcoming | known)
         self._live.declare(waited_for, self.in_force.values)
 
     def begin_episode(self, states: Mapping[str, StampedState]) -> dict[str, StampedState] | None:
-        """Put what was changed into force; characters of these names begin in these states.
+        """Put what was changed into force.
+
+        Characters of these names that begin with their references do so in these states.
 
         Returns the starts that are others than before, by name; None if nothing has changed.
         """
         before = self.in_force
         after = before.at_reset(self._upcoming)
+        states = {
+            each.name: states[each.name]
+            for each in after.characters
+            if each.name in states and begins_with_reference(each.values)
+        }
         after = after.with_values({name: as_values(state) for name, state in states.items()})
         if after.values == before.values:
             return None
@@ -59,16 +77,23 @@ class EpisodeParameters:
 
     def _show_starts(self, names: Mapping[str, object]) -> None:
         """Give the node's parameters the values that came from controllers."""
-        shown = [
-            RosParameter(name, value=self.in_force.values[name])
+        shown = {
+            name: self.in_force.values[name]
             for each in self.in_force.characters
             if each.name in names
             for name in (each.prefix + POSITION, each.prefix + VELOCITY)
-        ]
-        self._node.set_parameters_atomically(shown)
+        }
+        self._upcoming = Values(self._upcoming | shown)
+        parameters = [RosParameter(name, value=value) for name, value in shown.items()]
+        self._node.set_parameters_atomically(parameters)
 
     def _check(self, values: Values) -> None:
-        self.in_force.check_starts(values)
+        self.in_force.check_starts(self._upcoming, values)
+        kinds = (each.prefix + INITIAL_STATE for each in self.in_force.characters)
+        if not self._begun and any(values[each] != self._upcoming[each] for each in kinds):
+            raise ConfigurationError(
+                f"parameter '{INITIAL_STATE}' may change once the first episode has begun"
+            )
 
     def _change(self, values: Values) -> None:
         self._upcoming = values

@@ -9,6 +9,7 @@ from msgs_config.errors import LayoutError, MessageError, SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.state import StampedState
+from msgs_config.parameters import Values
 from msgs_config.runtime.composition import UNTIL_A_MESSAGE
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
@@ -16,7 +17,7 @@ from msgs_config.runtime.process import StopSignal
 from sim_node.initial_state import (
     GIVEN,
     INITIAL_STATE,
-    begins_with_reference,
+    REFERENCE,
     check_state,
     describe_start,
 )
@@ -40,13 +41,20 @@ class InitialStates:
         """Subscribe to the controllers of the characters that begin with their references."""
         self._node = node
         self._timeout = parameters.values.number("initial_state_timeout")
-        speed_limit = parameters.values.number("speed_limit")
+        self._speed_limit = parameters.values.number("speed_limit")
         self._complete = False
-        self._subscriptions = [
-            _Subscription(node, each, speed_limit)
-            for each, own in zip(characters, parameters.characters, strict=True)
-            if begins_with_reference(own.values)
-        ]
+        self._characters = {each.setup.name: each for each in characters}
+        self._subscriptions: list[_Subscription] = []
+        self.watch(parameters, parameters.values)
+
+    def watch(self, parameters: SimulatorParameters, values: Values) -> None:
+        """Subscribe to the controllers of those that these values let begin with references."""
+        watched = {each.name for each in self._subscriptions}
+        for each in parameters.characters:
+            begins_so = values[each.prefix + INITIAL_STATE] == REFERENCE
+            if begins_so and each.name not in watched:
+                character = self._characters[each.name]
+                self._subscriptions.append(_Subscription(self._node, character, self._speed_limit))
 
     def wait(self, stop: StopSignal) -> Generator[float, None, dict[str, StampedState]]:
         """Wait, in turns, for the states, by the characters' names; none if `stop` comes first.

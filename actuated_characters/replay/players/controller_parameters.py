@@ -6,7 +6,7 @@ from typing import Any
 
 from actuated_characters.bags.recording import Recording
 from msgs_config.errors import RecordingError
-from sim_node.initial_state import POSITION, VELOCITY
+from sim_node.initial_state import INITIAL_STATE, POSITION, VELOCITY
 
 _OF_A_CHARACTER = (POSITION, VELOCITY)  # of what a reset may change
 _WITHOUT_LIMIT = "effort_limit."  # infinite ones are null in a configuration
@@ -54,14 +54,17 @@ def parameter_changes(
 
 
 def reset_changes(together: Sequence[Recording]) -> dict[int, dict[str, Any]]:
-    """The parameters of a world's simulator that count from an episode on, by its first row."""
+    """The parameters of a world's simulator that count from an episode on, by its first row.
+
+    Where the characters begin is given, also where it came from a controller.
+    """
     changes: dict[int, dict[str, Any]] = {}
     for recording in together:
         prefix = f"{recording.world.name}." if recording.world.name else ""
         for row in recording.episode_rows.tolist()[1:]:
             before, now = recording.parameters_at(row - 1), recording.parameters_at(row)
             for name in now:
-                if now[name] != before.get(name):
+                if name != INITIAL_STATE and now[name] != before.get(name):
                     full_name = prefix + name if name in _OF_A_CHARACTER else name
                     changes.setdefault(row, {})[full_name] = now[name]
     return changes

@@ -1,11 +1,14 @@
 """A reset is a fresh simulation, to the bit, whatever was before; only time goes on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import pybullet
 from msgs_config.errors import SimulationError
+from msgs_config.messages.state import StampedState
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import LoneSimulation, character, joint_simulation, simulation
@@ -149,3 +152,47 @@ def test_a_reset_of_two_humanoids_in_contact_is_a_fresh_simulation_to_the_bit(
                 assert simulated.state.position.tobytes() == expected.state.position.tobytes()
                 assert simulated.state.velocity.tobytes() == expected.state.velocity.tobytes()
         assert touched
+
+
+ON_THE_MOON = {
+    "gravity": 1.62,
+    "friction": 0.3,
+    "link_friction": 0.9,
+    "solver_iterations": 30,
+    "contact_breaking_threshold": 0.1,
+}
+
+
+@pytest.mark.slow
+@any_settings
+def test_a_reset_with_other_settings_is_a_fresh_simulation_of_them_to_the_bit(
+    given: dict[str, object],
+) -> None:
+    rng, whole = np.random.default_rng(4), character("humanoid")
+    start = np.array(whole.rest_position) + rng.uniform(-0.05, 0.05, whole.layout.size)
+    begins = {"initial_position": start.tolist(), "initial_velocity": [0.1] * whole.layout.size}
+    efforts = humanoid_efforts(120, size=3.0)
+    fresh_one = simulation("humanoid", **given, **ON_THE_MOON, **begins)
+    with fresh_one as fresh, simulation("humanoid", **given) as used:
+        a_dirty_episode(used)
+        state = StampedState(0, start, np.full(whole.layout.size, 0.1), None)
+
+        used.reset(replace(used.settings.world, **ON_THE_MOON), {"": state})
+
+        assert used.settings.world == fresh.settings.world
+        for effort in efforts:
+            assert used.state.position.tobytes() == fresh.state.position.tobytes()
+            assert used.state.velocity.tobytes() == fresh.state.velocity.tobytes()
+            used.advance(effort)
+            fresh.advance(effort)
+
+
+def test_other_settings_stay_for_the_episodes_after() -> None:
+    with simulation("lift", gravity=9.81) as run:
+        run.reset(replace(run.settings.world, gravity=1.62))
+        speeds = []
+        for _ in range(2):
+            speeds.append(run.advance(np.zeros(1)).velocity[0])
+            run.reset()
+
+        assert speeds == pytest.approx([-1.62 / 240.0] * 2)
