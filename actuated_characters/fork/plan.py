@@ -200,9 +200,10 @@ def _checked_settings(
                 raise ConfigurationError(one_of(f"parameter of {node}", name, sorted(declared)))
             checked.setdefault(node, {})[name] = declared[name].checked(value)
             if not declared[name].live:
+                why = "changes at a reset alone" if declared[name].at_reset else "cannot change"
                 raise ConfigurationError(
-                    f"parameter '{name}' of {node} cannot change while a run goes on, so not in a "
-                    f"fork; 'actuated_characters parameters {node}' says which are live"
+                    f"parameter '{name}' of {node} {why} while a run goes on, so not in a fork; "
+                    f"'actuated_characters parameters {node}' says which are live"
                 )
     return checked
 

@@ -45,7 +45,7 @@ class Publishers:
             return topics.create_publisher(node, topic.under(character.setup.name))
 
         self._episode = create(topics.EPISODE)
-        self._configuration = create(topics.CONFIGURATION.of(node.get_name()))
+        self.configuration = create(topics.CONFIGURATION.of(node.get_name()))
         self._states = create(topics.JOINT_STATES)
         self._contacts = create(topics.CONTACTS)
         self._wrenches = create(topics.APPLIED_WRENCH)
@@ -105,7 +105,7 @@ class Publishers:
             characters=characters,
             session=self._session,
         )
-        self._configuration.publish(String(data=text))
+        self.configuration.publish(String(data=text))
 
     def change_sensing(self, settings: SensingSettings) -> None:
         """Read the sensors by other settings from now on."""

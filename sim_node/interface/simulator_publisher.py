@@ -17,6 +17,8 @@ from sim_node.parameters import SimulatorParameters
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.simulation import Simulation
 
+_ACKNOWLEDGE_TIME = 0.5  # s that subscribers may take to acknowledge a changed configuration
+
 
 class SimulatorPublisher:
     """Publishes each tick in a row, in the order in which controllers may wait for its messages."""
@@ -61,6 +63,8 @@ class SimulatorPublisher:
         self._samples = [measure_probe(each.character, gravity) for each in parameters.characters]
         if self._is_configured:
             self.publish_configurations(parameters, since_ns)
+            # each latched topic keeps one message: the next must not push it out
+            topics.flush([each.configuration for each in self.of_characters], _ACKNOWLEDGE_TIME)
 
     def publish_episode(self) -> None:
         """Publish that the present tick is the first of an episode."""

@@ -145,3 +145,14 @@ def test_changes_are_listed(recording: Recording) -> None:
     assert [change for change in changes if change not in found] == []
     times = {each.name: each.time for each in live_changes(recording)}
     assert times["solver_iterations"] == pytest.approx((BEGINS[3] - 1) / 240)
+
+
+def test_info_and_report_tell_of_changes(run: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(run), "--json"]) == 0
+    told = json.loads(capfd.readouterr().out)["runs"][0]["changes"]
+    assert {"name": "gravity", "before": 9.81, "after": MOON} in [
+        {key: change[key] for key in ("name", "before", "after")} for change in told
+    ]
+    page = run.parent / "page"
+    assert main(["report", str(run), "--output", str(page)]) == 0
+    assert f"gravity: 9.81 to {MOON}" in (page / "index.html").read_text()
