@@ -60,14 +60,13 @@ class ControllerSetups:
         self.in_force.controller.check(make_settings(self._character, self._now(values)))
         if self._coming(values) == self._coming(self.in_force.values):
             return None
-        upcoming = self._find(values)
-        if upcoming is None:
-            upcoming = self._checked = make_setup(self._character, values)
-            if ROOT in upcoming.commanded and not self._may_drive_root:
-                raise ConfigurationError(
-                    "the root is not driven in this run: sim_node's 'commanded_joints' were to be "
-                    "without 'root'; set 'root_assistance' to false, or begin with it"
-                )
+        upcoming = self._find(values) or make_setup(self._character, values)
+        if ROOT in upcoming.commanded and not self._may_drive_root:
+            raise ConfigurationError(
+                "the root cannot be driven, because it was not when this controller began, and "
+                "sim_node's 'commanded_joints' lack it; set 'root_assistance' to false"
+            )
+        self._checked = upcoming
         upcoming.controller.check(make_settings(self._character, values))
         return upcoming
 
@@ -79,8 +78,10 @@ class ControllerSetups:
             self._set(self.upcoming, values)
 
     def _set(self, setup: ControllerSetup, values: Values) -> None:
-        setup.values = values
-        setup.controller.settings = make_settings(self._character, values)
+        """Set live values; where there is no new one, nothing happens that a planner notices."""
+        if values != setup.values:
+            setup.values = values
+            setup.controller.settings = make_settings(self._character, values)
 
     def _find(self, values: Values) -> ControllerSetup | None:
         """What was built already for the next episode's values."""

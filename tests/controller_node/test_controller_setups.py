@@ -51,6 +51,16 @@ def test_what_is_for_the_next_episode_waits_for_it() -> None:
     assert not made.begin_episode()
 
 
+def test_what_is_for_the_next_episode_does_not_touch_this_one() -> None:
+    """Its planner, for one, would seek another plan, and no replay would know when."""
+    made = setups()
+    settings = made.in_force.controller.settings
+
+    made.take(changed(made, clip="run"))
+
+    assert made.in_force.controller.settings is settings
+
+
 def test_live_values_count_at_once_and_in_the_next_episode_too() -> None:
     made = setups()
 
@@ -106,5 +116,6 @@ def test_the_root_is_driven_only_in_runs_that_began_so() -> None:
     assert assisted.begin_episode() and "root" in assisted.in_force.commanded
 
     alone = setups(root_assistance=False)
-    with pytest.raises(ConfigurationError, match=r"'commanded_joints'.*'root_assistance'"):
-        alone.check(changed(alone, root_assistance=True))
+    for _ in range(2):
+        with pytest.raises(ConfigurationError, match=r"'commanded_joints'.*'root_assistance'"):
+            alone.check(changed(alone, root_assistance=True))
