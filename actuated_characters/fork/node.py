@@ -8,6 +8,7 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from actuated_characters.replay.comparison import (
     clock_of,
     first_difference,
 )
+from actuated_characters.replay.players.controller_parameters import late_topics
 from actuated_characters.replay.players.processes import ANSWER_TIMEOUT
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.runs.planned_files import Planned
@@ -159,9 +161,13 @@ class ForkNode(Node):
         """Whether all are there that will be called or sent something."""
         clients: list[Client] = [*self._setters.values(), *self._simulator_clients.values()]
         return all(each.service_is_ready() for each in clients) and all(
-            publisher.get_subscription_count() >= count
-            for publisher, count in self._outgoing.values()
+            self._is_heard(name) for name in self._outgoing.keys() - late_topics(self._recording)
         )
+
+    def _is_heard(self, name: str) -> bool:
+        """Whether all that are to hear a topic subscribe to it."""
+        publisher, count = self._outgoing[name]
+        return publisher.get_subscription_count() >= count
 
     def _step(self, present: int, row: int) -> int:
         """Go on from a row's state to another's; returns that row."""
@@ -192,6 +198,7 @@ class ForkNode(Node):
             raw = self._throw_codec.encode(throw.stamp_ns, throw.throw)
             messages.append((topics.THROW.name, raw))
         for name, message in messages:
+            self._wait(partial(self._is_heard, name), f"subscribers of '{name}'")
             self._outgoing[name][0].publish(message)
         for name in dict.fromkeys(name for name, _ in messages):
             if not self._outgoing[name][0].wait_for_all_acked(_ACKNOWLEDGED):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from rclpy.context import Context
 from std_msgs.msg import String
 
@@ -10,19 +11,20 @@ from tests.support.physics import character
 from tests.support.recorded_nodes import recorded
 from tests.support.ros import SimulatorClient
 
-BEGINS = (0, 31, 72, 113)
+BEGINS = (0, 31, 72, 113, 150)
 """The rows of the first states of the episodes."""
-TICKS = 150
+TICKS = 200
 MOON = 1.62  # m/s^2
 SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
 
 
 def record_changed_episodes(folder: Path, context: Context) -> tuple[Path, list[String]]:
-    """A walk; a run on the moon; a limp fall there; a reactive walk from a place of its own.
+    """A walk; a run on the moon; a limp fall there; a reactive walk; a steered one.
 
     Returns the run, and the configurations that the simulator has published.
     """
     client = SimulatorClient(context)
+    velocities = client.speak(topics.CMD_VEL_STAMPED)
 
     def step(count: int) -> None:
         change(SIMULATOR, step_count=count)
@@ -57,6 +59,13 @@ def record_changed_episodes(folder: Path, context: Context) -> tuple[Path, list[
         change(SIMULATOR, gravity=9.81, link_friction=0.6, solver_iterations=20)
         change(CONTROLLER, behaviour="reactive", library=["walk"], gravity=9.81, clip="walk")
         assert client.reset().success
+        step(BEGINS[4] - BEGINS[3] - 1)
+        change(CONTROLLER, behaviour="tracking", reference="steered")
+        assert client.reset().success
+        step(3)
+        client.spin_until(lambda: velocities.get_subscription_count() == 2, "who hears velocities")
+        velocities.publish(TwistStamped(twist=Twist(linear=Vector3(x=1.0))))
+        assert velocities.wait_for_all_acked()
         assert client.pause(False).success
         assert simulator.wait() == 0
     configurations = list(client.configuration.messages)

@@ -6,6 +6,7 @@ from typing import Any
 
 from actuated_characters.bags.recording import Recording
 from msgs_config.errors import RecordingError
+from msgs_config.messages import topics
 from sim_node.initial_state import INITIAL_STATE, POSITION, VELOCITY
 
 _OF_A_CHARACTER = (POSITION, VELOCITY)  # of what a reset may change
@@ -68,6 +69,13 @@ def reset_changes(together: Sequence[Recording]) -> dict[int, dict[str, Any]]:
                     full_name = prefix + name if name in _OF_A_CHARACTER else name
                     changes.setdefault(row, {})[full_name] = now[name]
     return changes
+
+
+def late_topics(recording: Recording) -> frozenset[str]:
+    """The topics that the controller may subscribe to only in a later episode."""
+    first = recording.controller[0].parameters if recording.controller else {}
+    is_steered = first.get("reference") == "steered"
+    return frozenset() if is_steered else frozenset({topics.CMD_VEL_STAMPED.name})
 
 
 def _known(parameters: dict[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from rclpy.node import Node
 
 from actuated_characters.bags.recording import CommandArrays, read_recording
 from actuated_characters.replay.command_comparison import merge_commands, recorded_commands
-from actuated_characters.replay.players.controller_parameters import parameter_changes
+from actuated_characters.replay.players.controller_parameters import late_topics, parameter_changes
 from actuated_characters.replay.players.processes import ANSWER_TIMEOUT, PlayerReport
 from actuated_characters.replay.players.simulator_outputs import (
     REQUESTS,
@@ -114,6 +114,7 @@ class RecordedSimulator(Node):
             topic = topics.JOINT_STATES.under(f"/{self._opponent}")
             self._outputs[self._opponent] = topics.create_publisher(self, topic)
             self._opponents_states = read_opponent(self._path, self._recording)
+        self._late = late_topics(self._recording)
         self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
 
     def run(self, stop: StopSignal) -> None:
@@ -156,7 +157,8 @@ class RecordedSimulator(Node):
 
     def _is_subscribed(self) -> bool:
         """Whether there is a controller, and all that it is sent will reach it."""
-        publishers = [self._outputs[topics.JOINT_STATES.name], *self._requests.values()]
+        requests = [each for name, each in self._requests.items() if name not in self._late]
+        publishers = [self._outputs[topics.JOINT_STATES.name], *requests]
         if self._changes and not self._parameter_client.service_is_ready():
             return False
         answers = self.count_publishers(topics.JOINT_TORQUES.name)
@@ -231,6 +233,7 @@ class RecordedSimulator(Node):
     def _send_requests(self, row: int) -> None:
         for name, message in self._rare.requests.get(row, ()):
             publisher = self._requests[name]
+            self._wait(publisher.get_subscription_count, lambda: "controller_node to subscribe")
             publisher.publish(message)
             if not publisher.wait_for_all_acked(_ACKNOWLEDGED):
                 raise RunError(f"controller_node did not acknowledge a message on '{name}'")
@@ -246,7 +249,7 @@ class RecordedSimulator(Node):
 
     def _wait(
         self,
-        condition: Callable[[], bool],
+        condition: Callable[[], object],
         what: Callable[[], str],
         timeout: float = ANSWER_TIMEOUT,
     ) -> None:
