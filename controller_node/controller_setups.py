@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from controller_node.controller import Controller
 from controller_node.parameters import commanded_joints, make_controller, make_settings
 from controller_node.references.factory import make_motion
+from msgs_config.arrays import IntArray
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
@@ -19,7 +22,8 @@ class ControllerSetup:
     values: Values
     controller: Controller
     first_state: StampedState  # in which its reference begins
-    commanded: tuple[str, ...]  # the joints that it drives
+    drives_root: bool
+    driven: IntArray  # the entries of the effort that it drives
     warnings: tuple[str, ...]
 
 
@@ -31,8 +35,15 @@ def make_setup(character: Character, values: Values) -> ControllerSetup:
     """
     motion = make_motion(character, values)
     controller = make_controller(character, motion.reference, values)
-    commanded = tuple(commanded_joints(character, values))
-    return ControllerSetup(values, controller, motion.first_state(), commanded, motion.warnings)
+    joints = commanded_joints(character, values)
+    return ControllerSetup(
+        values=values,
+        controller=controller,
+        first_state=motion.first_state(),
+        drives_root=ROOT in joints,
+        driven=np.flatnonzero(character.layout.mask(joints)),
+        warnings=motion.warnings,
+    )
 
 
 class ControllerSetups:
@@ -49,7 +60,7 @@ class ControllerSetups:
         self._checked: ControllerSetup | None = None  # built for values that are to be taken
         self._character = character
         self._at_resets = [each.name for each in parameters if each.at_reset]
-        self._may_drive_root = ROOT in self.in_force.commanded
+        self._may_drive_root = self.in_force.drives_root
 
     def check(self, values: Values) -> ControllerSetup | None:
         """Check values; the controller of the next episode, None if it is the one in force.
@@ -61,7 +72,7 @@ class ControllerSetups:
         if self._coming(values) == self._coming(self.in_force.values):
             return None
         upcoming = self._find(values) or make_setup(self._character, values)
-        if ROOT in upcoming.commanded and not self._may_drive_root:
+        if upcoming.drives_root and not self._may_drive_root:
             raise ConfigurationError(
                 "the root cannot be driven, because it was not when this controller began, and "
                 "sim_node's 'commanded_joints' lack it; set 'root_assistance' to false"

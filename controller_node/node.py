@@ -5,8 +5,6 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Any
 
-import numpy as np
-
 from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import Surroundings
 from controller_node.controller import Controller
@@ -18,7 +16,6 @@ from controller_node.interface.simulators import Simulators, check_simulator
 from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.interface.state_decoder import StateDecoder
 from controller_node.parameters import PARAMETERS, character_parameters, check_world
-from msgs_config.arrays import IntArray
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
@@ -88,7 +85,9 @@ class ControllerNode(ComposableNode):
         self._pending_state: bytes | None = None  # a state, for what is awaited with it
         # after them: a simulator that has found this subscription has found the others as well
         self._states = DirectSubscription(self, topics.JOINT_STATES)
-        self._outputs = Publishers(self, self._layout, self._driven, self._simulators.bound)
+        self._outputs = Publishers(
+            self, self._layout, self._setups.in_force.driven, self._simulators.bound
+        )
         self._stamped_topics = StampedTopics(self, controller, self._outputs, logger)
         self._publish_configuration()
 
@@ -100,15 +99,10 @@ class ControllerNode(ComposableNode):
     def _values(self) -> Values:
         return self._setups.in_force.values
 
-    @property
-    def _driven(self) -> IntArray:
-        """The entries of the effort that the controller drives."""
-        return np.flatnonzero(self._layout.mask(self._setups.in_force.commanded))
-
     def _publish_configuration(self) -> None:
         """Publish the parameters in force, and since which state they are."""
         since_ns = None if self._last_reply is None else self._last_reply.state.stamp_ns
-        actuation = describe_actuation(len(self._driven), self._layout.size)
+        actuation = describe_actuation(len(self._setups.in_force.driven), self._layout.size)
         self._outputs.publish_configuration(
             configuration.describe(self._character, self._values, since_ns, actuation=actuation)
         )
@@ -285,7 +279,7 @@ class ControllerNode(ComposableNode):
         controller.while_planning(self._serve)
         self._awaited.use(controller)
         self._stamped_topics.use(controller)
-        self._outputs.drive(self._driven)
+        self._outputs.drive(self._setups.in_force.driven)
         self._simulators.check_again()
         self._publish_configuration()
 

@@ -111,9 +111,9 @@ def test_what_cannot_be_is_refused_in_one_line_and_changes_nothing(
 def test_the_root_is_driven_only_in_runs_that_began_so() -> None:
     assisted = setups()
     assisted.take(changed(assisted, root_assistance=False))
-    assert assisted.begin_episode() and "root" not in assisted.in_force.commanded
+    assert assisted.begin_episode() and not assisted.in_force.drives_root
     assisted.take(changed(assisted, root_assistance=True))
-    assert assisted.begin_episode() and "root" in assisted.in_force.commanded
+    assert assisted.begin_episode() and assisted.in_force.drives_root
 
     alone = setups(root_assistance=False)
     for _ in range(2):
