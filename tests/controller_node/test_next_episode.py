@@ -65,11 +65,11 @@ def test_a_gravity_of_one_side_alone_is_waited_for_on_the_other(
     (line,) = [line for line in controller.stderr.splitlines() if "no state" in line]
     assert "'gravity'" in line
     client.spin_until(lambda: not client.states.messages[-1].effort, "a first state")
-    held = tick_of(client.states.last)
+    first = tick_of(client.states.last)
 
     assert client.set_parameter(CONTROLLER, "gravity", 1.62) == (True, "")
 
-    assert go_on(client) > held + 10
+    assert go_on(client) > first + 10
     assert controller.exit_code is None
 
 
