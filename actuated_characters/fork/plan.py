@@ -200,9 +200,11 @@ def _checked_settings(
                 raise ConfigurationError(one_of(f"parameter of {node}", name, sorted(declared)))
             checked.setdefault(node, {})[name] = declared[name].checked(value)
             if not declared[name].live:
-                why = "changes at a reset alone" if declared[name].at_reset else "cannot change"
+                why = "cannot change while a run goes on"
+                if declared[name].at_reset:
+                    why = "changes at a reset alone"
                 raise ConfigurationError(
-                    f"parameter '{name}' of {node} {why} while a run goes on, so not in a fork; "
+                    f"parameter '{name}' of {node} {why}, so not in a fork; "
                     f"'actuated_characters parameters {node}' says which are live"
                 )
     return checked

@@ -47,7 +47,11 @@ def refusal(capsys: pytest.CaptureFixture[str], run: Path, *options: str) -> str
         (["--at", "0.1", "--push", "rod:1,0,0@0.05"], "begins at 0.05 s, before the fork at 0.1 s"),
         (["--at", "0.1", "--push", "nose:1,0,0@0.15"], "push: unknown link 'nose'"),
         (["--at", "0.1", "--throw", "mass=1"], "throw 'mass=1': 'speed' is missing"),
-        (["--at", "0.1", "--set", "sim_node.gravity:=3"], "'gravity' of sim_node cannot change"),
+        (["--at", "0.1", "--set", "sim_node.rate:=3"], "'rate' of sim_node cannot change"),
+        (
+            ["--at", "0.1", "--set", "sim_node.gravity:=3"],
+            "'gravity' of sim_node changes at a reset",
+        ),
         (["--at", "0.1", "--set", "sim_node.gravty:=3"], "parameter of sim_node 'gravty'"),
         (["--at", "0.1", "--set", "controller_node.law:=lqr"], "'law': 'lqr'"),
         (["--at", "0.1", "--set", "recorder.storage:=mcap"], "node 'recorder'"),
