@@ -130,7 +130,9 @@ class Panel:
             node = f"{chosen.simulator}/{topics.SIM_NODE}"
             self.requests.get(node, ["real_time_factor", "wrench_duration"], self._take_settings)
             controller = f"{chosen.below}/{topics.CONTROLLER_NODE}"
-            self._controls.choose({SIMULATOR: node, CONTROLLER: controller}, chosen.parameters)
+            own = chosen.below.removeprefix(chosen.simulator).strip("/")
+            nodes = {SIMULATOR: node, CONTROLLER: controller}
+            self._controls.choose(nodes, own, chosen.parameters)
         stamp_ns, now = stamps_ns.get(chosen.below), time.monotonic()
         if stamp_ns is not None and now >= self._next_text:
             self._next_text = now + _TEXT_PERIOD

@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from actuated_characters.viewer.controls.requests import Requests
-from actuated_characters.viewer.controls.shown_parameters import AT_RESET, Shown
+from actuated_characters.viewer.controls.shown_parameters import AT_RESET, SIMULATOR, Shown
 
 Later = Callable[[Callable[..., None], Callable[[], Any]], Callable[..., Any]]
 
@@ -21,13 +21,19 @@ class ParameterControls:
     ) -> None:
         self._gui, self._requests, self._later, self._tell = gui, requests, later, tell
         self._nodes: dict[str, str] = {}  # whole names by those in the contract
+        self._prefix = ""  # of the character's own parameters of its simulator
         self._shown: Mapping[str, tuple[Shown, ...]] = {}
         self._folders: dict[str, Any] = {}
         self._controls: dict[str, tuple[Shown, Any]] = {}  # by the parameter's name
 
-    def choose(self, nodes: dict[str, str], shown: Mapping[str, tuple[Shown, ...]]) -> None:
-        """Be about some nodes from now on, and about the parameters of each folder's title."""
-        self._nodes = nodes
+    def choose(
+        self, nodes: dict[str, str], name: str, shown: Mapping[str, tuple[Shown, ...]]
+    ) -> None:
+        """Be about some nodes from now on, and about the parameters of each folder's title.
+
+        `name` is the character's in its simulator; empty where it is alone.
+        """
+        self._nodes, self._prefix = nodes, f"{name}." if name else ""
         if shown != self._shown:
             self._shown = shown
             self._build()
@@ -99,3 +105,11 @@ class ParameterControls:
         self._tell(f"{shown.name} {given}: {reason or ('at the next reset' if waits else 'set')}")
         if reason:
             self._ask([shown.name])
+            return
+        for other, name, follows in shown.then:
+            whole = self._prefix + name if other == SIMULATOR else name
+            self._requests.set(self._nodes[other], whole, follows, partial(self._reject, whole))
+
+    def _reject(self, name: str, reason: str) -> None:
+        if reason:
+            self._tell(f"{name}: {reason}")

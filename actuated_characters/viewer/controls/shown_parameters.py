@@ -26,6 +26,7 @@ class Shown:
     range: tuple[float, float, float] | None = None  # least, most, step
     has_no_limit: bool = False  # the slider's largest value stands for infinity
     nodes: tuple[str, ...] = (CONTROLLER,)  # that have it; the first one's value is shown
+    then: tuple[tuple[str, str, str], ...] = ()  # node, name, value: set when this one was taken
 
 
 _LAW = (
@@ -43,6 +44,10 @@ _LAW = (
     Shown("balance.stiffness", "Balance (N/m)", range=(0.0, 5000.0, 50.0)),
     Shown("balance.damping", "Balance (N s/m)", range=(0.0, 1000.0, 10.0)),
 )
+_TRACKED_FROM_ITS_START = (
+    (CONTROLLER, "reference", "clip"),
+    (SIMULATOR, "initial_state", "reference"),
+)
 _WORLD = (
     Shown("gravity", "Gravity (m/s²)", range=(0.0, 20.0, 0.01), nodes=(SIMULATOR, CONTROLLER)),
     Shown("friction", "Friction, ground", range=(0.0, 2.0, 0.05), nodes=(SIMULATOR,)),
@@ -54,7 +59,7 @@ def shown_parameters(character: Character) -> dict[str, tuple[Shown, ...]]:
     """Those of a character's nodes, by the titles of the panel's folders."""
     motion = [Shown("behaviour", "Behaviour", options=BEHAVIOUR_PARAMETERS[0].choices)]
     if clips := available_clips(character):
-        motion.insert(0, Shown("clip", "Clip", options=tuple(clips)))
+        motion.insert(0, Shown("clip", "Clip", options=tuple(clips), then=_TRACKED_FROM_ITS_START))
     strengths = tuple(
         Shown(f"strength.{name}", name, range=(0.0, 1.0, 0.05))
         for name in character.vector_names
