@@ -1,0 +1,1 @@
+"""Captured motion of any skeleton, made into motion of a character."""

@@ -1,0 +1,94 @@
+"""When feet and hands stand on the ground: near it and slow, with hysteresis."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from msgs_config.arrays import BoolArray, FloatArray
+
+_ENTER, _LEAVE = (0.022, 0.20), (0.035, 0.40)  # height in m and speed in m/s of a character's size
+_SMOOTHED = 0.05  # s over which a speed is measured
+_LEAST, _GAP = 0.06, 0.05  # s of a contact, and of a break that is none
+_GROUND = 2.0  # per cent of the heights of a joint that may be below its height on the ground
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A time in which a point of a body stands on the ground."""
+
+    first: int  # frame
+    last: int
+
+    @property
+    def frames(self) -> slice:
+        """The frames of it."""
+        return slice(self.first, self.last + 1)
+
+
+def ground_height(heights: FloatArray) -> float:
+    """The height of a joint that stands on the ground, of its heights (...) over a motion."""
+    return float(np.percentile(heights, _GROUND))
+
+
+def speeds(positions: FloatArray, frame_time: float) -> FloatArray:
+    """Speed (f,) in m/s of points (f, 3), over a few hundredths of a second."""
+    reach = max(1, round(0.5 * _SMOOTHED / frame_time))
+    rows = np.arange(len(positions))
+    after, before = np.minimum(rows + reach, len(rows) - 1), np.maximum(rows - reach, 0)
+    lasting = np.maximum(after - before, 1) * frame_time
+    speed: FloatArray = np.linalg.norm(positions[after] - positions[before], axis=-1) / lasting
+    return speed
+
+
+def find_contacts(
+    positions: FloatArray, ground: float, frame_time: float
+) -> tuple[Contact, ...]:
+    """The contacts of a point with the ground.
+
+    Args:
+        positions: Of the point (f, 3), in m of the character's size, z up.
+        ground: Its height in m when it stands on the ground.
+        frame_time: s.
+    """
+    height, speed = positions[:, 2] - ground, speeds(positions, frame_time)
+    enters = (height < _ENTER[0]) & (speed < _ENTER[1])
+    stays = (height < _LEAVE[0]) & (speed < _LEAVE[1])
+    return joined(_with_hysteresis(enters, stays), frame_time)
+
+
+def joined(touches: BoolArray, frame_time: float) -> tuple[Contact, ...]:
+    """The contacts of frames (f,) that touch; short breaks closed, and short contacts left out."""
+    edges = np.flatnonzero(np.diff(touches.astype(int), prepend=0, append=0))
+    spans = [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    merged: list[tuple[int, int]] = []
+    for first, last in spans:
+        if merged and (first - merged[-1][1] - 1) * frame_time < _GAP:
+            merged[-1] = (merged[-1][0], last)
+        else:
+            merged.append((first, last))
+    least = max(2, round(_LEAST / frame_time))
+    return tuple(Contact(first, last) for first, last in merged if last - first + 1 >= least)
+
+
+def mask(contacts: tuple[Contact, ...], frames: int) -> BoolArray:
+    """The frames (f,) of some contacts."""
+    touches = np.zeros(frames, dtype=np.bool_)
+    for contact in contacts:
+        touches[contact.frames] = True
+    return touches
+
+
+def flat_frames(contacts: Mapping[str, tuple[Contact, ...]], side: str, frames: int) -> BoolArray:
+    """The frames (f,) in which heel and toes of a side's foot stand on the ground."""
+    return mask(contacts[f"{side}_heel"], frames) & mask(contacts[f"{side}_toe"], frames)
+
+
+def _with_hysteresis(enters: BoolArray, stays: BoolArray) -> BoolArray:
+    """The frames (f,) that lie in a span of frames that stay, of which one enters."""
+    touches = np.zeros_like(stays)
+    edges = np.flatnonzero(np.diff(stays.astype(int), prepend=0, append=0))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        if enters[first:end].any():
+            touches[first:end] = True
+    return touches

@@ -1,0 +1,190 @@
+"""What a character's links should do to show a captured motion: the goals of its kinematics."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from actuated_characters.motion.retargeting.captured_body import CapturedBody
+from actuated_characters.motion.retargeting.contacts import Contact
+from actuated_characters.motion.retargeting.inverse_kinematics import Goals
+from actuated_characters.motion.retargeting.segments import SegmentTurns
+from actuated_characters.motion.retargeting.skeleton_map import SIDES
+from actuated_characters.motion.retargeting.target_body import TargetBody
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.layout import GeneralizedPosition, JointType
+from msgs_config.geometry import elementary, rotations
+
+# Weights: one over what counts as a residual of one
+_TURNS = {"pelvis": 1 / 0.06, "chest": 1 / 0.06, "head": 1 / 0.12, "ankle": 1 / 0.12}
+_BONE, _TWIST = 1 / 0.06, 1 / 0.5  # rad, of limbs across and about their bones
+_PELVIS = np.array((1 / 0.03, 1 / 0.03, 1 / 0.03))  # m
+_ANKLE = 1 / 0.03  # m
+_STANDING = 1 / 0.001  # m, of a point that stands on the ground
+_GROUND, _LIMIT = 1 / 0.001, 1 / 0.005  # m below it, rad beyond one
+_ACCELERATION, _ROOT_ACCELERATION = 90.0, 25.0  # rad/s^2 and m/s^2
+_MARGIN = 0.001  # m over the ground
+_RAMP = 0.06  # s in which a contact takes hold
+
+
+def free_goals(body: CapturedBody, target: TargetBody, turns: SegmentTurns) -> Goals:
+    """The goals without contacts: turns of all segments, places of pelvis and ankles."""
+    roles = list(turns.turns_xyzw)
+    wanted = np.stack([turns.turns_xyzw[role] for role in roles], axis=1)
+    weights = np.stack([_turn_weights(role, turns, body.frames) for role in roles], axis=1)
+    ankles = [f"{side}_ankle" for side in SIDES]
+    names, offsets = ["pelvis", *ankles], [hips_in_pelvis(target), np.zeros(3), np.zeros(3)]
+    places = np.stack([body.middle("hip"), *(body.part(role) for role in ankles)], axis=1)
+    place_weights = np.tile(
+        np.array([_PELVIS, *([_ANKLE] * 3 for _ in ankles)]), (body.frames, 1, 1)
+    )
+    layout = target.character.layout
+    acceleration = np.full(layout.size, _ACCELERATION)
+    acceleration[:3] = _ROOT_ACCELERATION
+    return Goals(
+        links=np.array([target.map[role] for role in roles], dtype=np.intp),
+        turns_xyzw=wanted,
+        turn_weights=weights,
+        point_links=np.array([target.map[name] for name in names], dtype=np.intp),
+        point_offsets=np.array(offsets),
+        places=places,
+        place_weights=place_weights,
+        surface=target.surface,
+        clearance=np.full((body.frames, len(target.surface.links)), _MARGIN),
+        ground_weight=_GROUND,
+        limit_weight=_LIMIT,
+        acceleration=acceleration,
+    )
+
+
+def contact_goals(
+    goals: Goals,
+    target: TargetBody,
+    loose: GeneralizedPosition,
+    contacts: Mapping[str, tuple[Contact, ...]],
+    frame_time: float,
+) -> Goals:
+    """The goals with points of soles that stand still on the ground while they touch it."""
+    frames = len(loose.position)
+    links, offsets, places, weights = [], [], [], []
+    for side in SIDES:
+        ankle = f"{side}_ankle"
+        link = target.map[ankle]
+        origins, turns = link_motion(target, loose, link)
+        for part, corners in (("toe", slice(0, 2)), ("heel", slice(2, 4))):
+            for corner in target.soles(ankle)[corners]:
+                points = origins + rotations.rotate(turns, corner)
+                place, weight = np.zeros((frames, 3)), np.zeros((frames, 3))
+                for contact in contacts[f"{side}_{part}"]:
+                    held = points[contact.frames].mean(axis=0)
+                    place[contact.frames] = (held[0], held[1], _MARGIN)
+                    weight[contact.frames] = _STANDING
+                    _ramp(contact, frames, frame_time, place, weight)
+                links.append(link)
+                offsets.append(corner)
+                places.append(place)
+                weights.append(weight)
+    return replace(
+        goals,
+        point_links=np.concatenate((goals.point_links, np.array(links, dtype=np.intp))),
+        point_offsets=np.concatenate((goals.point_offsets, np.array(offsets))),
+        places=np.concatenate((goals.places, np.stack(places, axis=1)), axis=1),
+        place_weights=np.concatenate((goals.place_weights, np.stack(weights, axis=1)), axis=1),
+    )
+
+
+def _ramp(
+    contact: Contact, frames: int, frame_time: float, place: FloatArray, weight: FloatArray
+) -> None:
+    """Let the hold of a contact come and go within a time before and after it."""
+    reach = max(1, round(_RAMP / frame_time))
+    for frame, away in [
+        *((contact.first - k, k) for k in range(1, reach)),
+        *((contact.last + k, k) for k in range(1, reach)),
+    ]:
+        share = (1.0 - away / reach) ** 2 * 0.05
+        if 0 <= frame < frames and share * _STANDING > weight[frame, 0]:
+            place[frame] = place[contact.first]
+            weight[frame] = share * _STANDING
+
+
+def link_motion(
+    target: TargetBody, motion: GeneralizedPosition, link: int
+) -> tuple[FloatArray, FloatArray]:
+    """Origins (f, 3) in m and turns (f, 4) of a link in the world."""
+    model, still = DynamicsModel(target.character), np.zeros(motion.position.shape[1])
+    origins, turns = np.empty((len(motion.position), 3)), np.empty((len(motion.position), 4))
+    for frame, position in enumerate(motion.position):
+        model.update(position, still)
+        whole = model.link_poses()
+        origins[frame], turns[frame] = whole[0][link], whole[1][link]
+    return origins, turns
+
+
+def hips_in_pelvis(target: TargetBody) -> FloatArray:
+    """The middle (3,) of the hips in the frame of the pelvis' link, m."""
+    middle = 0.5 * sum(target.origin(f"{side}_hip") for side in SIDES)
+    link = target.map["pelvis"]
+    back = rotations.conjugate(target.turns_xyzw[link])
+    return rotations.rotate(back, middle - target.origins[link])
+
+
+def first_guess(
+    body: CapturedBody, target: TargetBody, turns: SegmentTurns
+) -> GeneralizedPosition:
+    """The character with its links turned as the segments are, joint by joint from the root on."""
+    character, layout = target.character, target.character.layout
+    frames = body.frames
+    positions = np.zeros((frames, layout.size))
+    by_link = {target.map[role]: turn for role, turn in turns.turns_xyzw.items()}
+    lower, upper = character.position_bounds()
+    world: list[FloatArray] = []
+    for index, link in enumerate(character.links):
+        joint, wanted = link.joint, by_link.get(index)
+        if index == 0:
+            pelvis = target.map["pelvis"]
+            back = rotations.multiply(
+                rotations.conjugate(target.turns_xyzw[pelvis]), target.turns_xyzw[0]
+            )
+            turn = rotations.multiply(turns.turns_xyzw["pelvis"], back)
+            positions[:, 3:6] = rotations.log(turn)
+            positions[:, :3] = body.middle("hip") - rotations.rotate(
+                turn, _hips_in_base(target)
+            )
+            world.append(turn)
+            continue
+        frame = rotations.multiply(world[link.parent], np.array(joint.pose_in_parent.orientation_xyzw))
+        if wanted is not None and joint.type is JointType.SPHERICAL:
+            entries = layout.joint(joint.name).entries
+            relative = rotations.multiply(rotations.conjugate(frame), wanted)
+            positions[:, entries] = rotations.log(relative)
+            frame = wanted
+        elif wanted is not None and joint.type is JointType.REVOLUTE:
+            relative = rotations.multiply(rotations.conjugate(frame), wanted)
+            axis = np.array(joint.axis_in_child)
+            angle = 2.0 * elementary.arctan2(relative[:, :3] @ axis, relative[:, 3])
+            angle = (angle + np.pi) % (2.0 * np.pi) - np.pi
+            start = layout.joint(joint.name).start
+            angle = np.clip(angle, lower[start], upper[start])
+            positions[:, start] = angle
+            frame = rotations.multiply(frame, rotations.exp(angle[:, np.newaxis] * axis))
+        world.append(frame)
+    return layout.configuration(positions)
+
+
+def _hips_in_base(target: TargetBody) -> FloatArray:
+    middle = 0.5 * sum(target.origin(f"{side}_hip") for side in SIDES)
+    back = rotations.conjugate(target.turns_xyzw[0])
+    return rotations.rotate(back, middle - target.origins[0])
+
+
+def _turn_weights(role: str, turns: SegmentTurns, frames: int) -> FloatArray:
+    """The weights (f, 3, 3) of a segment's rotation vector."""
+    if role in turns.bones:
+        bone = turns.bones[role]
+        along = bone[:, :, np.newaxis] * bone[:, np.newaxis]
+        weights: FloatArray = _BONE * (np.eye(3) - along) + _TWIST * along
+        return weights
+    part = role.removeprefix("left_").removeprefix("right_")
+    return np.tile(_TURNS[part] * np.eye(3), (frames, 1, 1))

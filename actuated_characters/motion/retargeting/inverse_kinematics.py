@@ -1,0 +1,218 @@
+"""Inverse kinematics of a whole motion: Gauss-Newton on all frames at once.
+
+Each frame has residuals: turns and places of links against what they should be, points below the
+ground, joints beyond their limits. Second differences of the coordinates join the frames, so the
+motion is smooth where the residuals leave it free. Jacobians are MuJoCo's.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuated_characters.motion.retargeting.smooth_least_squares import solve_smooth
+from actuated_characters.motion.retargeting.target_body import SurfacePoints, TargetBody
+from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.geometry import fixed_order, rotations
+
+_USUAL_FRAME = 1.0 / 60.0  # s, whose residuals count once
+_DAMPING = 1e-2  # added to each block: the coordinates that no residual is about
+_LARGEST_STEP = 0.4  # rad or m
+_ENOUGH = 2e-4  # rad or m of the largest step, at which an iteration ends
+_WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and of these solved again
+
+Progress = Callable[[int], None]
+"""Is told how many frames are done."""
+
+
+@dataclass(frozen=True)
+class Goals:
+    """What the links should do in f frames; weights are those of residuals."""
+
+    links: IntArray  # (k,) whose turns are given
+    turns_xyzw: FloatArray  # (f, k, 4), world
+    turn_weights: FloatArray  # (f, k, 3, 3) 1/rad, of rotation vectors in world axes
+    point_links: IntArray  # (p,) of points that move with links
+    point_offsets: FloatArray  # (p, 3) m, in the link frame
+    places: FloatArray  # (f, p, 3) m, where the points should be
+    place_weights: FloatArray  # (f, p, 3) 1/m
+    surface: SurfacePoints
+    clearance: FloatArray  # (f, s) m, of each ball of the surface over the ground
+    ground_weight: float  # 1/m below that
+    limit_weight: float  # 1/rad beyond a limit
+    acceleration: FloatArray  # (n,) m/s^2 or rad/s^2 that count as much as a residual of one
+
+    def part(self, frames: slice) -> "Goals":
+        """The goals of some frames."""
+        return Goals(
+            self.links,
+            self.turns_xyzw[frames],
+            self.turn_weights[frames],
+            self.point_links,
+            self.point_offsets,
+            self.places[frames],
+            self.place_weights[frames],
+            self.surface,
+            self.clearance[frames],
+            self.ground_weight,
+            self.limit_weight,
+            self.acceleration,
+        )
+
+
+class InverseKinematics:
+    """Finds the motion of a character that does best what some goals say."""
+
+    def __init__(self, target: TargetBody, frame_time: float, iterations: int = 25) -> None:
+        self._layout = target.character.layout
+        self._bounds = target.bounds
+        self._hard = target.character.position_bounds()
+        self._model = DynamicsModel(target.character)
+        self._frame_time = frame_time
+        self._iterations = iterations
+
+    def solve(
+        self, start: GeneralizedPosition, goals: Goals, progress: Progress | None = None
+    ) -> GeneralizedPosition:
+        """The motion (f, n) from a first guess; long ones in windows that go on from each other."""
+        frames = len(start.position)
+        positions, turns = start.position.copy(), start.orientations_xyzw.copy()
+        first = 0
+        while True:
+            end = min(first + _WINDOW, frames)
+            fixed = 2 if first else 0
+            window = slice(first, end)
+            guess = GeneralizedPosition(positions[window], turns[window])
+            solved = self._solve_window(guess, goals.part(window), fixed)
+            positions[window], turns[window] = solved.position, solved.orientations_xyzw
+            if progress is not None:
+                progress(end)
+            if end == frames:
+                return GeneralizedPosition(positions, turns)
+            first = end - _OVERLAP
+
+    def _solve_window(
+        self, guess: GeneralizedPosition, goals: Goals, fixed: int
+    ) -> GeneralizedPosition:
+        now, share = guess, np.sqrt(self._frame_time / _USUAL_FRAME)
+        spring = 1.0 / (goals.acceleration * self._frame_time**2)
+        weights = (share * spring) ** 2
+        for _ in range(self._iterations):
+            jacobian, residual = self._linearised(now, goals)
+            jacobian, residual = share * jacobian, share * residual
+            blocks = np.matmul(jacobian.swapaxes(-1, -2), jacobian)
+            gradients = np.matmul(jacobian.swapaxes(-1, -2), residual[..., np.newaxis])[..., 0]
+            diagonal = np.arange(blocks.shape[-1])
+            blocks[:, diagonal, diagonal] += _DAMPING
+            blocks[:fixed, diagonal, diagonal] += 1e12
+            velocity = self._layout.difference(_rows(now, slice(-1)), _rows(now, slice(1, None)))
+            step = solve_smooth(blocks, gradients, weights, np.diff(velocity, axis=0))
+            largest = np.abs(step).max(axis=1, keepdims=True)
+            step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-12))
+            now = self._moved(now, step)
+            if float(largest.max()) < _ENOUGH:
+                break
+        return now
+
+    def _moved(self, now: GeneralizedPosition, step: FloatArray) -> GeneralizedPosition:
+        entries = self._layout.rotation_entries
+        turns = rotations.multiply(now.orientations_xyzw, rotations.exp(step[:, entries]))
+        turns = rotations.normalised(turns)
+        positions = np.clip(now.position + step, *self._hard)
+        positions[:, entries] = rotations.log(turns)
+        return GeneralizedPosition(positions, turns)
+
+    def _linearised(
+        self, now: GeneralizedPosition, goals: Goals
+    ) -> tuple[FloatArray, FloatArray]:
+        """Jacobians (f, m, n) and what is missing (f, m) of all residuals, weighted."""
+        used, index = np.unique(
+            np.concatenate((goals.links, goals.point_links, goals.surface.links)),
+            return_inverse=True,
+        )
+        origins, axes, jacobians = self._kinematics(now.position, used)
+        turned, placed, touching = np.split(
+            index, np.cumsum((len(goals.links), len(goals.point_links)))
+        )
+        parts = [
+            self._turns(goals, axes[:, turned], jacobians[:, turned]),
+            self._places(goals, origins[:, placed], axes[:, placed], jacobians[:, placed]),
+            self._ground(goals, origins[:, touching], axes[:, touching], jacobians[:, touching]),
+            self._limits(goals, now),
+        ]
+        whole, missing = zip(*parts, strict=True)
+        return np.concatenate(whole, axis=1), np.concatenate(missing, axis=1)
+
+    def _kinematics(
+        self, positions: FloatArray, links: IntArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Origins (f, l, 3), axes (f, l, 3, 3) and Jacobians (f, l, 6, n) of the origins."""
+        frames, size = positions.shape
+        origins, axes = np.empty((frames, len(links), 3)), np.empty((frames, len(links), 3, 3))
+        jacobians = np.empty((frames, len(links), 6, size))
+        still = np.zeros(size)
+        for frame, position in enumerate(positions):
+            self._model.update(position, still)
+            origins[frame], axes[frame] = self._model.link_frames(links)
+            for row, link in enumerate(links.tolist()):
+                jacobians[frame, row] = self._model.point_jacobian(link, origins[frame, row])
+        return origins, axes, jacobians
+
+    def _turns(
+        self, goals: Goals, axes: FloatArray, jacobians: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        wanted = rotations.matrix(goals.turns_xyzw)
+        missing = _rotation_vectors(np.matmul(wanted, axes.swapaxes(-1, -2)))
+        weighted = np.matmul(goals.turn_weights, jacobians[:, :, 3:])
+        frames, size = len(axes), jacobians.shape[-1]
+        residual = np.matmul(goals.turn_weights, missing[..., np.newaxis])[..., 0]
+        return weighted.reshape(frames, -1, size), residual.reshape(frames, -1)
+
+    def _places(
+        self, goals: Goals, origins: FloatArray, axes: FloatArray, jacobians: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        arms = np.matmul(axes, goals.point_offsets[..., np.newaxis])[..., 0]
+        moving = _point_jacobians(jacobians, arms) * goals.place_weights[..., np.newaxis]
+        missing = (goals.places - origins - arms) * goals.place_weights
+        frames, size = len(axes), jacobians.shape[-1]
+        return moving.reshape(frames, -1, size), missing.reshape(frames, -1)
+
+    def _ground(
+        self, goals: Goals, origins: FloatArray, axes: FloatArray, jacobians: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        arms = np.matmul(axes, goals.surface.offsets[..., np.newaxis])[..., 0]
+        heights = origins[..., 2] + arms[..., 2] - goals.surface.radii
+        below = np.maximum(goals.clearance - heights, 0.0)
+        rising = _point_jacobians(jacobians, arms)[:, :, 2] * (below > 0.0)[..., np.newaxis]
+        return goals.ground_weight * rising, goals.ground_weight * below
+
+    def _limits(self, goals: Goals, now: GeneralizedPosition) -> tuple[FloatArray, FloatArray]:
+        lower, upper = self._bounds
+        beyond = np.clip(now.position, lower, upper) - now.position
+        jacobian = np.tile(np.eye(now.position.shape[1]), (len(beyond), 1, 1))
+        for entries in self._layout.rotation_entries:
+            rate = rotations.right_jacobian_inverse(now.position[:, entries])
+            jacobian[:, entries[:, np.newaxis], entries] = rate
+        jacobian *= (beyond != 0.0)[..., np.newaxis]
+        return goals.limit_weight * jacobian, goals.limit_weight * beyond
+
+
+def _rows(motion: GeneralizedPosition, rows: slice) -> GeneralizedPosition:
+    return GeneralizedPosition(motion.position[rows], motion.orientations_xyzw[rows])
+
+
+def _point_jacobians(jacobians: FloatArray, arms: FloatArray) -> FloatArray:
+    """The velocities (f, p, 3, n) of points at arms (f, p, 3) from the origins of their links."""
+    turning = jacobians[:, :, 3:].swapaxes(-1, -2)  # (f, p, n, 3)
+    carried = fixed_order.cross(turning, arms[:, :, np.newaxis])
+    moving: FloatArray = jacobians[:, :, :3] + carried.swapaxes(-1, -2)
+    return moving
+
+
+def _rotation_vectors(matrices: FloatArray) -> FloatArray:
+    """The rotation vectors (..., 3) of rotation matrices (..., 3, 3)."""
+    from actuated_characters.motion.retargeting.conventions import quaternion
+
+    return rotations.log(quaternion(matrices))

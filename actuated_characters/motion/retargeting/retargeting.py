@@ -1,0 +1,166 @@
+"""Captured motion made into motion of a character: the steps, one after another."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from actuated_characters.motion.bvh.skeleton import POSITIONS, BvhMotion
+from actuated_characters.motion.retargeting.captured_body import CapturedBody, captured_body
+from actuated_characters.motion.retargeting.contacts import (
+    Contact,
+    find_contacts,
+    flat_frames,
+    ground_height,
+)
+from actuated_characters.motion.retargeting.conventions import (
+    UNITS,
+    Conventions,
+    feet_point_backwards,
+    find_unit,
+    find_up,
+    first_heading,
+    leading_poses,
+    rest_name,
+    to_upright,
+)
+from actuated_characters.motion.retargeting.goals import contact_goals, first_guess, free_goals
+from actuated_characters.motion.retargeting.inverse_kinematics import InverseKinematics, Progress
+from actuated_characters.motion.retargeting.segments import segment_turns
+from actuated_characters.motion.retargeting.skeleton_map import SIDES, find_map
+from actuated_characters.motion.retargeting.target_body import TargetBody
+from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.errors import ClipError
+from msgs_config.geometry import rotations
+
+
+@dataclass(frozen=True)
+class RetargetingSettings:
+    """What is told rather than found out."""
+
+    joints: Mapping[str, str] | None = None  # of the skeleton, by role
+    up: str | None = None  # an axis
+    unit: str | None = None  # a key of `UNITS`
+
+
+@dataclass(frozen=True)
+class RetargetedMotion:
+    """A captured motion, and the same of a character."""
+
+    source: CapturedBody  # in the character's size and world, z up, where its ankles would be
+    conventions: Conventions
+    scale: float  # the character's lengths over the file's, in the file's unit
+    contacts: Mapping[str, tuple[Contact, ...]]  # by point, such as `left_heel`
+    motion: GeneralizedPosition  # (f, n), (f, k, 4)
+
+
+def read_body(
+    place: object, motion: BvhMotion, settings: RetargetingSettings
+) -> tuple[CapturedBody, Conventions]:
+    """The body of a BVH motion in m, z up, that faces along x at first; and how the file had it.
+
+    Raises:
+        ClipError: joints are missing, or the motion is too short.
+    """
+    skeleton = motion.skeleton
+    joints = find_map(place, skeleton.names, skeleton.parents, settings.joints)
+    body = captured_body(motion, joints)
+    if not body.leg_length > 0.0:
+        raise ClipError(f"{place}: the legs have no length; the offsets of the joints must say it")
+    first = leading_poses(body)
+    body = body.since(first)
+    if body.frames < 2:
+        raise ClipError(f"{place}: {body.frames} frame; a motion needs two or more")
+    swapped = feet_point_backwards(body)
+    if swapped:
+        body = replace(body, map=body.map.swapped())
+    up = settings.up or find_up(body)
+    unit, length = (
+        find_unit(body.leg_length)
+        if settings.unit is None
+        else (settings.unit, UNITS[settings.unit])
+    )
+    rest = rest_name(body)
+    body = body.turned(to_upright(up)).scaled(length)
+    heading = first_heading(body)
+    body = body.turned(rotations.about_z(-heading))
+    moves = any(name in POSITIONS for name in skeleton.channels[0])
+    if not moves:
+        body = _moved_by_feet(body)
+    return body, Conventions(up, unit, length, heading, rest, first, swapped, moves)
+
+
+def retarget(
+    place: object,
+    motion: BvhMotion,
+    target: TargetBody,
+    settings: RetargetingSettings | None = None,
+    progress: Progress | None = None,
+) -> RetargetedMotion:
+    """The motion of a character that does what a BVH motion shows.
+
+    Args:
+        place: The file, for errors.
+        motion: What was captured.
+        target: The character.
+        settings: What is told.
+        progress: Is told how many of twice the frames are done.
+
+    Raises:
+        ClipError: joints are missing, or the motion is too short.
+    """
+    body, conventions = read_body(place, motion, settings or RetargetingSettings())
+    scale = target.leg_length / body.leg_length
+    body = body.scaled(scale)
+    ankles = np.concatenate([body.part(f"{side}_ankle")[:, 2] for side in SIDES])
+    rise = target.ankle_height - ground_height(ankles)
+    start = -body.middle("hip")[0]
+    body = body.moved(np.tile((start[0], start[1], rise), (body.frames, 1)))
+    contacts = body_contacts(body)
+    flat = {
+        f"{side}_ankle": flat_frames(contacts, side, body.frames) for side in SIDES
+    }
+    turns = segment_turns(body, target, flat)
+    solver = InverseKinematics(target, body.frame_time)
+    goals = free_goals(body, target, turns)
+    guess = first_guess(body, target, turns)
+    loose = solver.solve(guess, goals, progress)
+    goals = contact_goals(goals, target, loose, contacts, body.frame_time)
+    told = None if progress is None else (lambda done: progress(body.frames + done))
+    tight = solver.solve(loose, goals, told)
+    return RetargetedMotion(body, conventions, scale * conventions.unit_length, contacts, tight)
+
+
+def body_contacts(body: CapturedBody) -> dict[str, tuple[Contact, ...]]:
+    """The contacts of heels, toes and hands of a body in a character's size with the ground."""
+    contacts = {}
+    frame_time = body.frame_time
+    for part, role in (("heel", "ankle"), ("toe", "toe")):
+        points = {}
+        for side in SIDES:
+            name = f"{side}_{role}"
+            node = body.map[name] if name in body.map else body.tip(f"{side}_ankle")
+            points[side] = body.positions[:, node] if node is not None else body.part(f"{side}_ankle")
+        ground = ground_height(np.concatenate([point[:, 2] for point in points.values()]))
+        for side, point in points.items():
+            contacts[f"{side}_{part}"] = find_contacts(point, ground, frame_time)
+    return contacts
+
+
+def _moved_by_feet(body: CapturedBody) -> CapturedBody:
+    """A body whose root stands still, moved so that the lower foot does."""
+    feet = [
+        body.positions[:, body.map[f"{side}_{part}"]]
+        for side in SIDES
+        for part in ("ankle", "toe")
+        if f"{side}_{part}" in body.map
+    ]
+    points = np.stack(feet, axis=1)  # (f, p, 3)
+    heights = points[..., 2] - points[..., 2].min(axis=0)
+    lowest = points[..., 2].min(axis=1)
+    moved = -np.diff(points, axis=0)
+    standing = np.argmin(heights[1:] + heights[:-1], axis=1)
+    steps = moved[np.arange(len(standing)), standing]
+    offsets = np.concatenate((np.zeros((1, 3)), np.cumsum(steps, axis=0)))
+    offsets[:, 2] = -lowest
+    return body.moved(offsets)
