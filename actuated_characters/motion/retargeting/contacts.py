@@ -7,7 +7,8 @@ import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
 
-_ENTER, _LEAVE = (0.022, 0.20), (0.035, 0.40)  # height in m and speed in m/s of a character's size
+_ENTER, _LEAVE = ((0.022, 0.20), (0.05, 0.10)), ((0.035, 0.40), (0.06, 0.15))
+"""Heights in m below which, and speeds in m/s below which a point touches; either pair will do."""
 _SMOOTHED = 0.05  # s over which a speed is measured
 _LEAST, _GAP = 0.06, 0.05  # s of a contact, and of a break that is none
 _GROUND = 2.0  # per cent of the heights of a joint that may be below its height on the ground
@@ -52,8 +53,10 @@ def find_contacts(
         frame_time: s.
     """
     height, speed = positions[:, 2] - ground, speeds(positions, frame_time)
-    enters = (height < _ENTER[0]) & (speed < _ENTER[1])
-    stays = (height < _LEAVE[0]) & (speed < _LEAVE[1])
+    enters, stays = (
+        np.any([(height < low) & (speed < slow) for low, slow in pairs], axis=0)
+        for pairs in (_ENTER, _LEAVE)
+    )
     return joined(_with_hysteresis(enters, stays), frame_time)
 
 

@@ -1,12 +1,8 @@
 """What a character's links should do to show a captured motion: the goals of its kinematics."""
 
-from collections.abc import Mapping
-from dataclasses import replace
-
 import numpy as np
 
 from actuated_characters.motion.retargeting.captured_body import CapturedBody
-from actuated_characters.motion.retargeting.contacts import Contact
 from actuated_characters.motion.retargeting.inverse_kinematics import Goals
 from actuated_characters.motion.retargeting.segments import SegmentTurns
 from actuated_characters.motion.retargeting.skeleton_map import SIDES
@@ -21,11 +17,9 @@ _TURNS = {"pelvis": 1 / 0.06, "chest": 1 / 0.06, "head": 1 / 0.12, "ankle": 1 / 
 _BONE, _TWIST = 1 / 0.06, 1 / 0.5  # rad, of limbs across and about their bones
 _PELVIS = np.array((1 / 0.03, 1 / 0.03, 1 / 0.03))  # m
 _ANKLE = 1 / 0.03  # m
-_STANDING = 1 / 0.001  # m, of a point that stands on the ground
 _GROUND, _LIMIT = 1 / 0.001, 1 / 0.005  # m below it, rad beyond one
 _ACCELERATION, _ROOT_ACCELERATION = 90.0, 25.0  # rad/s^2 and m/s^2
-_MARGIN = 0.001  # m over the ground
-_RAMP = 0.06  # s in which a contact takes hold
+MARGIN = 0.001  # m over the ground
 
 
 def free_goals(body: CapturedBody, target: TargetBody, turns: SegmentTurns) -> Goals:
@@ -51,62 +45,11 @@ def free_goals(body: CapturedBody, target: TargetBody, turns: SegmentTurns) -> G
         places=places,
         place_weights=place_weights,
         surface=target.surface,
-        clearance=np.full((body.frames, len(target.surface.links)), _MARGIN),
+        clearance=np.full((body.frames, len(target.surface.links)), MARGIN),
         ground_weight=_GROUND,
         limit_weight=_LIMIT,
         acceleration=acceleration,
     )
-
-
-def contact_goals(
-    goals: Goals,
-    target: TargetBody,
-    loose: GeneralizedPosition,
-    contacts: Mapping[str, tuple[Contact, ...]],
-    frame_time: float,
-) -> Goals:
-    """The goals with points of soles that stand still on the ground while they touch it."""
-    frames = len(loose.position)
-    links, offsets, places, weights = [], [], [], []
-    for side in SIDES:
-        ankle = f"{side}_ankle"
-        link = target.map[ankle]
-        origins, turns = link_motion(target, loose, link)
-        for part, corners in (("toe", slice(0, 2)), ("heel", slice(2, 4))):
-            for corner in target.soles(ankle)[corners]:
-                points = origins + rotations.rotate(turns, corner)
-                place, weight = np.zeros((frames, 3)), np.zeros((frames, 3))
-                for contact in contacts[f"{side}_{part}"]:
-                    held = points[contact.frames].mean(axis=0)
-                    place[contact.frames] = (held[0], held[1], _MARGIN)
-                    weight[contact.frames] = _STANDING
-                    _ramp(contact, frames, frame_time, place, weight)
-                links.append(link)
-                offsets.append(corner)
-                places.append(place)
-                weights.append(weight)
-    return replace(
-        goals,
-        point_links=np.concatenate((goals.point_links, np.array(links, dtype=np.intp))),
-        point_offsets=np.concatenate((goals.point_offsets, np.array(offsets))),
-        places=np.concatenate((goals.places, np.stack(places, axis=1)), axis=1),
-        place_weights=np.concatenate((goals.place_weights, np.stack(weights, axis=1)), axis=1),
-    )
-
-
-def _ramp(
-    contact: Contact, frames: int, frame_time: float, place: FloatArray, weight: FloatArray
-) -> None:
-    """Let the hold of a contact come and go within a time before and after it."""
-    reach = max(1, round(_RAMP / frame_time))
-    for frame, away in [
-        *((contact.first - k, k) for k in range(1, reach)),
-        *((contact.last + k, k) for k in range(1, reach)),
-    ]:
-        share = (1.0 - away / reach) ** 2 * 0.05
-        if 0 <= frame < frames and share * _STANDING > weight[frame, 0]:
-            place[frame] = place[contact.first]
-            weight[frame] = share * _STANDING
 
 
 def link_motion(

@@ -5,7 +5,7 @@ ground, joints beyond their limits. Second differences of the coordinates join t
 motion is smooth where the residuals leave it free. Jacobians are MuJoCo's.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +20,12 @@ from msgs_config.geometry import fixed_order, rotations
 _USUAL_FRAME = 1.0 / 60.0  # s, whose residuals count once
 _DAMPING = 1e-2  # added to each block: the coordinates that no residual is about
 _LARGEST_STEP = 0.4  # rad or m
-_ENOUGH = 2e-4  # rad or m of the largest step, at which an iteration ends
+_ENOUGH = 3e-4  # rad or m of the largest step, at which an iteration ends
+_ACTIVE_SETS = 5  # solutions of a step, between which bounds come and go
 _WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and of these solved again
+
+Linear = tuple[FloatArray, FloatArray]
+"""Jacobians (f, m, n) of m residuals in f frames, and what is missing (f, m)."""
 
 Progress = Callable[[int], None]
 """Is told how many frames are done."""
@@ -99,16 +103,25 @@ class InverseKinematics:
         now, share = guess, np.sqrt(self._frame_time / _USUAL_FRAME)
         spring = 1.0 / (goals.acceleration * self._frame_time**2)
         weights = (share * spring) ** 2
+        active = None
         for _ in range(self._iterations):
-            jacobian, residual = self._linearised(now, goals)
-            jacobian, residual = share * jacobian, share * residual
-            blocks = np.matmul(jacobian.swapaxes(-1, -2), jacobian)
-            gradients = np.matmul(jacobian.swapaxes(-1, -2), residual[..., np.newaxis])[..., 0]
-            diagonal = np.arange(blocks.shape[-1])
-            blocks[:, diagonal, diagonal] += _DAMPING
-            blocks[:fixed, diagonal, diagonal] += 1e12
+            wanted, bounded = self._linearised(now, goals)
+            quadratic = _normal_equations(share * wanted[0], share * wanted[1])
+            diagonal = np.arange(quadratic[0].shape[-1])
+            quadratic[0][:, diagonal, diagonal] += _DAMPING
+            quadratic[0][:fixed, diagonal, diagonal] += 1e12
             velocity = self._layout.difference(_rows(now, slice(-1)), _rows(now, slice(1, None)))
-            step = solve_smooth(blocks, gradients, weights, np.diff(velocity, axis=0))
+            accelerations = np.diff(velocity, axis=0)
+            limit, missing = share * bounded[0], share * bounded[1]
+            active = missing > 0.0 if active is None else active
+            for _ in range(_ACTIVE_SETS):
+                held = _normal_equations(limit * active[..., np.newaxis], missing * active)
+                blocks, gradients = quadratic[0] + held[0], quadratic[1] + held[1]
+                step = solve_smooth(blocks, gradients, weights, accelerations)
+                left = missing - np.matmul(limit, step[..., np.newaxis])[..., 0]
+                before, active = active, left > 0.0
+                if (before == active).all():
+                    break
             largest = np.abs(step).max(axis=1, keepdims=True)
             step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-12))
             now = self._moved(now, step)
@@ -126,8 +139,8 @@ class InverseKinematics:
 
     def _linearised(
         self, now: GeneralizedPosition, goals: Goals
-    ) -> tuple[FloatArray, FloatArray]:
-        """Jacobians (f, m, n) and what is missing (f, m) of all residuals, weighted."""
+    ) -> tuple[Linear, Linear]:
+        """The residuals, and those that count only where something is missing, weighted."""
         used, index = np.unique(
             np.concatenate((goals.links, goals.point_links, goals.surface.links)),
             return_inverse=True,
@@ -136,14 +149,15 @@ class InverseKinematics:
         turned, placed, touching = np.split(
             index, np.cumsum((len(goals.links), len(goals.point_links)))
         )
-        parts = [
+        wanted = (
             self._turns(goals, axes[:, turned], jacobians[:, turned]),
             self._places(goals, origins[:, placed], axes[:, placed], jacobians[:, placed]),
+        )
+        bounded = (
             self._ground(goals, origins[:, touching], axes[:, touching], jacobians[:, touching]),
-            self._limits(goals, now),
-        ]
-        whole, missing = zip(*parts, strict=True)
-        return np.concatenate(whole, axis=1), np.concatenate(missing, axis=1)
+            *self._limits(goals, now),
+        )
+        return _stacked(wanted), _stacked(bounded)
 
     def _kinematics(
         self, positions: FloatArray, links: IntArray
@@ -184,19 +198,33 @@ class InverseKinematics:
     ) -> tuple[FloatArray, FloatArray]:
         arms = np.matmul(axes, goals.surface.offsets[..., np.newaxis])[..., 0]
         heights = origins[..., 2] + arms[..., 2] - goals.surface.radii
-        below = np.maximum(goals.clearance - heights, 0.0)
-        rising = _point_jacobians(jacobians, arms)[:, :, 2] * (below > 0.0)[..., np.newaxis]
-        return goals.ground_weight * rising, goals.ground_weight * below
+        rising = _point_jacobians(jacobians, arms)[:, :, 2]
+        return goals.ground_weight * rising, goals.ground_weight * (goals.clearance - heights)
 
-    def _limits(self, goals: Goals, now: GeneralizedPosition) -> tuple[FloatArray, FloatArray]:
+    def _limits(self, goals: Goals, now: GeneralizedPosition) -> tuple[Linear, Linear]:
+        """How the coordinates that have bounds go from them inwards, lower ones and upper ones."""
         lower, upper = self._bounds
-        beyond = np.clip(now.position, lower, upper) - now.position
-        jacobian = np.tile(np.eye(now.position.shape[1]), (len(beyond), 1, 1))
+        jacobian = np.tile(np.eye(now.position.shape[1]), (len(now.position), 1, 1))
         for entries in self._layout.rotation_entries:
             rate = rotations.right_jacobian_inverse(now.position[:, entries])
             jacobian[:, entries[:, np.newaxis], entries] = rate
-        jacobian *= (beyond != 0.0)[..., np.newaxis]
-        return goals.limit_weight * jacobian, goals.limit_weight * beyond
+        low, high = np.isfinite(lower), np.isfinite(upper)
+        weight = goals.limit_weight
+        return (
+            (weight * jacobian[:, low], weight * (lower - now.position)[:, low]),
+            (-weight * jacobian[:, high], weight * (now.position - upper)[:, high]),
+        )
+
+
+def _stacked(parts: Sequence[Linear]) -> Linear:
+    jacobians, missing = zip(*parts, strict=True)
+    return np.concatenate(jacobians, axis=1), np.concatenate(missing, axis=1)
+
+
+def _normal_equations(jacobian: FloatArray, missing: FloatArray) -> Linear:
+    """`J' J` (f, n, n) and `J' r` (f, n)."""
+    transposed = jacobian.swapaxes(-1, -2)
+    return np.matmul(transposed, jacobian), np.matmul(transposed, missing[..., np.newaxis])[..., 0]
 
 
 def _rows(motion: GeneralizedPosition, rows: slice) -> GeneralizedPosition:

@@ -24,14 +24,18 @@ from actuated_characters.motion.retargeting.conventions import (
     rest_name,
     to_upright,
 )
-from actuated_characters.motion.retargeting.goals import contact_goals, first_guess, free_goals
+from actuated_characters.motion.retargeting.goals import first_guess, free_goals
 from actuated_characters.motion.retargeting.inverse_kinematics import InverseKinematics, Progress
 from actuated_characters.motion.retargeting.segments import segment_turns
 from actuated_characters.motion.retargeting.skeleton_map import SIDES, find_map
+from actuated_characters.motion.retargeting.stances import with_stances
 from actuated_characters.motion.retargeting.target_body import TargetBody
+from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
+
+_HAND_HEIGHT = 0.05  # m of a wrist over the lowest joint of the feet, while the hand stands
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ def retarget(
     goals = free_goals(body, target, turns)
     guess = first_guess(body, target, turns)
     loose = solver.solve(guess, goals, progress)
-    goals = contact_goals(goals, target, loose, contacts, body.frame_time)
+    goals = with_stances(goals, target, loose, contacts, body.frame_time)
     told = None if progress is None else (lambda done: progress(body.frames + done))
     tight = solver.solve(loose, goals, told)
     return RetargetedMotion(body, conventions, scale * conventions.unit_length, contacts, tight)
@@ -133,18 +137,28 @@ def retarget(
 
 def body_contacts(body: CapturedBody) -> dict[str, tuple[Contact, ...]]:
     """The contacts of heels, toes and hands of a body in a character's size with the ground."""
-    contacts = {}
-    frame_time = body.frame_time
+    contacts, floor = {}, np.inf
     for part, role in (("heel", "ankle"), ("toe", "toe")):
-        points = {}
-        for side in SIDES:
-            name = f"{side}_{role}"
-            node = body.map[name] if name in body.map else body.tip(f"{side}_ankle")
-            points[side] = body.positions[:, node] if node is not None else body.part(f"{side}_ankle")
+        points = {side: _foot_point(body, side, role) for side in SIDES}
         ground = ground_height(np.concatenate([point[:, 2] for point in points.values()]))
+        floor = min(floor, ground)
         for side, point in points.items():
-            contacts[f"{side}_{part}"] = find_contacts(point, ground, frame_time)
+            contacts[f"{side}_{part}"] = find_contacts(point, ground, body.frame_time)
+    for side in SIDES:
+        wrist = f"{side}_wrist"
+        contacts[f"{side}_hand"] = (
+            find_contacts(body.part(wrist), floor + _HAND_HEIGHT, body.frame_time)
+            if wrist in body.map
+            else ()
+        )
     return contacts
+
+
+def _foot_point(body: CapturedBody, side: str, role: str) -> FloatArray:
+    """Where the ankle (f, 3) of a foot is, or its toes, or what is at their place."""
+    name = f"{side}_{role}"
+    node = body.map[name] if name in body.map else body.tip(f"{side}_ankle")
+    return body.part(f"{side}_ankle") if node is None else body.positions[:, node]
 
 
 def _moved_by_feet(body: CapturedBody) -> CapturedBody:

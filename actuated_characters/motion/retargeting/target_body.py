@@ -72,6 +72,11 @@ class TargetBody:
         points = self.soles(f"{SIDES[0]}_ankle")
         return float(-rotations.rotate(self.turns_xyzw[link], points)[:, 2].min())
 
+    def foot_up(self, ankle: str) -> FloatArray:
+        """The direction (3,) in a foot's link that is up while it stands flat."""
+        back = rotations.conjugate(self.turns_xyzw[self.map[ankle]])
+        return rotations.rotate(back, np.array((0.0, 0.0, 1.0)))
+
     def soles(self, ankle: str) -> FloatArray:
         """The corners (4, 3) of a foot's sole in its link's frame, m: two at the toes come first.
 
