@@ -21,7 +21,7 @@ from actuated_characters.commands.compare import add_compare
 from actuated_characters.commands.export import add_export
 from actuated_characters.commands.fork import add_fork
 from actuated_characters.commands.info import add_info
-from actuated_characters.commands.motion import add_motion
+from actuated_characters.commands.motion.command import add_motion
 from actuated_characters.commands.play import add_play
 from actuated_characters.commands.reconstruct import add_reconstruct
 from actuated_characters.commands.recover import add_recover

@@ -140,7 +140,7 @@ def _draw_strip(
         tiles.append(picture)
         if progress is not None:
             progress(len(tiles))
-    return _side_by_side(tiles, columns or min(count, _COLUMNS))
+    return side_by_side(tiles, columns or min(count, _COLUMNS))
 
 
 def _with_views(
@@ -206,7 +206,7 @@ def check_size(size: Size, count: int) -> None:
         )
 
 
-def _side_by_side(tiles: Sequence[Picture], columns: int) -> Picture:
+def side_by_side(tiles: Sequence[Picture], columns: int) -> Picture:
     """Pictures of one size in rows, white between them and where there is none."""
     height, width, _ = tiles[0].shape
     columns = min(columns, len(tiles))

@@ -27,8 +27,8 @@ _WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and of these solv
 Linear = tuple[FloatArray, FloatArray]
 """Jacobians (f, m, n) of m residuals in f frames, and what is missing (f, m)."""
 
-Progress = Callable[[int], None]
-"""Is told how many frames are done."""
+Progress = Callable[[int, int], None]
+"""Is told how many frames are done, and of how many."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class InverseKinematics:
             solved = self._solve_window(guess, goals.part(window), fixed)
             positions[window], turns[window] = solved.position, solved.orientations_xyzw
             if progress is not None:
-                progress(end)
+                progress(end, frames)
             if end == frames:
                 return GeneralizedPosition(positions, turns)
             first = end - _OVERLAP
@@ -115,8 +115,8 @@ class InverseKinematics:
             limit, missing = share * bounded[0], share * bounded[1]
             active = missing > 0.0 if active is None else active
             for _ in range(_ACTIVE_SETS):
-                held = _normal_equations(limit * active[..., np.newaxis], missing * active)
-                blocks, gradients = quadratic[0] + held[0], quadratic[1] + held[1]
+                counting = _normal_equations(limit * active[..., np.newaxis], missing * active)
+                blocks, gradients = quadratic[0] + counting[0], quadratic[1] + counting[1]
                 step = solve_smooth(blocks, gradients, weights, accelerations)
                 left = missing - np.matmul(limit, step[..., np.newaxis])[..., 0]
                 before, active = active, left > 0.0

@@ -26,7 +26,7 @@ from actuated_characters.motion.retargeting.conventions import (
 )
 from actuated_characters.motion.retargeting.goals import first_guess, free_goals
 from actuated_characters.motion.retargeting.inverse_kinematics import InverseKinematics, Progress
-from actuated_characters.motion.retargeting.segments import segment_turns
+from actuated_characters.motion.retargeting.segments import SegmentTurns, segment_turns
 from actuated_characters.motion.retargeting.skeleton_map import SIDES, find_map
 from actuated_characters.motion.retargeting.stances import with_stances
 from actuated_characters.motion.retargeting.target_body import TargetBody
@@ -55,6 +55,7 @@ class RetargetedMotion:
     conventions: Conventions
     scale: float  # the character's lengths over the file's, in the file's unit
     contacts: Mapping[str, tuple[Contact, ...]]  # by point, such as `left_heel`
+    turns: SegmentTurns  # that were to be shown
     motion: GeneralizedPosition  # (f, n), (f, k, 4)
 
 
@@ -128,11 +129,17 @@ def retarget(
     solver = InverseKinematics(target, body.frame_time)
     goals = free_goals(body, target, turns)
     guess = first_guess(body, target, turns)
-    loose = solver.solve(guess, goals, progress)
+    loose = solver.solve(guess, goals, _share(progress, 0, body.frames))
     goals = with_stances(goals, target, loose, contacts, body.frame_time)
-    told = None if progress is None else (lambda done: progress(body.frames + done))
-    tight = solver.solve(loose, goals, told)
-    return RetargetedMotion(body, conventions, scale * conventions.unit_length, contacts, tight)
+    tight = solver.solve(loose, goals, _share(progress, body.frames, body.frames))
+    return RetargetedMotion(body, conventions, scale * conventions.unit_length, contacts, turns, tight)
+
+
+def _share(progress: Progress | None, before: int, frames: int) -> Progress | None:
+    """The progress of one of two passes over the frames, the first one of which has `before`."""
+    if progress is None:
+        return None
+    return lambda done, total: progress(before + done, 2 * frames)
 
 
 def body_contacts(body: CapturedBody) -> dict[str, tuple[Contact, ...]]:

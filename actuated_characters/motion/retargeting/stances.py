@@ -82,56 +82,51 @@ def _hold_foot(
     touching: Sequence[BoolArray],  # toes and heel, (f,) each
     frame_time: float,
 ) -> None:
-    """Hold the corners of a sole where its toes and heel touch the ground."""
-    frames, link, sole = len(touching[0]), target.map[ankle], target.soles(ankle)
+    """Hold the middles of toes and heel where they touch the ground; on one the foot can pivot."""
+    frames, link = len(touching[0]), target.map[ankle]
+    ends = target.soles(ankle).reshape(2, 2, 3).mean(axis=1)  # the middles of toes and heel
     origins, turns = link_motion(target, loose, link)
-    corners = np.stack([origins + rotations.rotate(turns, corner) for corner in sole], axis=1)
-    places, weights = np.zeros((frames, 4, 3)), np.zeros((frames, 4, 3))
+    moving = np.stack([origins + rotations.rotate(turns, end) for end in ends], axis=1)
+    places, weights = np.zeros((frames, 2, 3)), np.zeros((frames, 2))
     for stance in joined(touching[0] | touching[1], frame_time):
         rows = stance.frames
         upright = rotations.rotate(turns[rows], target.foot_up(ankle))[:, 2].mean()
         lies = float(upright) < _FLAT  # as in a crawl, on its toes or its back
-        held = (
-            corners[rows].mean(axis=0)
+        length = float(np.linalg.norm(ends[0] - ends[1]))
+        standing = (
+            moving[rows].mean(axis=0)
             if lies
-            else _on_ground(sole, corners[rows], [touches[rows] for touches in touching])
+            else _on_ground(length, moving[rows], [touches[rows] for touches in touching])
         )
-        for part, pair in enumerate((slice(0, 2), slice(2, 4))):
+        for part in range(2):
             touches = np.zeros(frames, dtype=np.bool_)
             touches[rows] = touching[part][rows]
             hold = (_LYING if lies else 1.0) * _hold(touches, frame_time)
-            stronger = hold > weights[:, pair.start, 0]
-            places[stronger, pair] = held[pair]
-            weights[stronger, pair] = hold[stronger, np.newaxis, np.newaxis]
-    for number, corner in enumerate(sole):
+            stronger = hold > weights[:, part]
+            places[stronger, part] = standing[part]
+            weights[stronger, part] = hold[stronger]
+    for part, end in enumerate(ends):
         points.links.append(link)
-        points.offsets.append(corner)
-        points.places.append(places[:, number])
-        points.weights.append(_STANDING * weights[:, number])
+        points.offsets.append(end)
+        points.places.append(places[:, part])
+        points.weights.append(_STANDING * np.repeat(weights[:, part, np.newaxis], 3, axis=1))
 
 
-def _on_ground(
-    sole: FloatArray, corners: FloatArray, touching: Sequence[BoolArray]
-) -> FloatArray:
-    """Where the corners (4, 3) of a sole stand flat, of where they were (f, 4, 3) in a stance."""
+def _on_ground(length: float, ends: FloatArray, touching: Sequence[BoolArray]) -> FloatArray:
+    """Where the middles (2, 3) of toes and heel stand flat, of where they were (f, 2, 3)."""
     flat = touching[0] & touching[1]
     some = flat if flat.any() else touching[0] | touching[1]
-    ahead = (corners[:, :2].mean(axis=1) - corners[:, 2:].mean(axis=1))[some, :2].mean(axis=0)
+    ahead = (ends[some, 0, :2] - ends[some, 1, :2]).mean(axis=0)
     ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
-    length = float(np.linalg.norm(sole[:2].mean(axis=0) - sole[2:].mean(axis=0)))
-    width = float(np.linalg.norm(sole[0] - sole[1]))
-    ends = []  # where the toes would be, by themselves and by the heel
-    for part, pair in enumerate((slice(0, 2), slice(2, 4))):
+    toes = []  # where the toes are, by themselves and by the heel
+    for part in range(2):
         rows = flat if flat.any() else touching[part]
         if rows.any():
-            end = corners[rows, pair].mean(axis=(0, 1))[:2]
-            ends.append(end + part * length * ahead)
-    toes = np.mean(ends, axis=0)
-    across = 0.5 * width * np.array((-ahead[1], ahead[0]))
-    heel = toes - length * ahead
-    flat_corners = np.full((4, 3), MARGIN)
-    flat_corners[:, :2] = (toes + across, toes - across, heel + across, heel - across)
-    return flat_corners
+            toes.append(ends[rows, part, :2].mean(axis=0) + part * length * ahead)
+    toe = np.mean(toes, axis=0)
+    standing = np.full((2, 3), MARGIN)
+    standing[:, :2] = toe, toe - length * ahead
+    return standing
 
 
 def _hold_hand(

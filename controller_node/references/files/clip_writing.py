@@ -42,10 +42,10 @@ def clip_rows(character: Character, times: FloatArray, motion: GeneralizedPositi
     return np.concatenate(columns, axis=1)
 
 
-def clip_text(rows: FloatArray, *, wraps: bool, notes: Mapping[str, Any]) -> str:
-    """The text of a clip's file: frames (f, m), whether it goes on from its end, and notes."""
+def clip_text(rows: FloatArray, *, wraps: bool, known: Mapping[str, Any]) -> str:
+    """The text of a clip's file: frames (f, m), whether it goes on from its end, and what else is known."""
     frames = (np.round(rows, _DECIMALS) + 0.0).tolist()
-    head = json.dumps({"Loop": "wrap" if wraps else "none", **notes}, indent=1)
+    head = json.dumps({"Loop": "wrap" if wraps else "none", **known}, indent=1)
     lines = ",\n".join(json.dumps(frame, separators=(",", ":")) for frame in frames)
     return f'{head[:-2]},\n "Frames": [\n{lines}\n ]\n}}\n'
 

@@ -1,0 +1,108 @@
+"""BVH files made into clips of a character."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuated_characters.motion.bvh.reading import read_bvh
+from actuated_characters.motion.clips.motion_clip import MotionClip
+from actuated_characters.motion.clips.quality import ClipQuality, link_poses, measure_quality
+from actuated_characters.motion.retargeting.inverse_kinematics import Progress
+from actuated_characters.motion.retargeting.retargeting import (
+    RetargetedMotion,
+    RetargetingSettings,
+    retarget,
+)
+from actuated_characters.motion.retargeting.target_body import TargetBody
+from msgs_config.geometry import rotations
+
+
+@dataclass(frozen=True)
+class ImportedClip:
+    """A clip, what it was made from, and how well it shows that."""
+
+    clip: MotionClip
+    retargeted: RetargetedMotion
+    quality: ClipQuality
+    worst_joint: str  # a role, such as `left_elbow`
+    worst_mean_rad: float  # mean angle between the segment and the captured one
+    worst_max_rad: float
+
+
+def import_bvh(
+    path: Path,
+    target: TargetBody,
+    settings: RetargetingSettings | None = None,
+    licence: str = "",
+    progress: Progress | None = None,
+) -> ImportedClip:
+    """Make a clip of a BVH file.
+
+    Args:
+        path: The file.
+        target: The character.
+        settings: What is told rather than found out.
+        licence: Of the file; empty if it is not known.
+        progress: Is told how many of twice the frames are done.
+
+    Raises:
+        ClipError: the file is no sound BVH, or its skeleton is none of a body.
+    """
+    motion = read_bvh(path)
+    made = retarget(path, motion, target, settings, progress)
+    conventions = made.conventions
+    times = np.arange(made.source.frames) * motion.frame_time
+    source: dict[str, Any] = {
+        "file": path.name,
+        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "frames": len(motion.values),
+        "rate_hz": round(1.0 / motion.frame_time, 3),
+        "up": conventions.up,
+        "unit_m": round(conventions.unit_length, 6),
+        "rest_pose": conventions.rest,
+        "first_frame": conventions.first_frame,
+        "scale": round(made.scale, 6),
+        "joints": {role: made.source.names[index] for role, index in made.source.map.joints.items()},
+    }
+    if licence:
+        source["licence"] = licence
+    contacts = {
+        point: tuple((float(times[each.first]), float(times[each.last])) for each in found)
+        for point, found in made.contacts.items()
+    }
+    clip = MotionClip(target.character, times, made.motion, False, contacts, source)
+    quality = measure_quality(target, clip)
+    worst, mean, most = _worst_joint(target, clip, made)
+    content = {
+        **quality.content(),
+        "worst_joint": worst,
+        "worst_joint_mean_rad": round(mean, 4),
+        "worst_joint_max_rad": round(most, 4),
+    }
+    known = MotionClip(target.character, times, made.motion, False, contacts, source, content)
+    return ImportedClip(known, made, quality, worst, mean, most)
+
+
+def _worst_joint(
+    target: TargetBody, clip: MotionClip, made: RetargetedMotion
+) -> tuple[str, float, float]:
+    """The segment that is turned worst: its role, mean and largest angle in rad to the captured.
+
+    Of a limb it is the angle between the bones, as a turn about a bone is uncertain.
+    """
+    _, turns = link_poses(target, clip)
+    errors = {}
+    for role, wanted in made.turns.turns_xyzw.items():
+        own = turns[:, target.map[role]]
+        if role in made.turns.bones:
+            apart = rotations.multiply(own, rotations.conjugate(wanted))
+            bone = made.turns.bones[role]
+            cosine = (rotations.rotate(apart, bone) * bone).sum(axis=-1)
+            errors[role] = np.arccos(np.clip(cosine, -1.0, 1.0))
+        else:
+            errors[role] = rotations.angle_between(own, wanted)
+    worst = max(errors, key=lambda role: float(errors[role].mean()))
+    return worst, float(errors[worst].mean()), float(errors[worst].max())
