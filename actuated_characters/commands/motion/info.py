@@ -120,14 +120,14 @@ def _clip_facts(clip: "MotionClip") -> Iterator[tuple[str, Any]]:
         yield "edits", "; ".join(map(str, source["edits"]))
     for point, spans in clip.contacts.items():
         yield f"{point} on the ground", ", ".join(f"{a:.2f}-{b:.2f}" for a, b in spans) or "never"
-    target = _target(clip.character)
+    target = target_of(clip.character)
     quality = clip.quality
     if target is not None:
         quality = {**quality, **measure_quality(target, clip).content()}
     yield from describe_quality(quality)
 
 
-def _target(character: "Character") -> "TargetBody | None":
+def target_of(character: "Character") -> "TargetBody | None":
     """The character as one that stands on legs; None if it is none."""
     from actuated_characters.motion.retargeting.target_body import TargetBody
 
