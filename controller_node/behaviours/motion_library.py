@@ -9,12 +9,13 @@ about z to where its links' origins are nearest (Kovar, Gleicher and Pighin 2002
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from controller_node.references.base import Reference
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import available_clips, read_clip
+from controller_node.references.files.clip import available_clips, expand_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, Vector
@@ -209,9 +210,10 @@ def _names(character: Character, clips: Sequence[str]) -> list[str]:
             "its file has no key 'clips', or nothing is there"
         )
     for clip in clips:
-        if clip not in available:
-            raise ConfigurationError(one_of("clip in parameter 'library':", clip, available))
-    return list(dict.fromkeys(clips)) or available
+        if clip not in available and not Path(clip).exists():
+            sentence = one_of("clip in parameter 'library':", clip, available)
+            raise ConfigurationError(f"{sentence}; or a .json file, or a folder of them")
+    return expand_clips(character, clips) or available
 
 
 def _lengths(character: Character) -> FloatArray:

@@ -37,7 +37,12 @@ REACTION_PARAMETERS = [
         minimum=0.05,
         maximum=60.0,
     ),
-    Parameter("library", [], "clips that a reaction may go on with; none named: all", texts=True),
+    Parameter(
+        "library",
+        [],
+        "clips that a reaction may go on with: names, files, or folders of them; none named: all",
+        texts=True,
+    ),
     Parameter("upright.torque", 150.0, "active_ragdoll, pursuit: largest root torque", unit="N m"),
     Parameter(
         "recovery",

@@ -1,4 +1,4 @@
-"""Files of motion capture as several makers write them, made from clips of which the truth is known.
+"""Files of motion capture as several makers write them, made from clips that are the truth.
 
 A clip of the humanoid moves another skeleton: other proportions, another pose of zero rotations,
 other names, axes, units and channels. The segments turn as the humanoid's do.
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from actuated_characters.motion.export.sources import of_clip
 from tests.support.physics import character
+from tests.support.rotation_matrices import about, euler, half_way, matrices
 
 Floats = NDArray[np.float64]
 
@@ -73,7 +74,9 @@ class Maker:
 
 
 @lru_cache(maxsize=32)
-def humanoid_motion(clip: str, rate: float, cycles: int = 1) -> tuple[float, dict[str, Floats], Floats]:
+def humanoid_motion(
+    clip: str, rate: float, cycles: int = 1
+) -> tuple[float, dict[str, Floats], Floats]:
     """Rate in Hz, turns since standing upright (f, 3, 3) by link, and the root's places (f, 3)."""
     whole = of_clip(character("humanoid"), clip)
     (trajectory,) = whole.characters
@@ -81,46 +84,8 @@ def humanoid_motion(clip: str, rate: float, cycles: int = 1) -> tuple[float, dic
     poses = whole.link_poses(trajectory, whole.sample_times(rate=rate))
     upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # of y-up links
     names = [link.name for link in trajectory.character.links]
-    turns = {
-        name: matrices(poses.turns_xyzw[:, row]) @ upright.T for row, name in enumerate(names)
-    }
+    turns = {name: matrices(poses.turns_xyzw[:, row]) @ upright.T for row, name in enumerate(names)}
     return rate, turns, poses.origins[:, names.index("base")]
-
-
-def matrices(q: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) of quaternions xyzw (..., 4)."""
-    x, y, z, w = np.moveaxis(q, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-
-def about(axis: int, angle: float | Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) of turns about an axis by angles in rad."""
-    angle = np.asarray(angle, dtype=float)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    turn = np.zeros((*angle.shape, 3, 3))
-    turn[..., axis, axis] = 1.0
-    turn[..., i, i] = turn[..., j, j] = np.cos(angle)
-    turn[..., j, i], turn[..., i, j] = np.sin(angle), -np.sin(angle)
-    return turn
-
-
-def half_way(a: Floats, b: Floats, share: float) -> Floats:
-    """Rotations (f, 3, 3) a share of the way from a to b."""
-    between = np.swapaxes(a, -1, -2) @ b
-    angle = np.arccos(np.clip((np.trace(between, axis1=-2, axis2=-1) - 1.0) / 2.0, -1.0, 1.0))
-    skew = between - np.swapaxes(between, -1, -2)
-    axis = np.stack((skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]), axis=-1)
-    axis /= np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-12)
-    k = np.zeros_like(between)
-    k[..., 2, 1], k[..., 0, 2], k[..., 1, 0] = axis[..., 0], axis[..., 1], axis[..., 2]
-    k -= np.swapaxes(k, -1, -2)
-    part = (share * angle)[..., None, None]
-    return a @ (np.eye(3) + np.sin(part) * k + (1.0 - np.cos(part)) * (k @ k))
 
 
 @dataclass
@@ -145,8 +110,7 @@ def capture(
     world = maker.world @ about(2, maker.yaw)
     own = [_own_axes(index) if maker.bent_frames else np.eye(3) for index in range(len(nodes))]
     globals_ = [
-        world @ node.turns @ maker.rest.T @ frame
-        for node, frame in zip(nodes, own, strict=True)
+        world @ node.turns @ maker.rest.T @ frame for node, frame in zip(nodes, own, strict=True)
     ]
     columns: list[Floats] = []
     lines = ["HIERARCHY"]
@@ -160,7 +124,9 @@ def capture(
         offset = frame.T @ maker.rest @ node.offset / maker.unit
         if (node.parent < 0 and maker.root_moves) or maker.positions:
             moving = (
-                places @ world.T / maker.unit if node.parent < 0 else np.tile(offset, (len(root), 1))
+                places @ world.T / maker.unit
+                if node.parent < 0
+                else np.tile(offset, (len(root), 1))
             )
             columns.append(np.broadcast_to(moving, (len(root), 3)))
         columns.append(angles)
@@ -185,7 +151,9 @@ def _skeleton(maker: Maker, turns: Mapping[str, Floats]) -> list[_Node]:
     still = np.tile(np.eye(3), (len(pelvis), 1, 1))
     nodes: list[_Node] = []
 
-    def add(name: str, parent: int, offset: tuple[float, float, float] | Floats, turn: Floats) -> int:
+    def add(
+        name: str, parent: int, offset: tuple[float, float, float] | Floats, turn: Floats
+    ) -> int:
         nodes.append(_Node(name, parent, np.array(offset, dtype=float), turn))
         return len(nodes) - 1
 
@@ -292,122 +260,3 @@ def _hierarchy(maker: Maker, nodes: list[_Node], own: list[Floats]) -> list[str]
 def _own_axes(index: int) -> Floats:
     """The axes of a joint of its own, any."""
     return about(2, 0.7 * index) @ about(0, 1.3 + 0.4 * index) @ about(1, 0.9 * index)
-
-
-def euler(turns: Floats, order: str) -> Floats:
-    """Angles (f, 3) in rad whose turns about the axes of an order are the given ones."""
-    i, j, k = ("XYZ".index(axis) for axis in order)
-    sign = 1.0 if (j - i) % 3 == 1 else -1.0
-    b = np.arcsin(np.clip(sign * turns[:, i, k], -1.0, 1.0))
-    a = np.arctan2(-sign * turns[:, j, k], turns[:, k, k])
-    c = np.arctan2(-sign * turns[:, i, j], turns[:, i, i])
-    return np.stack((a, b, c), axis=-1)
-
-
-def _sided(**parts: str) -> dict[str, str]:
-    """Names by part: `{side}` is the word of a side."""
-    return parts
-
-
-def names_of(
-    sides: tuple[str, str], pattern: Mapping[str, str], trunk: Mapping[str, str]
-) -> dict[str, str]:
-    """Names by part, of both sides, where `*` stands for a side's word."""
-    names = dict(trunk)
-    for side, word in zip(SIDES, sides, strict=True):
-        names |= {f"{side}_{part}": name.replace("*", word) for part, name in pattern.items()}
-    return names
-
-
-_HIK = {
-    "hip": "*UpLeg", "knee": "*Leg", "ankle": "*Foot", "toe": "*ToeBase",
-    "collar": "*Shoulder", "shoulder": "*Arm", "elbow": "*ForeArm", "wrist": "*Hand",
-}  # fmt: skip
-_TRUNK = {"hips": "Hips", "neck": "Neck", "head": "Head"}
-_WORDS = ("Left", "Right")
-_CLASSIC = {
-    "hip": "*Hip", "knee": "*Knee", "ankle": "*Ankle", "toe": "*Toe",
-    "collar": "*Collar", "shoulder": "*Shoulder", "elbow": "*Elbow", "wrist": "*Wrist",
-}  # fmt: skip
-_BIPED = {
-    "hip": "Bip01 * Thigh", "knee": "Bip01 * Calf", "ankle": "Bip01 * Foot",
-    "toe": "Bip01 * Toe0", "collar": "Bip01 * Clavicle", "shoulder": "Bip01 * UpperArm",
-    "elbow": "Bip01 * Forearm", "wrist": "Bip01 * Hand",
-}  # fmt: skip
-_COURSE = {
-    "hip": "*Hip", "knee": "*Knee", "ankle": "*Ankle", "toe": "*ToeJoint",
-    "collar": "*Torso_Clavicle", "shoulder": "*Shoulder", "elbow": "*Elbow", "wrist": "*Wrist",
-}  # fmt: skip
-_BANDAI = {
-    "hip": "UpperLeg_*", "knee": "LowerLeg_*", "ankle": "Foot_*", "toe": "Toes_*",
-    "collar": "Shoulder_*", "shoulder": "UpperArm_*", "elbow": "LowerArm_*", "wrist": "Hand_*",
-}  # fmt: skip
-_SMPL = {
-    "hip": "*_Hip", "knee": "*_Knee", "ankle": "*_Ankle", "toe": "*_Foot",
-    "collar": "*_Collar", "shoulder": "*_Shoulder", "elbow": "*_Elbow", "wrist": "*_Wrist",
-}  # fmt: skip
-_ROKOKO = {
-    "hip": "*Thigh", "knee": "*Shin", "ankle": "*Foot", "toe": "*Toe",
-    "collar": "*Shoulder", "shoulder": "*Arm", "elbow": "*ForeArm", "wrist": "*Hand",
-}  # fmt: skip
-_DAZ = {
-    "hip": "*Thigh", "knee": "*Shin", "ankle": "*Foot",
-    "collar": "*Collar", "shoulder": "*Shldr", "elbow": "*ForeArm", "wrist": "*Hand",
-}  # fmt: skip
-
-MAKERS: dict[str, Maker] = {
-    "cmu": Maker(
-        names_of(_WORDS, _HIK, _TRUNK), spine=("LowerBack", "Spine", "Spine1"), order="ZYX",
-        unit=0.056444, legs=0.35, hip_joints="{L}HipJoint", first_rest=True, fingers=True,
-        rate=120.0, indent="\t",
-    ),
-    "mixamo": Maker(
-        {part: f"mixamorig:{name}" for part, name in names_of(_WORDS, _HIK, _TRUNK).items()},
-        spine=("mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2"), order="ZXY",
-        fingers=True, positions=True, yaw=2.2, line_end="\r\n",
-        proportions=Proportions(thigh=0.44, shank=0.43, spine=0.5, upper_arm=0.26, forearm=0.27),
-    ),
-    "lafan": Maker(
-        names_of(_WORDS, {**_HIK, "toe": "*Toe"}, _TRUNK), spine=("Spine", "Spine1", "Spine2"),
-        order="ZYX", bent_frames=True, yaw=-1.1, rate=30.0,
-    ),
-    "biovision": Maker(
-        names_of(_WORDS, {k: v for k, v in _CLASSIC.items() if k != "toe"}, _TRUNK),
-        spine=("Chest",), order="ZXY", unit=0.0254, rate=30.0,
-        proportions=Proportions(thigh=0.40, shank=0.44, hip_width=0.08, hip_drop=0.0),
-    ),
-    "biped": Maker(
-        names_of(("L", "R"), _BIPED, {"hips": "Bip01", "neck": "Bip01 Neck", "head": "Bip01 Head"}),
-        spine=("Bip01 Spine", "Bip01 Spine1"), order="ZYX", unit=0.0254, world=Z_UP, rest=Z_UP,
-        yaw=0.8, indent="\t",
-    ),
-    "bandai": Maker(
-        names_of(("L", "R"), _BANDAI, _TRUNK), spine=("Spine", "Chest"), order="ZYX",
-        above_root="joint_Root", positions=True, arms=0.0,
-        proportions=Proportions(thigh=0.38, shank=0.37, ankle=0.07, spine=0.42),
-    ),
-    "rokoko": Maker(
-        names_of(_WORDS, _ROKOKO, _TRUNK), spine=("Spine1", "Spine2", "Spine3", "Spine4"),
-        order="YXZ", unit=1.0, number="{:.8e}", rate=100.0, arms=0.7,
-    ),
-    "smpl": Maker(
-        names_of(("L", "R"), _SMPL, {"hips": "Pelvis", "neck": "Neck", "head": "Head"}),
-        spine=("Spine1", "Spine2", "Spine3"), order="XYZ", unit=1.0, world=Z_UP, rest=Y_UP,
-        yaw=3.0, rate=60.0,
-    ),
-    "course": Maker(
-        names_of(("l", "r"), _COURSE, {"hips": "RootJoint", "neck": "torso_head"}),
-        spine=("pelvis_lowerback", "lowerback_torso"), order="XYZ", unit=1.0, rate=60.0,
-        proportions=Proportions(thigh=0.39, shank=0.40, shoulder_width=0.2),
-    ),
-    "daz": Maker(
-        names_of(("l", "r"), _DAZ, {"hips": "hip", "neck": "neck", "head": "head"}),
-        spine=("abdomen", "chest"), order="ZXY", unit=0.01, arms=0.0, first_rest=True, rate=120.0,
-        line_end="\r\n",
-    ),
-    "in place": Maker(
-        names_of(_WORDS, _CLASSIC, _TRUNK), spine=("Chest", "Chest2", "Chest3", "Chest4"),
-        order="YXZ", root_moves=False, rate=60.0,
-    ),
-}  # fmt: skip
-"""Makers by the convention that they follow."""

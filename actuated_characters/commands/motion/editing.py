@@ -1,7 +1,7 @@
 """The commands `actuated_characters motion trim`, `loop`, `mirror`, `blend` and `speed`."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,7 +43,9 @@ def add_motion_edits(commands: "Commands[argparse.ArgumentParser]") -> None:
     blend.add_argument("next", metavar="NEXT", help="the clip that follows: a name or a file")
     blend.add_argument("--over", type=float, default=0.3, metavar="S", help="s (%(default)s)")
     speed = _add(commands, "speed", _speed, "play a clip faster", "motion speed run --factor 0.8")
-    speed.add_argument("--factor", type=float, required=True, metavar="X", help="2 is twice as fast")
+    speed.add_argument(
+        "--factor", type=float, required=True, metavar="X", help="2 is twice as fast"
+    )
 
 
 def _add(
@@ -54,13 +56,15 @@ def _add(
 
     description = f"{about.capitalize()}; of a folder, all clips in it."
     command = add_command(commands, run, name, about, description, [example])
-    command.add_argument("source", metavar="CLIP", help="a clip's name or file, or a folder of them")
+    command.add_argument(
+        "source", metavar="CLIP", help="a clip's name or file, or a folder of them"
+    )
     add_character(command)
     command.add_argument(
         "--output",
         type=Path,
         metavar="FILE",
-        help=f"a .json file, or a folder for those of a folder (the clip's name with -{name}, here)",
+        help=f"a .json file, or a folder for those of a folder (CLIP-{name}, here)",
     )
     command.add_argument("--overwrite", action="store_true", help="replace files")
     return command

@@ -155,6 +155,6 @@ def describe_quality(quality: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if "worst_joint" in quality:
         yield (
             "worst joint",
-            f"{quality['worst_joint']}: {quality['worst_joint_mean_rad']:.3f} rad from the captured "
-            f"one, at most {quality['worst_joint_max_rad']:.3f} rad",
+            f"{quality['worst_joint']}: {quality['worst_joint_mean_rad']:.3f} rad from the "
+            f"captured one, at most {quality['worst_joint_max_rad']:.3f} rad",
         )

@@ -62,7 +62,9 @@ def loop(clip: MotionClip, start: float | None = None, end: float | None = None)
         ClipError: the clip is too short.
     """
     first, last = _cycle(clip, start, end)
-    part = _part(clip, first, last, f"cycle from {clip.times[first]:.3f} s to {clip.times[last]:.3f} s")
+    part = _part(
+        clip, first, last, f"cycle from {clip.times[first]:.3f} s to {clip.times[last]:.3f} s"
+    )
     layout, moves = clip.character.layout, clip.character.layout.has_floating_base
     begin, finish = _row(part.motion, 0), _row(part.motion, -1)
     if moves:  # on the ground, and about z, it goes on from where it is
@@ -93,7 +95,7 @@ def blend(first: MotionClip, second: MotionClip, duration: float) -> MotionClip:
     begins = first.duration - duration
     step = 1.0 / first.rate
     count = math.floor((begins + second.duration) / step + 1e-6) + 1
-    times = np.arange(count) * step
+    times: FloatArray = step * np.arange(count, dtype=float)
     one = _samples(first, np.minimum(times, first.duration))
     two = _samples(second, np.maximum(times - begins, 0.0))
     join = int(np.searchsorted(times, begins + 0.5 * duration).clip(0, count - 1))
@@ -108,7 +110,9 @@ def blend(first: MotionClip, second: MotionClip, duration: float) -> MotionClip:
     }
     made = replace(first, motion=one, times=times, contacts=contacts, wraps=False)
     name = second.source.get("file", second.source.get("clip", "another clip"))
-    return replace(made, motion=_moved(made, way)).edited(f"{name} after it, blended {duration:g} s")
+    return replace(made, motion=_moved(made, way)).edited(
+        f"{name} after it, blended {duration:g} s"
+    )
 
 
 def mirror(clip: MotionClip) -> MotionClip:

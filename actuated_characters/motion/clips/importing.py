@@ -17,6 +17,7 @@ from actuated_characters.motion.retargeting.retargeting import (
     retarget,
 )
 from actuated_characters.motion.retargeting.target_body import TargetBody
+from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
 
@@ -54,7 +55,7 @@ def import_bvh(
     motion = read_bvh(path)
     made = retarget(path, motion, target, settings, progress)
     conventions = made.conventions
-    times = np.arange(made.source.frames) * motion.frame_time
+    times: FloatArray = motion.frame_time * np.arange(made.source.frames, dtype=float)
     source: dict[str, Any] = {
         "file": path.name,
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -65,7 +66,9 @@ def import_bvh(
         "rest_pose": conventions.rest,
         "first_frame": conventions.first_frame,
         "scale": round(made.scale, 6),
-        "joints": {role: made.source.names[index] for role, index in made.source.map.joints.items()},
+        "joints": {
+            role: made.source.names[index] for role, index in made.source.map.joints.items()
+        },
     }
     if licence:
         source["licence"] = licence

@@ -1,4 +1,4 @@
-"""A motion clip with what is known of it: where it comes from, contacts with the ground, quality."""
+"""A motion clip with what is known of it: its source, contacts with the ground, quality."""
 
 import json
 import math

@@ -42,9 +42,7 @@ def speeds(positions: FloatArray, frame_time: float) -> FloatArray:
     return speed
 
 
-def find_contacts(
-    positions: FloatArray, ground: float, frame_time: float
-) -> tuple[Contact, ...]:
+def find_contacts(positions: FloatArray, ground: float, frame_time: float) -> tuple[Contact, ...]:
     """The contacts of a point with the ground.
 
     Args:

@@ -40,6 +40,7 @@ class Conventions:
     first_frame: int  # of the motion; a pose that was put before it is left out
     sides_swapped: bool  # what is called left is right
     root_moves: bool  # whether the file has where the root is
+    is_own: bool = False  # the skeleton is the character's own, and the motion taken as it is
 
     def described(self) -> str:
         """A line of it."""
@@ -56,6 +57,8 @@ class Conventions:
             parts.append("left and right exchanged, as the feet point backwards")
         if not self.root_moves:
             parts.append("the root stands still, so the feet say where it goes")
+        if self.is_own:
+            parts.append("the character's own skeleton, whose motion is taken as it is")
         return ", ".join(parts)
 
 

@@ -4,13 +4,14 @@ import numpy as np
 
 from actuated_characters.motion.retargeting.captured_body import CapturedBody
 from actuated_characters.motion.retargeting.inverse_kinematics import Goals
+from actuated_characters.motion.retargeting.joint_angles import joint_angles
 from actuated_characters.motion.retargeting.segments import SegmentTurns
 from actuated_characters.motion.retargeting.skeleton_map import SIDES
 from actuated_characters.motion.retargeting.target_body import TargetBody
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.layout import GeneralizedPosition, JointType
-from msgs_config.geometry import elementary, rotations
+from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.geometry import rotations
 
 # Weights: one over what counts as a residual of one
 _TURNS = {"pelvis": 1 / 0.06, "chest": 1 / 0.06, "head": 1 / 0.12, "ankle": 1 / 0.12}
@@ -67,59 +68,29 @@ def link_motion(
 
 def hips_in_pelvis(target: TargetBody) -> FloatArray:
     """The middle (3,) of the hips in the frame of the pelvis' link, m."""
-    middle = 0.5 * sum(target.origin(f"{side}_hip") for side in SIDES)
     link = target.map["pelvis"]
     back = rotations.conjugate(target.turns_xyzw[link])
-    return rotations.rotate(back, middle - target.origins[link])
+    return rotations.rotate(back, _middle_of_hips(target) - target.origins[link])
 
 
-def first_guess(
-    body: CapturedBody, target: TargetBody, turns: SegmentTurns
-) -> GeneralizedPosition:
+def first_guess(body: CapturedBody, target: TargetBody, turns: SegmentTurns) -> GeneralizedPosition:
     """The character with its links turned as the segments are, joint by joint from the root on."""
-    character, layout = target.character, target.character.layout
-    frames = body.frames
-    positions = np.zeros((frames, layout.size))
+    pelvis = target.map["pelvis"]
+    back = rotations.multiply(rotations.conjugate(target.turns_xyzw[pelvis]), target.turns_xyzw[0])
+    turn = rotations.multiply(turns.turns_xyzw["pelvis"], back)
+    hips = rotations.rotate(
+        rotations.conjugate(target.turns_xyzw[0]), _middle_of_hips(target) - target.origins[0]
+    )
+    origin = body.middle("hip") - rotations.rotate(turn, hips)
     by_link = {target.map[role]: turn for role, turn in turns.turns_xyzw.items()}
-    lower, upper = character.position_bounds()
-    world: list[FloatArray] = []
-    for index, link in enumerate(character.links):
-        joint, wanted = link.joint, by_link.get(index)
-        if index == 0:
-            pelvis = target.map["pelvis"]
-            back = rotations.multiply(
-                rotations.conjugate(target.turns_xyzw[pelvis]), target.turns_xyzw[0]
-            )
-            turn = rotations.multiply(turns.turns_xyzw["pelvis"], back)
-            positions[:, 3:6] = rotations.log(turn)
-            positions[:, :3] = body.middle("hip") - rotations.rotate(
-                turn, _hips_in_base(target)
-            )
-            world.append(turn)
-            continue
-        frame = rotations.multiply(world[link.parent], np.array(joint.pose_in_parent.orientation_xyzw))
-        if wanted is not None and joint.type is JointType.SPHERICAL:
-            entries = layout.joint(joint.name).entries
-            relative = rotations.multiply(rotations.conjugate(frame), wanted)
-            positions[:, entries] = rotations.log(relative)
-            frame = wanted
-        elif wanted is not None and joint.type is JointType.REVOLUTE:
-            relative = rotations.multiply(rotations.conjugate(frame), wanted)
-            axis = np.array(joint.axis_in_child)
-            angle = 2.0 * elementary.arctan2(relative[:, :3] @ axis, relative[:, 3])
-            angle = (angle + np.pi) % (2.0 * np.pi) - np.pi
-            start = layout.joint(joint.name).start
-            angle = np.clip(angle, lower[start], upper[start])
-            positions[:, start] = angle
-            frame = rotations.multiply(frame, rotations.exp(angle[:, np.newaxis] * axis))
-        world.append(frame)
-    return layout.configuration(positions)
+    return joint_angles(target.character, (origin, turn), by_link)
 
 
-def _hips_in_base(target: TargetBody) -> FloatArray:
-    middle = 0.5 * sum(target.origin(f"{side}_hip") for side in SIDES)
-    back = rotations.conjugate(target.turns_xyzw[0])
-    return rotations.rotate(back, middle - target.origins[0])
+def _middle_of_hips(target: TargetBody) -> FloatArray:
+    """The middle (3,) between the hips at rest, m."""
+    left, right = (target.origin(f"{side}_hip") for side in SIDES)
+    middle: FloatArray = 0.5 * (left + right)
+    return middle
 
 
 def _turn_weights(role: str, turns: SegmentTurns, frames: int) -> FloatArray:

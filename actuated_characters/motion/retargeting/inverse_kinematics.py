@@ -137,9 +137,7 @@ class InverseKinematics:
         positions[:, entries] = rotations.log(turns)
         return GeneralizedPosition(positions, turns)
 
-    def _linearised(
-        self, now: GeneralizedPosition, goals: Goals
-    ) -> tuple[Linear, Linear]:
+    def _linearised(self, now: GeneralizedPosition, goals: Goals) -> tuple[Linear, Linear]:
         """The residuals, and those that count only where something is missing, weighted."""
         used, index = np.unique(
             np.concatenate((goals.links, goals.point_links, goals.surface.links)),

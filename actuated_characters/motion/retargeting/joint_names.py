@@ -35,7 +35,7 @@ LEG: tuple[tuple[str, PartWeights], ...] = (
     ("ankle", {"ankle": 1, "foot": 0.9, "anklejoint": 1}),
     ("toe", {"toe": 1, "toes": 1, "toebase": 1, "ball": 1, "toejoint": 1, "foot": 0.4}),
 )
-"""The joints of a leg from the trunk on, each with the parts that it is called by, and how surely."""
+"""The joints of a leg from the trunk on, with the parts that they are called by, and how surely."""
 
 ARM: tuple[tuple[str, PartWeights], ...] = (
     (
@@ -67,7 +67,9 @@ def side_and_part(name: str) -> tuple[str, str]:
     """
     last = re.split(r"[:|/]", name.strip())[-1]
     found = " ".join(_WORDS.findall(last)).lower()
-    words = " ".join(_SIDE_AND_WORD.sub(r"\1 \2", w) if len(w) == 2 else w for w in found.split()).split()
+    words = " ".join(
+        _SIDE_AND_WORD.sub(r"\1 \2", w) if len(w) == 2 else w for w in found.split()
+    ).split()
     if _HELPERS.search("".join(words)):
         return "", ""
     if len(words) > 1 and words[0] == "joint":

@@ -54,7 +54,8 @@ def _with_skeleton(
     drawn = picture.astype(float)
     for node, parent in bones:
         _draw_bone(drawn, view, nodes[parent], nodes[node], _COLORS[sides[node]])
-    return np.rint(drawn).astype(np.uint8)
+    painted: Picture = np.rint(drawn).astype(np.uint8)
+    return painted
 
 
 def _sides(made: RetargetedMotion) -> list[str]:

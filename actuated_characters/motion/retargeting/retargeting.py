@@ -26,6 +26,7 @@ from actuated_characters.motion.retargeting.conventions import (
 )
 from actuated_characters.motion.retargeting.goals import first_guess, free_goals
 from actuated_characters.motion.retargeting.inverse_kinematics import InverseKinematics, Progress
+from actuated_characters.motion.retargeting.own_skeleton import own_motion
 from actuated_characters.motion.retargeting.segments import SegmentTurns, segment_turns
 from actuated_characters.motion.retargeting.skeleton_map import SIDES, find_map
 from actuated_characters.motion.retargeting.stances import with_stances
@@ -122,17 +123,29 @@ def retarget(
     start = -body.middle("hip")[0]
     body = body.moved(np.tile((start[0], start[1], rise), (body.frames, 1)))
     contacts = body_contacts(body)
-    flat = {
-        f"{side}_ankle": flat_frames(contacts, side, body.frames) for side in SIDES
-    }
+    own = own_motion(motion, target)
+    flat = {f"{side}_ankle": flat_frames(contacts, side, body.frames) for side in SIDES}
     turns = segment_turns(body, target, flat)
+    if own is not None:  # nothing is to be altered, not even where it stands
+        rows = slice(conventions.first_frame, None)
+        own = GeneralizedPosition(own.position[rows], own.orientations_xyzw[rows])
+        return RetargetedMotion(
+            body,
+            replace(conventions, is_own=True),
+            scale * conventions.unit_length,
+            contacts,
+            turns,
+            own,
+        )
     solver = InverseKinematics(target, body.frame_time)
     goals = free_goals(body, target, turns)
     guess = first_guess(body, target, turns)
     loose = solver.solve(guess, goals, _share(progress, 0, body.frames))
     goals = with_stances(goals, target, loose, contacts, body.frame_time)
     tight = solver.solve(loose, goals, _share(progress, body.frames, body.frames))
-    return RetargetedMotion(body, conventions, scale * conventions.unit_length, contacts, turns, tight)
+    return RetargetedMotion(
+        body, conventions, scale * conventions.unit_length, contacts, turns, tight
+    )
 
 
 def _share(progress: Progress | None, before: int, frames: int) -> Progress | None:

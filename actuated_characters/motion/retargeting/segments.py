@@ -5,7 +5,7 @@ about which the joint below it bends, or left and up of pelvis and chest. So nei
 zero rotations nor the axes of the joints matter, which differ from maker to maker.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,9 @@ _BENT = (0.15, 0.45)  # sines of the angle of knee or elbow between which its ow
 _FEW = 5  # frames on the ground that tell how a sole lies
 _TILTED = np.cos(np.radians(50.0))  # of a sole at rest, beyond which it is no sole
 
+Across = Callable[[FloatArray], FloatArray]
+"""The axis (f, 3) about which a limb usually bends whose upper bone is (f, 3)."""
+
 Frame = tuple[FloatArray, FloatArray]
 """Two directions (..., 3) each: the first one is kept, the second one as far as it is across."""
 
@@ -34,7 +37,9 @@ class SegmentTurns:
     bones: Mapping[str, FloatArray]  # (f, 3) by role: the axis about which a turn is uncertain
 
 
-def segment_turns(body: CapturedBody, target: TargetBody, flat: Mapping[str, BoolArray]) -> SegmentTurns:
+def segment_turns(
+    body: CapturedBody, target: TargetBody, flat: Mapping[str, BoolArray]
+) -> SegmentTurns:
     """The turns of all segments of a body whose world's z is up.
 
     Args:
@@ -51,13 +56,10 @@ def segment_turns(body: CapturedBody, target: TargetBody, flat: Mapping[str, Boo
     for side in SIDES:
         hip, knee, ankle = (f"{side}_{part}" for part in ("hip", "knee", "ankle"))
         shoulder, elbow = f"{side}_shoulder", f"{side}_elbow"
-        ahead = np.cross(pelvis[0], pelvis[1])
-        limb = _limb(body, (hip, knee, ankle), lambda bone, a=ahead: np.cross(a, bone))
+        limb = _limb(body, (hip, knee, ankle), _usual_knee(pelvis))
         frames[hip], frames[knee] = limb
         frames[ankle] = _foot(body, ankle, limb[1], flat[ankle], up_at_rest)
-        ahead = np.cross(chest[1], chest[0])
-        wrist = f"{side}_wrist"
-        limb = _limb(body, (shoulder, elbow, wrist), lambda bone, a=ahead: np.cross(bone, a))
+        limb = _limb(body, (shoulder, elbow, f"{side}_wrist"), _usual_elbow(chest))
         frames[shoulder], frames[elbow] = limb
         for role in (hip, knee, shoulder, elbow):
             bones[role] = frames[role][0]
@@ -112,7 +114,19 @@ def _head(body: CapturedBody, chest: Frame, up_at_rest: FloatArray | None) -> Fr
     return rotations.rotate(turn, up), rotations.rotate(turn, left)
 
 
-def _limb(body: CapturedBody, roles: tuple[str, str, str], usual) -> tuple[Frame, Frame]:
+def _usual_knee(pelvis: Frame) -> Across:
+    """Knees bend backwards, seen from the pelvis."""
+    ahead = np.cross(pelvis[0], pelvis[1])
+    return lambda bone: np.cross(ahead, bone)
+
+
+def _usual_elbow(chest: Frame) -> Across:
+    """Elbows bend to the front, seen from the chest."""
+    ahead = np.cross(chest[1], chest[0])
+    return lambda bone: np.cross(bone, ahead)
+
+
+def _limb(body: CapturedBody, roles: tuple[str, str, str], usual: Across) -> tuple[Frame, Frame]:
     """Both bones of a limb, each with the axis about which the joint between them bends.
 
     Of a limb that is straight it is the axis that the upper joint has carried all the time.

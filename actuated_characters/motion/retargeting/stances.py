@@ -55,7 +55,7 @@ def with_stances(
     frames = len(loose.position)
     points, clearance = _Points([], [], [], []), goals.clearance.copy()
     for side in SIDES:
-        touching = [mask(contacts[f"{side}_{part}"], frames) for part in ("toe", "heel")]
+        touching = [mask(tuple(contacts[f"{side}_{part}"]), frames) for part in ("toe", "heel")]
         _hold_foot(points, target, loose, f"{side}_ankle", touching, frame_time)
         lift = _swing_clearance(touching[0] | touching[1], frame_time)
         foot = goals.surface.links == target.map[f"{side}_ankle"]

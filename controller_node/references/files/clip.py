@@ -6,6 +6,7 @@ character's file may say otherwise of quaternions, of the base's axes, and of an
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +21,7 @@ from msgs_config.errors import ClipError, one_of
 from msgs_config.files import read_text
 from msgs_config.geometry import fixed_order, rotations
 
+_SUFFIXES = (".txt", ".json")
 _OF_BEFORE = "Corrections"
 _ROOT_COLUMNS = 8  # duration, position, quaternion
 _SHORTEST_QUATERNION = 0.1
@@ -104,12 +106,34 @@ def clip_path(character: Character, name_or_path: str) -> Path:
     """The file of a clip given by name or path. Raises ClipError if there is no such clip."""
     if not character.clips.pattern:
         raise ClipError(f"character '{character.name}' has no clips: its file has no key 'clips'")
-    if name_or_path.endswith((".txt", ".json")):
+    if name_or_path.endswith(_SUFFIXES):
         return Path(name_or_path)
     clips = available_clips(character)
     if name_or_path not in clips:
         raise ClipError(f"{one_of('clip', name_or_path, clips)}, or the path of a .txt file")
     return Path(character.clips.pattern.replace("*", name_or_path))
+
+
+def expand_clips(character: Character, names: Sequence[str]) -> list[str]:
+    """Clips by name or path, those of a folder in its place, in the order of their paths.
+
+    Raises:
+        ClipError: a clip does not exist, or a folder has none.
+    """
+    clips: list[str] = []
+    for name in names:
+        folder = Path(name)
+        if folder.is_dir() and name not in available_clips(character):
+            files = sorted(str(p) for p in folder.rglob("*") if p.suffix in _SUFFIXES)
+            if not files:
+                raise ClipError(f"{folder}: there is no .json or .txt file in it")
+            clips += files
+        else:
+            path = clip_path(character, name)
+            if not path.is_file():
+                raise ClipError(f"{path}: No such file or directory")
+            clips.append(name)
+    return list(dict.fromkeys(clips))
 
 
 def _check_frames(path: Path, frames: FloatArray) -> None:

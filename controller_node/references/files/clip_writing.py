@@ -43,7 +43,7 @@ def clip_rows(character: Character, times: FloatArray, motion: GeneralizedPositi
 
 
 def clip_text(rows: FloatArray, *, wraps: bool, known: Mapping[str, Any]) -> str:
-    """The text of a clip's file: frames (f, m), whether it goes on from its end, and what else is known."""
+    """The text of a clip's file: frames (f, m), whether it goes on from its end, and the rest."""
     frames = (np.round(rows, _DECIMALS) + 0.0).tolist()
     head = json.dumps({"Loop": "wrap" if wraps else "none", **known}, indent=1)
     lines = ",\n".join(json.dumps(frame, separators=(",", ":")) for frame in frames)

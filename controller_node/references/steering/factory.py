@@ -4,7 +4,7 @@ import numpy as np
 
 from controller_node.references.base import REFERENCES, Motion
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import read_clip
+from controller_node.references.files.clip import expand_clips, read_clip
 from controller_node.references.steering.gait import Gait, cycle_of, standing_cycle
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import SteeringLimits
@@ -17,6 +17,12 @@ from msgs_config.shared_parameters import RATE
 PARAMETERS = (
     Parameter("steering.walk", "walk", "the clip that a steered character walks by"),
     Parameter("steering.run", "run", "the clip that it runs by"),
+    Parameter(
+        "steering.clips",
+        [],
+        "cycles to move by instead of these two: names, files, or folders of them",
+        texts=True,
+    ),
     Parameter("steering.speed", 2.5, "its largest speed ahead", unit="m/s", maximum=10.0),
     Parameter(
         "steering.acceleration", 1.3, "of its speed", unit="m/s^2", minimum=0.01, maximum=100.0
@@ -55,15 +61,21 @@ def _steered(character: Character, values: Values) -> Motion:
         raise ConfigurationError(
             f"reference 'steered' needs a floating base; '{character.name}' is fixed to the world"
         )
+    names = expand_clips(character, values.texts("steering.clips")) or [
+        values.text("steering.walk"),
+        values.text("steering.run"),
+    ]
     clamped: list[str] = []
     cycles = []
-    for name in (values.text("steering.walk"), values.text("steering.run")):
+    for name in names:
         frames = read_clip(character, name)
         if not frames.wraps:
             raise ConfigurationError(f"clip '{name}' ends; to steer, it must wrap")
         clamped += frames.clamped
         clip = ClipReference(character.layout, frames)
         cycles.append(cycle_of(name, clip, float(frames.times[-1])))
+    if values.texts("steering.clips"):
+        cycles.sort(key=lambda cycle: cycle.speed)
     rest: FloatArray = np.array(character.rest_position)
     standing = standing_cycle(character.layout.configuration(rest), cycles[0].period)
     limits = SteeringLimits(
