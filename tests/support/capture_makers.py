@@ -107,3 +107,17 @@ MAKERS: dict[str, Maker] = {
     ),
 }  # fmt: skip
 """Makers by the convention that they follow."""
+
+TEN_FILES = [
+    ("cmu", "walk"),
+    ("mixamo", "run"),
+    ("lafan", "dance_a"),
+    ("biovision", "dance_b"),
+    ("biped", "kick"),
+    ("bandai", "punch"),
+    ("rokoko", "jump"),
+    ("smpl", "spin"),
+    ("course", "crawl"),
+    ("daz", "cartwheel"),
+]
+"""A file of each maker, by the clip that it shows."""

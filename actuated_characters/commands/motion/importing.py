@@ -62,6 +62,10 @@ def add_motion_import(commands: "Commands[argparse.ArgumentParser]") -> None:
     )
     command.add_argument("--up", choices=_AXES, metavar="AXIS", help="x, y, z, -x, -y or -z")
     command.add_argument("--units", choices=_UNITS, help="the unit of length")
+    command.add_argument(
+        "--from", dest="start", type=float, default=0.0, metavar="S", help="start, s (0)"
+    )
+    command.add_argument("--to", dest="end", type=float, metavar="S", help="end, s (the last)")
     command.add_argument("--licence", default="", metavar="TEXT", help="of the files; kept")
     command.add_argument("--no-picture", action="store_true", help="make no strip of pictures")
     command.add_argument("--overwrite", action="store_true", help="replace files")
@@ -115,7 +119,14 @@ def _convert(
             totals[0] = total
             bar.update(bar.task_ids[0], completed=done, total=total)
 
-        made = import_bvh(path, target, settings, options.licence, progress)
+        made = import_bvh(
+            path,
+            target,
+            settings,
+            part=(options.start, options.end),
+            licence=options.licence,
+            progress=progress,
+        )
     make_folder_of(conversion.output)
     made.clip.write(conversion.output)
     if not options.no_picture:

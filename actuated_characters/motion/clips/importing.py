@@ -1,13 +1,14 @@
 """BVH files made into clips of a character."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from actuated_characters.motion.bvh.reading import read_bvh
+from actuated_characters.motion.bvh.skeleton import BvhMotion
 from actuated_characters.motion.clips.motion_clip import MotionClip
 from actuated_characters.motion.clips.quality import ClipQuality, link_poses, measure_quality
 from actuated_characters.motion.retargeting.inverse_kinematics import Progress
@@ -18,7 +19,10 @@ from actuated_characters.motion.retargeting.retargeting import (
 )
 from actuated_characters.motion.retargeting.target_body import TargetBody
 from msgs_config.arrays import FloatArray
+from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
+
+_MOST_FRAMES = 30_000  # a file of which is read again
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,8 @@ def import_bvh(
     path: Path,
     target: TargetBody,
     settings: RetargetingSettings | None = None,
+    *,
+    part: tuple[float, float | None] = (0.0, None),
     licence: str = "",
     progress: Progress | None = None,
 ) -> ImportedClip:
@@ -46,13 +52,14 @@ def import_bvh(
         path: The file.
         target: The character.
         settings: What is told rather than found out.
+        part: From when to when in s of the file; None is its end.
         licence: Of the file; empty if it is not known.
         progress: Is told how many of twice the frames are done.
 
     Raises:
         ClipError: the file is no sound BVH, or its skeleton is none of a body.
     """
-    motion = read_bvh(path)
+    motion = _part_of(path, read_bvh(path), *part)
     made = retarget(path, motion, target, settings, progress)
     conventions = made.conventions
     times: FloatArray = motion.frame_time * np.arange(made.source.frames, dtype=float)
@@ -85,8 +92,25 @@ def import_bvh(
         "worst_joint_mean_rad": round(mean, 4),
         "worst_joint_max_rad": round(most, 4),
     }
-    known = MotionClip(target.character, times, made.motion, False, contacts, source, content)
-    return ImportedClip(known, made, quality, worst, mean, most)
+    return ImportedClip(replace(clip, quality=content), made, quality, worst, mean, most)
+
+
+def _part_of(path: Path, motion: BvhMotion, start: float, end: float | None) -> BvhMotion:
+    """The frames of a motion from a time to another one, s."""
+    frames = len(motion.values)
+    last = frames - 1 if end is None else round(end / motion.frame_time)
+    first = round(start / motion.frame_time)
+    if not 0 <= first < last < frames:
+        raise ClipError(
+            f"{path}: from {start:g} s to {'its end' if end is None else f'{end:g} s'} is no part "
+            f"of two frames or more; it lasts {(frames - 1) * motion.frame_time:.3f} s"
+        )
+    if last - first >= _MOST_FRAMES:
+        raise ClipError(
+            f"{path}: {last - first + 1} frames; a clip has at most {_MOST_FRAMES}, so choose a "
+            "part by --from and --to"
+        )
+    return replace(motion, values=motion.values[first : last + 1])
 
 
 def _worst_joint(

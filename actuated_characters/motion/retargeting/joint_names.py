@@ -12,7 +12,7 @@ LEFT, RIGHT = "left", "right"
 _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _SIDES = {"left": LEFT, "l": LEFT, "lft": LEFT, "right": RIGHT, "r": RIGHT, "rgt": RIGHT}
 _NAMELESS = re.compile(  # words that say whose joint it is, or that it is one
-    r"(mixamorig|bip|character|skeleton|skel|rig|armature|def|jnt|jt|j|b|bone|cc|base|c|ctrl)\d*"
+    r"(mixamorig|bip|character|skeleton|skel|rig|armature|def|jnt|jt|j|b|bone|cc|base|bend|c|ctrl)\d*"
 )
 _SIDE_AND_WORD = re.compile(r"([lr])([uf])")  # of `LUArm`, the left upper arm
 _HELPERS = re.compile(
@@ -24,13 +24,22 @@ PartWeights = Mapping[str, float]
 LEG: tuple[tuple[str, PartWeights], ...] = (
     (
         "hip",
-        {"upleg": 1, "upperleg": 1, "thigh": 1, "femur": 1, "uleg": 1, "hip": 0.8, "leg": 0.4}
+        {
+            "upleg": 1,
+            "upperleg": 1,
+            "thigh": 1,
+            "femur": 1,
+            "uleg": 1,
+            "legupper": 1,
+            "hip": 0.8,
+            "leg": 0.4,
+        }
         | {"hipjoint": 0.3, "buttock": 0.2},
     ),
     (
         "knee",
         {"knee": 1, "calf": 1, "shin": 1, "tibia": 1, "lowleg": 1, "lowerleg": 1, "lleg": 1}
-        | {"shank": 1, "leg": 0.9, "kneejoint": 1},
+        | {"shank": 1, "leglower": 1, "leg": 0.9, "kneejoint": 1},
     ),
     ("ankle", {"ankle": 1, "foot": 0.9, "anklejoint": 1}),
     ("toe", {"toe": 1, "toes": 1, "toebase": 1, "ball": 1, "toejoint": 1, "foot": 0.4}),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuated_characters.motion.bvh.skeleton import POSITIONS, BvhMotion
+from actuated_characters.motion.bvh.skeleton import POSITIONS, BvhMotion, Skeleton
 from actuated_characters.motion.retargeting.captured_body import CapturedBody, captured_body
 from actuated_characters.motion.retargeting.contacts import (
     Contact,
@@ -28,7 +28,7 @@ from actuated_characters.motion.retargeting.goals import first_guess, free_goals
 from actuated_characters.motion.retargeting.inverse_kinematics import InverseKinematics, Progress
 from actuated_characters.motion.retargeting.own_skeleton import own_motion
 from actuated_characters.motion.retargeting.segments import SegmentTurns, segment_turns
-from actuated_characters.motion.retargeting.skeleton_map import SIDES, find_map
+from actuated_characters.motion.retargeting.skeleton_map import SIDES, ancestors, find_map
 from actuated_characters.motion.retargeting.stances import with_stances
 from actuated_characters.motion.retargeting.target_body import TargetBody
 from msgs_config.arrays import FloatArray
@@ -36,6 +36,7 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
+_STILL = 1e-4  # of a leg's length, by which a root moves that does not move
 _HAND_HEIGHT = 0.05  # m of a wrist over the lowest joint of the feet, while the hand stands
 
 
@@ -90,7 +91,7 @@ def read_body(
     body = body.turned(to_upright(up)).scaled(length)
     heading = first_heading(body)
     body = body.turned(rotations.about_z(-heading))
-    moves = any(name in POSITIONS for name in skeleton.channels[0])
+    moves = _root_moves(body, skeleton)
     if not moves:
         body = _moved_by_feet(body)
     return body, Conventions(up, unit, length, heading, rest, first, swapped, moves)
@@ -146,6 +147,14 @@ def retarget(
     return RetargetedMotion(
         body, conventions, scale * conventions.unit_length, contacts, turns, tight
     )
+
+
+def _root_moves(body: CapturedBody, skeleton: Skeleton) -> bool:
+    """Whether the file says where the body is: its pelvis, or what that hangs on, is moved."""
+    line = ancestors(body.map["pelvis"], skeleton.parents)
+    has_channels = any(name in POSITIONS for joint in line for name in skeleton.channels[joint])
+    spread = float(np.ptp(body.part("pelvis"), axis=0).max())
+    return has_channels and spread > _STILL * body.leg_length
 
 
 def _share(progress: Progress | None, before: int, frames: int) -> Progress | None:

@@ -22,7 +22,7 @@ from msgs_config.geometry import rotations
 _STANDING, _HAND = 1 / 0.001, 1 / 0.01  # 1/m, of points of soles and hands
 _BLEND, _BLENDED = 0.06, 0.05  # s before and after it in which a stance takes hold, and how far
 _FLAT = 0.7  # cosine of the tilt of a sole that is put flat on the ground
-_LYING = 0.1  # of the hold of one that is not
+_ALONG = np.array((1.0, 1.0, 0.0))  # one that is not is held along the ground alone
 _LIFT, _LIFT_SPEED = 0.02, 0.25  # m and m/s by which a foot that swings is clear of the ground
 
 
@@ -87,29 +87,27 @@ def _hold_foot(
     ends = target.soles(ankle).reshape(2, 2, 3).mean(axis=1)  # the middles of toes and heel
     origins, turns = link_motion(target, loose, link)
     moving = np.stack([origins + rotations.rotate(turns, end) for end in ends], axis=1)
-    places, weights = np.zeros((frames, 2, 3)), np.zeros((frames, 2))
+    places, weights = np.zeros((frames, 2, 3)), np.zeros((frames, 2, 3))
     for stance in joined(touching[0] | touching[1], frame_time):
         rows = stance.frames
         upright = rotations.rotate(turns[rows], target.foot_up(ankle))[:, 2].mean()
         lies = float(upright) < _FLAT  # as in a crawl, on its toes or its back
         length = float(np.linalg.norm(ends[0] - ends[1]))
-        standing = (
-            moving[rows].mean(axis=0)
-            if lies
-            else _on_ground(length, moving[rows], [touches[rows] for touches in touching])
-        )
+        standing = _on_ground(length, moving[rows], [touches[rows] for touches in touching])
         for part in range(2):
             touches = np.zeros(frames, dtype=np.bool_)
             touches[rows] = touching[part][rows]
-            hold = (_LYING if lies else 1.0) * _hold(touches, frame_time)
-            stronger = hold > weights[:, part]
-            places[stronger, part] = standing[part]
-            weights[stronger, part] = hold[stronger]
+            if not touches.any():
+                continue
+            hold = _hold(touches, frame_time)
+            stronger = hold > weights[:, part, 0]
+            places[stronger, part] = moving[touches, part].mean(axis=0) if lies else standing[part]
+            weights[stronger, part] = hold[stronger, np.newaxis] * (_ALONG if lies else 1.0)
     for part, end in enumerate(ends):
         points.links.append(link)
         points.offsets.append(end)
         points.places.append(places[:, part])
-        points.weights.append(_STANDING * np.repeat(weights[:, part, np.newaxis], 3, axis=1))
+        points.weights.append(_STANDING * weights[:, part])
 
 
 def _on_ground(length: float, ends: FloatArray, touching: Sequence[BoolArray]) -> FloatArray:
