@@ -11,6 +11,8 @@ _ENTER, _LEAVE = ((0.022, 0.20), (0.05, 0.10)), ((0.035, 0.40), (0.06, 0.15))
 """Heights in m below which, and speeds in m/s below which a point touches; either pair will do."""
 _SMOOTHED = 0.05  # s over which a speed is measured
 _LEAST, _GAP = 0.06, 0.05  # s of a contact, and of a break that is none
+_STILL = 0.05  # m from the middle of a contact, that a point may be during it
+_SMOOTHED_PLACES = 0.08  # s over which places are averaged before
 _GROUND = 2.0  # per cent of the heights of a joint that may be below its height on the ground
 
 
@@ -50,12 +52,40 @@ def find_contacts(positions: FloatArray, ground: float, frame_time: float) -> tu
         ground: Its height in m when it stands on the ground.
         frame_time: s.
     """
+    positions = smoothed(positions, frame_time)
     height, speed = positions[:, 2] - ground, speeds(positions, frame_time)
     enters, stays = (
         np.any([(height < low) & (speed < slow) for low, slow in pairs], axis=0)
         for pairs in (_ENTER, _LEAVE)
     )
-    return joined(_with_hysteresis(enters, stays), frame_time)
+    found = joined(_with_hysteresis(enters, stays), frame_time)
+    still = (_still_part(contact, positions) for contact in found)
+    least = _least_frames(frame_time)
+    return tuple(contact for contact in still if contact.last - contact.first + 1 >= least)
+
+
+def smoothed(positions: FloatArray, frame_time: float) -> FloatArray:
+    """Positions (f, 3) averaged over a few hundredths of a second, in which noise goes."""
+    reach = round(0.5 * _SMOOTHED_PLACES / frame_time)
+    padded = np.pad(positions, ((reach, reach), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=0)
+    average: FloatArray = windows.mean(axis=-1)
+    return average
+
+
+def _still_part(contact: Contact, positions: FloatArray) -> Contact:
+    """The part of a contact in which a point stays where it is, and does not slide along."""
+    first, last = contact.first, contact.last
+    while last > first:
+        places = positions[first : last + 1, :2]
+        away = np.linalg.norm(places - places.mean(axis=0), axis=-1)
+        if max(away[0], away[-1]) <= _STILL:
+            break
+        if away[0] > away[-1]:
+            first += 1
+        else:
+            last -= 1
+    return Contact(first, last)
 
 
 def joined(touches: BoolArray, frame_time: float) -> tuple[Contact, ...]:
@@ -68,8 +98,12 @@ def joined(touches: BoolArray, frame_time: float) -> tuple[Contact, ...]:
             merged[-1] = (merged[-1][0], last)
         else:
             merged.append((first, last))
-    least = max(2, round(_LEAST / frame_time))
+    least = _least_frames(frame_time)
     return tuple(Contact(first, last) for first, last in merged if last - first + 1 >= least)
+
+
+def _least_frames(frame_time: float) -> int:
+    return max(2, round(_LEAST / frame_time))
 
 
 def mask(contacts: tuple[Contact, ...], frames: int) -> BoolArray:

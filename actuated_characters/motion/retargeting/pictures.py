@@ -15,14 +15,14 @@ _COUNT = 6
 _SIZE: Size = (330, 300)
 _BESIDE = 1.0  # m to the character's right, where the captured skeleton is drawn
 _BONE, _JOINT = 0.018, 0.028  # m, radii
-_COLORS = {"left": (214, 96, 40), "right": (40, 110, 200), "": (90, 90, 90)}
+_COLORS = {"left": (40, 110, 200), "right": (214, 96, 40), "": (90, 90, 90)}
 _VIEW = CameraPose(yaw=1.1, pitch=0.15)
 
 
 def comparison_strip(target: TargetBody, made: RetargetedMotion, count: int = _COUNT) -> Picture:
     """Pictures (h, w, 3) at equal steps of time; each follows the body along the ground.
 
-    The captured skeleton is in the character's size, its left orange and its right blue.
+    The captured skeleton is in the character's size, its left blue and its right orange.
     """
     frames = np.unique(np.linspace(0, made.source.frames - 1, count).round().astype(int))
     layout = target.character.layout

@@ -12,6 +12,7 @@ from actuated_characters.motion.retargeting.contacts import (
     find_contacts,
     flat_frames,
     ground_height,
+    smoothed,
 )
 from actuated_characters.motion.retargeting.conventions import (
     UNITS,
@@ -119,7 +120,9 @@ def retarget(
     body, conventions = read_body(place, motion, settings or RetargetingSettings())
     scale = target.leg_length / body.leg_length
     body = body.scaled(scale)
-    ankles = np.concatenate([body.part(f"{side}_ankle")[:, 2] for side in SIDES])
+    ankles = np.concatenate(
+        [smoothed(body.part(f"{side}_ankle"), body.frame_time)[:, 2] for side in SIDES]
+    )
     rise = target.ankle_height - ground_height(ankles)
     start = -body.middle("hip")[0]
     body = body.moved(np.tile((start[0], start[1], rise), (body.frames, 1)))
@@ -169,7 +172,8 @@ def body_contacts(body: CapturedBody) -> dict[str, tuple[Contact, ...]]:
     contacts, floor = {}, np.inf
     for part, role in (("heel", "ankle"), ("toe", "toe")):
         points = {side: _foot_point(body, side, role) for side in SIDES}
-        ground = ground_height(np.concatenate([point[:, 2] for point in points.values()]))
+        heights = [smoothed(point, body.frame_time)[:, 2] for point in points.values()]
+        ground = ground_height(np.concatenate(heights))
         floor = min(floor, ground)
         for side, point in points.items():
             contacts[f"{side}_{part}"] = find_contacts(point, ground, body.frame_time)

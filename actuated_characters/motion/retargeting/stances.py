@@ -1,8 +1,8 @@
 """Feet and hands that stand on the ground stay where they are, and feet that swing are clear of it.
 
-A foot that stands has one place and heading on the ground, the mean of its time there; its heel,
-its toes or both are held at it. While no part of it stands, its sole is lifted as far as it can be
-in the time since it stood, so that it neither scuffs nor slides.
+Toes or a heel that stand have one place on the ground, the mean of their time there, or that which
+the other part of the foot, where it stands, leaves them. While no part of a foot stands, its sole
+is lifted as far as it can be in the time since it stood, so that it neither scuffs nor slides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuated_characters.motion.retargeting.contacts import Contact, joined, mask
+from actuated_characters.motion.retargeting.contacts import Contact, mask
 from actuated_characters.motion.retargeting.goals import MARGIN, link_motion
 from actuated_characters.motion.retargeting.inverse_kinematics import Goals
 from actuated_characters.motion.retargeting.skeleton_map import SIDES
@@ -55,8 +55,9 @@ def with_stances(
     frames = len(loose.position)
     points, clearance = _Points([], [], [], []), goals.clearance.copy()
     for side in SIDES:
-        touching = [mask(tuple(contacts[f"{side}_{part}"]), frames) for part in ("toe", "heel")]
-        _hold_foot(points, target, loose, f"{side}_ankle", touching, frame_time)
+        parts = [contacts[f"{side}_{part}"] for part in ("toe", "heel")]
+        touching = [mask(tuple(each), frames) for each in parts]
+        _hold_foot(points, target, loose, f"{side}_ankle", parts, frame_time)
         lift = _swing_clearance(touching[0] | touching[1], frame_time)
         foot = goals.surface.links == target.map[f"{side}_ankle"]
         clearance[:, foot] += lift[:, np.newaxis]
@@ -79,30 +80,31 @@ def _hold_foot(
     target: TargetBody,
     loose: GeneralizedPosition,
     ankle: str,
-    touching: Sequence[BoolArray],  # toes and heel, (f,) each
+    contacts: Sequence[Sequence[Contact]],  # of toes and heel
     frame_time: float,
 ) -> None:
     """Hold the middles of toes and heel where they touch the ground; on one the foot can pivot."""
-    frames, link = len(touching[0]), target.map[ankle]
-    ends = target.soles(ankle).reshape(2, 2, 3).mean(axis=1)  # the middles of toes and heel
+    frames, link = len(loose.position), target.map[ankle]
+    ends = target.soles(ankle).reshape(2, 2, 3).mean(axis=1)
     origins, turns = link_motion(target, loose, link)
     moving = np.stack([origins + rotations.rotate(turns, end) for end in ends], axis=1)
+    upright = rotations.rotate(turns, target.foot_up(ankle))[:, 2]
     places, weights = np.zeros((frames, 2, 3)), np.zeros((frames, 2, 3))
-    for stance in joined(touching[0] | touching[1], frame_time):
-        rows = stance.frames
-        upright = rotations.rotate(turns[rows], target.foot_up(ankle))[:, 2].mean()
-        lies = float(upright) < _FLAT  # as in a crawl, on its toes or its back
-        length = float(np.linalg.norm(ends[0] - ends[1]))
-        standing = _on_ground(length, moving[rows], [touches[rows] for touches in touching])
-        for part in range(2):
-            touches = np.zeros(frames, dtype=np.bool_)
-            touches[rows] = touching[part][rows]
-            if not touches.any():
-                continue
-            hold = _hold(touches, frame_time)
-            stronger = hold > weights[:, part, 0]
-            places[stronger, part] = moving[touches, part].mean(axis=0) if lies else standing[part]
-            weights[stronger, part] = hold[stronger, np.newaxis] * (_ALONG if lies else 1.0)
+    in_order = sorted(
+        ((part, contact) for part in range(2) for contact in contacts[part]),
+        key=lambda each: (each[1].first, each[0]),
+    )
+    placed: list[_Placed] = []
+    for part, contact in in_order:
+        lies = float(upright[contact.frames].mean()) < _FLAT  # as in a crawl: on its toes or back
+        place = moving[contact.frames, part].mean(axis=0)
+        if not lies:
+            place = _beside(place, part, contact, placed, moving)
+            placed.append(_Placed(part, contact, place))
+        hold = _hold(mask((contact,), frames), frame_time)
+        stronger = hold > weights[:, part, 0]
+        places[stronger, part] = place
+        weights[stronger, part] = hold[stronger, np.newaxis] * (_ALONG if lies else 1.0)
     for part, end in enumerate(ends):
         points.links.append(link)
         points.offsets.append(end)
@@ -110,20 +112,41 @@ def _hold_foot(
         points.weights.append(_STANDING * weights[:, part])
 
 
-def _on_ground(length: float, ends: FloatArray, touching: Sequence[BoolArray]) -> FloatArray:
-    """Where the middles (2, 3) of toes and heel stand flat, of where they were (f, 2, 3)."""
-    flat = touching[0] & touching[1]
-    some = flat if flat.any() else touching[0] | touching[1]
-    ahead = (ends[some, 0, :2] - ends[some, 1, :2]).mean(axis=0)
+@dataclass(frozen=True)
+class _Placed:
+    """Where toes (part 0) or a heel (part 1) stand during a contact."""
+
+    part: int
+    contact: Contact
+    place: FloatArray  # (3,) m
+
+
+def _beside(
+    place: FloatArray,
+    part: int,
+    contact: Contact,
+    placed: Sequence[_Placed],
+    moving: FloatArray,
+) -> FloatArray:
+    """Where a part (3,) stands on the ground: as far from the other part as the foot is long.
+
+    That is where the other part stands at the same time; by itself, it stands where it is.
+    """
+    overlaps = [
+        (min(contact.last, other.contact.last) - max(contact.first, other.contact.first), other)
+        for other in placed
+        if other.part != part
+    ]
+    common, other = max(overlaps, key=lambda each: each[0], default=(-1, None))
+    standing = np.array((place[0], place[1], MARGIN))
+    if other is None or common < 0:
+        return standing
+    first = max(contact.first, other.contact.first)
+    rows = slice(first, first + common + 1)
+    ahead = (moving[rows, 0, :2] - moving[rows, 1, :2]).mean(axis=0)
     ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
-    toes = []  # where the toes are, by themselves and by the heel
-    for part in range(2):
-        rows = flat if flat.any() else touching[part]
-        if rows.any():
-            toes.append(ends[rows, part, :2].mean(axis=0) + part * length * ahead)
-    toe = np.mean(toes, axis=0)
-    standing = np.full((2, 3), MARGIN)
-    standing[:, :2] = toe, toe - length * ahead
+    length = float(np.linalg.norm(moving[0, 0] - moving[0, 1]))
+    standing[:2] = other.place[:2] + (length if part == 0 else -length) * ahead
     return standing
 
 
