@@ -89,8 +89,11 @@ def _row(made: ImportedClip, results: Sequence[Attempt]) -> list[str]:
         f"{results[0].joint_error:.3f}",
     ]
     if len(results) > 1:
-        lost = results[1].lost_at
-        row += [f"{results[1].joint_error:.3f}", "yes" if lost is None else f"lost at {lost:.2f} s"]
+        lost_at = results[1].lost_at
+        row += [
+            f"{results[1].joint_error:.3f}",
+            "yes" if lost_at is None else f"lost at {lost_at:.2f} s",
+        ]
     return row
 
 

@@ -18,7 +18,9 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.geometry import fixed_order, rotations
 
 _USUAL_FRAME = 1.0 / 60.0  # s, whose residuals count once
-_DAMPING = 1e-2  # added to each block: the coordinates that no residual is about
+_DAMPING = 1e-2  # added to each block at least: the coordinates that no residual is about
+_STIFFENED, _EASED, _MOST_DAMPING = 8.0, 4.0, 1e6  # times, after a step that failed or did well
+_FIXED = 1e12  # added where frames are fixed
 _LARGEST_STEP = 0.4  # rad or m
 _ENOUGH = 3e-4  # rad or m of the largest step, at which an iteration ends
 _ACTIVE_SETS = 5  # solutions of a step, between which bounds come and go
@@ -100,34 +102,42 @@ class InverseKinematics:
     def _solve_window(
         self, guess: GeneralizedPosition, goals: Goals, fixed: int
     ) -> GeneralizedPosition:
-        now, share = guess, np.sqrt(self._frame_time / _USUAL_FRAME)
+        """The motion of a window, the first frames of which are fixed (Levenberg-Marquardt)."""
         spring = 1.0 / (goals.acceleration * self._frame_time**2)
-        weights = (share * spring) ** 2
-        active = None
+        weights = self._frame_time / _USUAL_FRAME * spring**2
+        damping, now = _DAMPING, self._linearised(guess, goals, weights)
         for _ in range(self._iterations):
-            wanted, bounded = self._linearised(now, goals)
-            quadratic = _normal_equations(share * wanted[0], share * wanted[1])
-            diagonal = np.arange(quadratic[0].shape[-1])
-            quadratic[0][:, diagonal, diagonal] += _DAMPING
-            quadratic[0][:fixed, diagonal, diagonal] += 1e12
-            velocity = self._layout.difference(_rows(now, slice(-1)), _rows(now, slice(1, None)))
-            accelerations = np.diff(velocity, axis=0)
-            limit, missing = share * bounded[0], share * bounded[1]
-            active = missing > 0.0 if active is None else active
-            for _ in range(_ACTIVE_SETS):
-                counting = _normal_equations(limit * active[..., np.newaxis], missing * active)
-                blocks, gradients = quadratic[0] + counting[0], quadratic[1] + counting[1]
-                step = solve_smooth(blocks, gradients, weights, accelerations)
-                left = missing - np.matmul(limit, step[..., np.newaxis])[..., 0]
-                before, active = active, left > 0.0
-                if (before == active).all():
-                    break
+            step = self._step(now, weights, damping, fixed)
             largest = np.abs(step).max(axis=1, keepdims=True)
             step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-12))
-            now = self._moved(now, step)
-            if float(largest.max()) < _ENOUGH:
+            then = self._linearised(self._moved(now.motion, step), goals, weights)
+            if then.cost < now.cost:
+                now, damping = then, max(damping / _EASED, _DAMPING)
+            else:
+                damping *= _STIFFENED
+            if float(largest.max()) < _ENOUGH or damping > _MOST_DAMPING:
                 break
-        return now
+        return now.motion
+
+    def _step(
+        self, now: "_Linearised", weights: FloatArray, damping: float, fixed: int
+    ) -> FloatArray:
+        """The step (f, n) that does best, with those bounds that it would cross."""
+        quadratic, gradient = _normal_equations(*now.wanted)
+        diagonal = np.arange(quadratic.shape[-1])
+        quadratic[:, diagonal, diagonal] += damping
+        quadratic[:fixed, diagonal, diagonal] += _FIXED
+        limit, missing = now.bounded
+        active = missing > 0.0
+        for _ in range(_ACTIVE_SETS):
+            counting = _normal_equations(limit * active[..., np.newaxis], missing * active)
+            blocks, gradients = quadratic + counting[0], gradient + counting[1]
+            step = solve_smooth(blocks, gradients, weights, now.accelerations)
+            left = missing - np.matmul(limit, step[..., np.newaxis])[..., 0]
+            before, active = active, left > 0.0
+            if (before == active).all():
+                break
+        return step
 
     def _moved(self, now: GeneralizedPosition, step: FloatArray) -> GeneralizedPosition:
         entries = self._layout.rotation_entries
@@ -137,8 +147,10 @@ class InverseKinematics:
         positions[:, entries] = rotations.log(turns)
         return GeneralizedPosition(positions, turns)
 
-    def _linearised(self, now: GeneralizedPosition, goals: Goals) -> tuple[Linear, Linear]:
-        """The residuals, and those that count only where something is missing, weighted."""
+    def _linearised(
+        self, now: GeneralizedPosition, goals: Goals, weights: FloatArray
+    ) -> "_Linearised":
+        """A motion with its residuals; accelerations have weights (n,)."""
         used, index = np.unique(
             np.concatenate((goals.links, goals.point_links, goals.surface.links)),
             return_inverse=True,
@@ -155,7 +167,16 @@ class InverseKinematics:
             self._ground(goals, origins[:, touching], axes[:, touching], jacobians[:, touching]),
             *self._limits(goals, now),
         )
-        return _stacked(wanted), _stacked(bounded)
+        share = float(np.sqrt(self._frame_time / _USUAL_FRAME))
+        velocity = self._layout.difference(_rows(now, slice(-1)), _rows(now, slice(1, None)))
+        accelerations = np.diff(velocity, axis=0)
+        stacked = _stacked(wanted, share), _stacked(bounded, share)
+        cost = (
+            float(np.square(stacked[0][1]).sum())
+            + float(np.square(np.maximum(stacked[1][1], 0.0)).sum())
+            + float((weights * np.square(accelerations)).sum())
+        )
+        return _Linearised(now, *stacked, accelerations, cost)
 
     def _kinematics(
         self, positions: FloatArray, links: IntArray
@@ -214,9 +235,20 @@ class InverseKinematics:
         )
 
 
-def _stacked(parts: Sequence[Linear]) -> Linear:
+def _stacked(parts: Sequence[Linear], share: float) -> Linear:
     jacobians, missing = zip(*parts, strict=True)
-    return np.concatenate(jacobians, axis=1), np.concatenate(missing, axis=1)
+    return share * np.concatenate(jacobians, axis=1), share * np.concatenate(missing, axis=1)
+
+
+@dataclass(frozen=True)
+class _Linearised:
+    """A motion, and how its residuals change."""
+
+    motion: GeneralizedPosition
+    wanted: Linear
+    bounded: Linear  # which count only where something is missing
+    accelerations: FloatArray  # (f - 2, n), per frame
+    cost: float
 
 
 def _normal_equations(jacobian: FloatArray, missing: FloatArray) -> Linear:

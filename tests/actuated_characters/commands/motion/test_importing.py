@@ -43,7 +43,7 @@ def test_a_file_becomes_a_clip_with_a_report_and_a_picture(
 
     assert main(["motion", "import", str(bvh), "--output", str(output), "--licence", "CC0"]) == 0
 
-    said = " ".join(capsys.readouterr().out.split())
+    printed = " ".join(capsys.readouterr().out.split())
     for text in (
         "up is y",
         "(cm)",
@@ -52,8 +52,8 @@ def test_a_file_becomes_a_clip_with_a_report_and_a_picture(
         "limits touched",
         "worst joint",
     ):
-        assert text in said
-    assert f"run --clip {output} --duration 1.2" in said
+        assert text in printed
+    assert f"run --clip {output} --duration 1.2" in printed
     made = read_motion_clip(character("humanoid"), str(output))
     assert made.source["file"] == "walk.bvh" and made.source["licence"] == "CC0"
     assert made.contacts["left_heel"] and made.quality["feet_in_ground_m"] < 0.01
@@ -87,9 +87,9 @@ def test_a_folder_becomes_a_folder_and_a_broken_file_stops_no_other(
 
     code = main(["motion", "import", str(captures), "--output", str(output), "--no-picture"])
 
-    said = capsys.readouterr()
-    assert code == 1 and "c.bvh, line 1: 'no motion'" in said.err
-    assert "1 of 3 files were not imported" in said.err
+    printed = capsys.readouterr()
+    assert code == 1 and "c.bvh, line 1: 'no motion'" in printed.err
+    assert "1 of 3 files were not imported" in printed.err
     made = sorted(str(path.relative_to(output)) for path in output.rglob("*"))
     assert made == ["a.json", "inside", "inside/b.json"]
 
