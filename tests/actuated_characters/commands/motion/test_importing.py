@@ -4,11 +4,14 @@ import json
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from actuated_characters.cli import main
+from actuated_characters.motion.bvh.kinematics import forward_kinematics
+from actuated_characters.motion.bvh.reading import read_bvh
 from actuated_characters.motion.clips.motion_clip import read_motion_clip
 from tests.support.capture_makers import MAKERS
 from tests.support.captures import capture
@@ -202,3 +205,19 @@ def test_a_run_tracks_an_imported_clip_and_is_replayed_without_it(
     summary = json.loads((run / "summary.json").read_text())
     assert not summary["fell"] and summary["joint_error_mean_rad"] < 0.10
     assert summary["ticks"] == 288
+
+
+@pytest.mark.parametrize(("unit", "order"), [("m", "ZXY"), ("cm", "ZYX")])
+def test_from_bvh_to_clip_to_bvh_joints_stay_where_they_are(
+    tmp_path: Path, unit: str, order: str
+) -> None:
+    first, clip, second = (tmp_path / name for name in ("a.bvh", "a.json", "b.bvh"))
+    options = f"--units {unit} --order {order}"
+    assert main(f"motion export spinkick --output {first} {options}".split()) == 0
+
+    assert main(f"motion import {first} --output {clip} --no-picture".split()) == 0
+    assert main(f"motion export {clip} --output {second} {options}".split()) == 0
+
+    places = [forward_kinematics(read_bvh(file)).positions for file in (first, second)]
+    metres = 0.01 if unit == "cm" else 1.0
+    assert np.abs(places[1] - places[0]).max() * metres < 1e-3
