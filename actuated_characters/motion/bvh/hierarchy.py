@@ -95,7 +95,7 @@ class HierarchyParser:
             self._begin(number, statement, -1)
         elif keyword == "JOINT" and self._innermost_name:
             self._begin(number, statement, self._open[-1])
-        elif statement.upper().split() == ["END", "SITE"] and self._innermost_name:
+        elif statement.upper().split()[:2] == ["END", "SITE"] and self._innermost_name:
             self._begin(number, "", self._open[-1])
         elif keyword == "OFFSET" and self._open:
             self._nodes[self._open[-1]].offset = self._offset(number, statement, words)
