@@ -61,24 +61,8 @@ def import_bvh(
     """
     motion = _part_of(path, read_bvh(path), *part)
     made = retarget(path, motion, target, settings, progress)
-    conventions = made.conventions
     times: FloatArray = motion.frame_time * np.arange(made.source.frames, dtype=float)
-    source: dict[str, Any] = {
-        "file": path.name,
-        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-        "frames": len(motion.values),
-        "rate_hz": round(1.0 / motion.frame_time, 3),
-        "up": conventions.up,
-        "unit_m": round(conventions.unit_length, 6),
-        "rest_pose": conventions.rest,
-        "first_frame": conventions.first_frame,
-        "scale": round(made.scale, 6),
-        "joints": {
-            role: made.source.names[index] for role, index in made.source.map.joints.items()
-        },
-    }
-    if licence:
-        source["licence"] = licence
+    source = _source(path, motion, made, licence)
     contacts = {
         point: tuple((float(times[each.first]), float(times[each.last])) for each in found)
         for point, found in made.contacts.items()
@@ -93,6 +77,24 @@ def import_bvh(
         "worst_joint_max_rad": round(most, 4),
     }
     return ImportedClip(replace(clip, quality=content), made, quality, worst, mean, most)
+
+
+def _source(path: Path, motion: BvhMotion, made: RetargetedMotion, licence: str) -> dict[str, Any]:
+    """Where a clip comes from, as its file has it."""
+    conventions, joints = made.conventions, made.source.map.joints
+    source: dict[str, Any] = {
+        "file": path.name,
+        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "frames": len(motion.values),
+        "rate_hz": round(1.0 / motion.frame_time, 3),
+        "up": conventions.up,
+        "unit_m": round(conventions.unit_length, 6),
+        "rest_pose": conventions.rest,
+        "first_frame": conventions.first_frame,
+        "scale": round(made.scale, 6),
+        "joints": {role: made.source.names[index] for role, index in joints.items()},
+    }
+    return source | ({"licence": licence} if licence else {})
 
 
 def _part_of(path: Path, motion: BvhMotion, start: float, end: float | None) -> BvhMotion:

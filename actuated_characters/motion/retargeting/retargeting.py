@@ -119,37 +119,32 @@ def retarget(
     """
     body, conventions = read_body(place, motion, settings or RetargetingSettings())
     scale = target.leg_length / body.leg_length
-    body = body.scaled(scale)
-    ankles = np.concatenate(
-        [smoothed(body.part(f"{side}_ankle"), body.frame_time)[:, 2] for side in SIDES]
-    )
-    rise = target.ankle_height - ground_height(ankles)
-    start = -body.middle("hip")[0]
-    body = body.moved(np.tile((start[0], start[1], rise), (body.frames, 1)))
+    body = _on_ground(body.scaled(scale), target)
     contacts = body_contacts(body)
-    own = own_motion(motion, target)
     flat = {f"{side}_ankle": flat_frames(contacts, side, body.frames) for side in SIDES}
     turns = segment_turns(body, target, flat)
-    if own is not None:  # nothing is to be altered, not even where it stands
+    own = own_motion(motion, target)
+    if own is None:
+        solver = InverseKinematics(target, body.frame_time)
+        goals = free_goals(body, target, turns)
+        guess = first_guess(body, target, turns)
+        loose = solver.solve(guess, goals, _share(progress, 0, body.frames))
+        goals = with_stances(goals, target, loose, contacts, body.frame_time)
+        shown = solver.solve(loose, goals, _share(progress, body.frames, body.frames))
+    else:  # nothing is to be altered, not even where it stands
         rows = slice(conventions.first_frame, None)
-        own = GeneralizedPosition(own.position[rows], own.orientations_xyzw[rows])
-        return RetargetedMotion(
-            body,
-            replace(conventions, is_own=True),
-            scale * conventions.unit_length,
-            contacts,
-            turns,
-            own,
-        )
-    solver = InverseKinematics(target, body.frame_time)
-    goals = free_goals(body, target, turns)
-    guess = first_guess(body, target, turns)
-    loose = solver.solve(guess, goals, _share(progress, 0, body.frames))
-    goals = with_stances(goals, target, loose, contacts, body.frame_time)
-    tight = solver.solve(loose, goals, _share(progress, body.frames, body.frames))
-    return RetargetedMotion(
-        body, conventions, scale * conventions.unit_length, contacts, turns, tight
-    )
+        shown = GeneralizedPosition(own.position[rows], own.orientations_xyzw[rows])
+        conventions = replace(conventions, is_own=True)
+    unit = scale * conventions.unit_length
+    return RetargetedMotion(body, conventions, unit, contacts, turns, shown)
+
+
+def _on_ground(body: CapturedBody, target: TargetBody) -> CapturedBody:
+    """A body of a character's size moved to the origin, its ankles to where the character's are."""
+    heights = [smoothed(body.part(f"{side}_ankle"), body.frame_time)[:, 2] for side in SIDES]
+    rise = target.ankle_height - ground_height(np.concatenate(heights))
+    x, y, _ = body.middle("hip")[0]
+    return body.moved(np.tile((-x, -y, rise), (body.frames, 1)))
 
 
 def _root_moves(body: CapturedBody, skeleton: Skeleton) -> bool:
