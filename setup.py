@@ -23,7 +23,10 @@ setup(
     package_data={
         "": ["py.typed"],
         "msgs_config": ["runtime/*.xml", "character/data/*"],
-        "controller_node": ["references/data/*.yaml"],
+        "controller_node": [
+            "references/data/*.yaml",
+            "behaviours/state_machine/data/*.yaml",
+        ],
         "actuated_characters": ["scenes/data/*.yaml"],
     },
     data_files=[

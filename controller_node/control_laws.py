@@ -155,6 +155,7 @@ class TrackingInput(NamedTuple):
     now: ReferenceState
     upcoming: ReferenceState  # one tick later
     offset: FloatArray | None = None  # (n,) of a planner, added to the errors
+    effort: FloatArray | None = None  # (n,) of a behaviour, added to the law's
 
     def error(self, model: DynamicsModel, desired: ReferenceState) -> FloatArray:
         """The error (n,) of the configuration against a desired state, with the offset."""

@@ -50,9 +50,9 @@ from msgs_config.messages.state import StampedReference, StampedState
 class Controller:
     """Inverse dynamics in ticks: `(q, v, desired state) -> effort`.
 
-    A function of the state's message and of the tick, so that the same state always gets the same
-    answer; only the law `pid`, a behaviour that reacts and a planner remember the ticks before, and
-    a trajectory or strengths that were taken hold until the episode ends.
+    A function of the state's message and of the tick: the same state always gets the same answer.
+    Only the law `pid`, a behaviour and a planner remember the ticks before; a trajectory,
+    velocities or strengths that were taken hold until the episode ends.
     """
 
     def __init__(
@@ -69,8 +69,7 @@ class Controller:
     ) -> None:
         """Build the model of the dynamics; `series` is what the law `feedforward` applies.
 
-        Without a behaviour the controller tracks the reference, whatever comes. A planner goes
-        with the law `stable_pd`.
+        Without a behaviour it tracks the reference. A planner goes with the law `stable_pd`.
 
         Raises:
             CharacterError: a joint moves neither mass nor inertia, or a foot is none.
@@ -100,10 +99,7 @@ class Controller:
             self.begin_episode(episode_ns)
 
     def begin_episode(self, episode_ns: int) -> None:
-        """Begin an episode, its first state of a stamp in ns: all of another one is forgotten.
-
-        A simulator that was started again begins with the same stamp as before.
-        """
+        """Begin an episode, its first state of a stamp in ns: all of another one is forgotten."""
         self._episode_ns = episode_ns
         self.mode: ModeReport | None = None  # since which state which mode holds
         self._law: Law = make_law(self._settings.law, self._context)
@@ -162,8 +158,8 @@ class Controller:
     ) -> None:
         """Track a trajectory from a stamp on, instead of what is tracked, until the episode ends.
 
-        The reference goes on without a jump: first from where it is then to the first point. What
-        a behaviour had carried to another place is there, and the points are not carried.
+        The reference goes on without a jump, first to the first point. What a behaviour had
+        carried to another place is there, and the points are not carried.
 
         Raises:
             MotionError: the character cannot follow it.
@@ -204,9 +200,9 @@ class Controller:
     ) -> tuple[FloatArray, StampedReference]:
         """The effort (n,) that answers a state, and the reference at the state's stamp.
 
-        `episode_ns` is the stamp of the episode's first state, from which the reference counts;
-        `contacts` (links, 6) are the net wrenches of the tick before, N and N m, world axes, which
-        a behaviour may need; `opponent` (3,) is where the root of its opponent is, m, world.
+        `episode_ns` is the stamp of the episode's first state, from which the reference counts; a
+        behaviour may need `contacts` (links, 6), the net wrenches of the tick before, N and N m,
+        world axes, and `opponent` (3,), where the root of its opponent is, m, world.
 
         Raises:
             ClockError: the state's stamp is no tick at this controller's rate.
@@ -227,12 +223,13 @@ class Controller:
             now=self._tracked.desired(seen.time, seen.now),
             upcoming=self._tracked.desired(seen.next_time, seen.upcoming),
             offset=self._offset(acting, gains),
+            effort=output.effort,
         )
         effort = self._effort(tracking, gains)
         if late is not None:
             late.send(tick, effort)
         now = tracking.now
-        if acting is not state:  # the reference that is published is that of the state's stamp
+        if acting is not state:  # the published reference is that of the state's stamp
             now = self._tracked.desired_at(self._tracked.tick(stamp_ns))
         return effort, StampedReference(stamp_ns, now.configuration.position, now.velocity)
 
@@ -255,6 +252,7 @@ class Controller:
             strengths=effective.strengths,
             assisted=effective.assisted,
             opponent=around.opponent,
+            course=self._tracked.course(tick),
         )
 
     def _effective_gains(self, stamp_ns: int) -> EffectiveGains:
@@ -277,8 +275,10 @@ class Controller:
             self.planner.change_reference(since)
 
     def _effort(self, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-        """The effort (n,) of law and balance, within the limits."""
+        """The effort (n,) of law, behaviour and balance, within the limits."""
         effort = self._law(tracking, gains)
+        if tracking.effort is not None:
+            effort = effort + tracking.effort
         if self._settings.balance is not None and self._balance is not None:
             self._model.update(tracking.position, tracking.velocity)
             bias = self._settings.law not in COMPENSATES_GRAVITY

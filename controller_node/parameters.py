@@ -9,6 +9,7 @@ import numpy as np
 from controller_node.balance import BalanceGains
 from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS, choose_behaviour
 from controller_node.behaviours.settings import check_terrain
+from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.control_laws import LAWS, GainArrays
 from controller_node.controller import Controller
 from controller_node.controller_settings import ControllerSettings
@@ -185,9 +186,10 @@ def _is_ragdoll(values: Values) -> bool:
 
 
 def _assists(values: Values) -> bool:
-    """Whether the root is driven; a ragdoll's is not, nor that of planned joint torques."""
+    """Whether the root is driven; not that of planned joint torques, and not by all behaviours."""
     plans = values.text("planner") != NO_PLANNER
-    return values.flag("root_assistance") and not plans and not _is_ragdoll(values)
+    unassisted = values.text("behaviour") in ("ragdoll", STATE_MACHINE)
+    return values.flag("root_assistance") and not plans and not unassisted
 
 
 def make_controller(character: Character, reference: Reference, values: Values) -> Controller:

@@ -7,7 +7,7 @@ import numpy as np
 
 from controller_node.behaviours.targets import Target
 from controller_node.references.base import Reference, ReferenceState, SampledTogether
-from controller_node.references.steering.reference import Steered, SteeredReference
+from controller_node.references.steering.reference import Course, Steered, SteeredReference
 from controller_node.references.steering.velocity import VelocityCommand
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
 from controller_node.references.transformed import PlanarTransform, TransformedReference
@@ -79,6 +79,11 @@ class TrackedReference:
         steered = self._reference.steered(command, now)
         self._reference, self._known = steered.reference, []
         return steered
+
+    def course(self, tick: int) -> Course | None:
+        """The motion over the ground at a tick, of a reference that is steered."""
+        steered = self._reference
+        return steered.course(tick) if isinstance(steered, SteeredReference) else None
 
     def own(self, tick: int) -> tuple[TimedState, TimedState]:
         """The reference's states at a tick and at the next one, without the behaviour's target."""

@@ -33,21 +33,21 @@ class MappingReader:
             prefix: The keys that lead to the mapping, such as `joints.chest.`.
         """
         self.content = content
-        self._place = place
+        self.place = place
         self._error = error
-        self._prefix = prefix
+        self.prefix = prefix
 
     def wrong(self, key: str, value: object, right: str) -> ActuatedCharactersError:
         """The error for a value; `right` is what it must be."""
-        name = f"{self._prefix}{key}"[:_SHOWN]
-        return self._error(f"{self._place}: {name} is {show_value(value)}; it must be {right}")
+        name = f"{self.prefix}{key}"[:_SHOWN]
+        return self._error(f"{self.place}: {name} is {show_value(value)}; it must be {right}")
 
     def check_keys(self, known: Iterable[str]) -> None:
         """Raise the error if there is a key that is not known."""
         for key in self.content:
             if key not in known:
-                sentence = one_of("key", key, list(known), self._prefix)
-                raise self._error(f"{self._place}: {sentence}")
+                sentence = one_of("key", key, list(known), self.prefix)
+                raise self._error(f"{self.place}: {sentence}")
 
     def part(self, key: str) -> "MappingReader":
         """The mapping under a key; one that is absent is empty."""
@@ -55,7 +55,7 @@ class MappingReader:
         value = {} if value is None else value
         if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
             raise self.wrong(key, value, "a mapping")
-        return MappingReader(self._place, value, self._error, f"{self._prefix}{key}.")
+        return MappingReader(self.place, value, self._error, f"{self.prefix}{key}.")
 
     def parts(self, key: str, known: Iterable[str]) -> dict[str, "MappingReader"]:
         """The mappings in the mapping under a key, each with no keys but those known."""

@@ -149,6 +149,9 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
         simulator.setdefault("real_time_factor", 1.0)
     for name in ("behaviour", "planner", "collision"):
         _set_option(name, getattr(options, name), controller)
+    if options.machine is not None:
+        _set_option("machine", options.machine, controller)
+        _set_option("behaviour", "state_machine", controller)
     character = load_character(options.character, collides(simulator | controller))
     found_in = bring_parameters(character, options.clip, simulator, controller)
     duration = options.duration
@@ -259,6 +262,8 @@ def _run_plan(
 
 def _motion_name(plan: "RunPlan") -> str:
     """The name of the motion that a plan tracks."""
+    if plan.controller.text("behaviour") == "state_machine":
+        return plan.controller.text("machine")
     kind = plan.controller.text("reference")
     return plan.controller.text(kind) if kind in ("clip", "keyframes") else kind
 

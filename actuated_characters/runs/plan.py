@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import choose_behaviour
+from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
 from controller_node.planner.settings import PREDICTIVE
@@ -85,7 +86,7 @@ def make_plan(
     controller, motion = _controller_values(character, controller_given)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
-    if controller.text("planner") == PREDICTIVE:
+    if controller.text("planner") == PREDICTIVE or controller.text("behaviour") == STATE_MACHINE:
         defaults |= STEADY_CONTACTS
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)
@@ -111,7 +112,7 @@ def _with_reference(
 
 
 def choose_reference(given: Mapping[str, object]) -> dict[str, object]:
-    """The parameter `reference` that a clip or keyframes among parameters mean.
+    """The parameter `reference` that a clip, keyframes or a state machine among parameters mean.
 
     Raises:
         ConfigurationError: both are given, or a clip or keyframes beside another reference.
@@ -119,7 +120,8 @@ def choose_reference(given: Mapping[str, object]) -> dict[str, object]:
     kinds = [name for name in ("clip", "keyframes") if given.get(name)]
     chosen = given.get("reference")
     if not kinds:
-        return {}
+        steered = given.get("behaviour") == STATE_MACHINE and chosen is None
+        return {"reference": "steered"} if steered else {}
     if len(kinds) == 2 and chosen not in kinds:
         raise ConfigurationError("'clip' and 'keyframes' are given; give one of them")
     if chosen is not None and chosen not in kinds:

@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 from controller_node.behaviours.targets import Target
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
+from controller_node.references.steering.reference import Course
 from controller_node.references.transformed import PlanarTransform
 from controller_node.registry import Registry
 from msgs_config.arrays import FloatArray
@@ -25,6 +26,7 @@ class Mode(Enum):
     SEARCH = "SEARCH"  # looks for a motion to go on with
     BLEND = "BLEND"  # goes over to a motion that was found, or back to its own
     LIMP = "LIMP"  # nothing drives it
+    STATE = "STATE"  # in a state of a state machine, which the facts name
 
 
 class Surroundings(NamedTuple):
@@ -49,6 +51,7 @@ class Observation(NamedTuple):
     strengths: FloatArray  # (b,) by which those in force are weaker
     assisted: bool  # whether the gains in force drive a floating base
     opponent: FloatArray | None = None  # (3,) m, world: the root of the opponent, if it has one
+    course: Course | None = None  # of a reference that is steered
 
     def assistance(self, unless_none: object = "full") -> object:
         """The assistance for a report: "none" where the gains drive no floating base."""
@@ -70,6 +73,7 @@ class BehaviourOutput:
     phase: Phase  # the same object as long as it lasts
     target: Target | None = None  # the same object as long as it leads on; None: the reference
     gains: GainArrays | None = None  # None: those in force
+    effort: FloatArray | None = None  # (n,) beside that of the law, N m and N; None: nothing
 
 
 class Behaviour(Protocol):

@@ -2,6 +2,7 @@
 
 from controller_node.behaviours import reaction_factory  # noqa: F401  registers its own
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
+from controller_node.behaviours.state_machine import factory as state_machine  # noqa: F401  as well
 from msgs_config.character.model import Character
 from msgs_config.parameters import Parameter, Values
 
@@ -10,7 +11,7 @@ BEHAVIOUR_PARAMETERS = [
         "behaviour",
         "tracking",
         "track whatever comes; be limp; track, and go limp on a hard hit; likewise, and go for an "
-        "opponent; or track, and react to a hit",
+        "opponent; track, and react to a hit; or go through the states of a machine",
         choices=BEHAVIOURS.names,
     ),
     *BEHAVIOURS.parameters,

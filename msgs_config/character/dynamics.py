@@ -167,6 +167,16 @@ class DynamicsModel:
         """Weight of all links together, N."""
         return float(-self._model.opt.gravity[2] * self._model.body_subtreemass[1])
 
+    @property
+    def mass(self) -> float:
+        """Mass of all links together, kg."""
+        return float(self._model.body_subtreemass[1])
+
+    def inertia_of_entries(self) -> FloatArray:
+        """The diagonal (n,) of the mass matrix at the state taken over: kg, kg m^2."""
+        diagonal: FloatArray = self._mass.take(self._diagonal)
+        return diagonal
+
     def centre_of_mass(self) -> FloatArray:
         """Centre of mass (3,) of all links in the world, m."""
         centre: FloatArray = self._data.subtree_com[1].copy()

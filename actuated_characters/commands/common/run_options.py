@@ -33,9 +33,15 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     )
     run.add_argument(
         "--behaviour",
-        choices=["tracking", "ragdoll", "active_ragdoll", "reactive"],
+        choices=["tracking", "ragdoll", "active_ragdoll", "reactive", "state_machine"],
         help="track whatever comes (tracking, the default); be limp; go limp on a hard hit, and "
-        "get up; or react to hits",
+        "get up; react to hits; or go through the states of a machine",
+    )
+    run.add_argument(
+        "--machine",
+        metavar="NAME",
+        help="walk, or what else a state machine does by joint torques alone, steered by cmd_vel: "
+        "a shipped one, such as walk, or a .yaml file (--behaviour state_machine)",
     )
     run.add_argument(
         "--collision",

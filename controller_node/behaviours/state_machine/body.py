@@ -1,0 +1,101 @@
+"""What a state machine sees of its character in a state, world axes."""
+
+from dataclasses import dataclass
+
+from controller_node.behaviours.state_machine.leg import Leg
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.geometry.single_rotations import (
+    QuaternionXyzw,
+    Vector,
+    about_z,
+    add,
+    conjugate,
+    multiply,
+    rotate,
+    yaw,
+)
+
+
+@dataclass(frozen=True)
+class Foot:
+    """A foot in a state."""
+
+    sole: Vector  # m, the middle
+    turn: QuaternionXyzw  # against how it stands, facing along x
+    load: float  # N, of what touches it, upwards
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A state, and what the model makes of it."""
+
+    position: FloatArray  # (n,)
+    velocity: FloatArray  # (n,)
+    root: Vector  # m
+    root_xyzw: QuaternionXyzw
+    tilt: QuaternionXyzw  # of the root against how it stands, facing along x
+    centre: Vector  # m, of mass
+    centre_velocity: Vector  # m/s
+    turns: list[QuaternionXyzw]  # orientation of each link
+    spin: Vector  # rad/s, of the root
+    feet: dict[str, Foot]  # by side
+
+    @property
+    def heading(self) -> float:
+        """The way that the root faces, rad about z from x."""
+        return yaw(self.tilt)
+
+
+class BodyReader:
+    """Makes a `Body` of each state."""
+
+    def __init__(self, model: DynamicsModel, legs: dict[str, Leg], upright: QuaternionXyzw) -> None:
+        """`upright` is the orientation of the root of a character that stands and faces along x."""
+        self._model, self._legs = model, legs
+        self._from_upright = conjugate(upright)
+
+    def read(self, position: FloatArray, velocity: FloatArray, contacts: FloatArray) -> Body:
+        """The body in a state, in which the model then is; `contacts` (links, 6) as observed."""
+        self._model.update(position, velocity)
+        origins, turns = self._model.link_poses()
+        feet = {
+            side: _foot(leg, origins[leg.foot_link], turns[leg.foot_link], contacts)
+            for side, leg in self._legs.items()
+        }
+        quaternions: list[QuaternionXyzw] = [(x, y, z, w) for x, y, z, w in turns.tolist()]
+        root_xyzw = quaternions[0]
+        return Body(
+            position=position,
+            velocity=velocity,
+            root=_vector(position[:3]),
+            root_xyzw=root_xyzw,
+            tilt=multiply(root_xyzw, self._from_upright),
+            centre=_vector(self._model.centre_of_mass()),
+            centre_velocity=_vector(self._model.centre_of_mass_velocity()),
+            turns=quaternions,
+            spin=rotate(root_xyzw, _vector(velocity[3:6])),
+            feet=feet,
+        )
+
+
+def _foot(leg: Leg, origin: FloatArray, turn: FloatArray, contacts: FloatArray) -> Foot:
+    x, y, z, w = turn.tolist()
+    sole = add(_vector(origin), rotate((x, y, z, w), leg.sole_in_foot))
+    against = multiply((x, y, z, w), conjugate(leg.upright[2]))
+    return Foot(sole, against, float(contacts[leg.foot_link, 2]))
+
+
+def _vector(values: FloatArray) -> Vector:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def in_frame(heading: float, vector: Vector) -> Vector:
+    """A vector of the world in axes ahead, to the left and up of a heading in rad."""
+    return rotate(about_z(-heading), vector)
+
+
+def in_world(heading: float, vector: Vector) -> Vector:
+    """A vector in axes ahead, to the left and up of a heading in rad, in the world."""
+    return rotate(about_z(heading), vector)

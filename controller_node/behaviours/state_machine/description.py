@@ -1,0 +1,168 @@
+"""What the file of a state machine says: states, their targets, and how they end."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from controller_node.behaviours.state_machine.support import Bounds
+from msgs_config.geometry.single_rotations import Vector
+
+STANCE, SWING = "stance", "swing"
+"""The roles of the two sides; a state's end may swap them."""
+
+STAND, STEP, REACH, FREE = "stand", "step", "reach", "free"
+FEET = (STAND, STEP, REACH, FREE)
+"""What a leg does: carries, goes to a place on the ground, reaches below the hip, or has targets of
+joints alone."""
+
+BALANCE = "balance"
+"""The effort of a stance hip that keeps the torso, by SIMBICON's balance of torques."""
+
+Gains = tuple[float, float]
+"""Of an error and of its rate: 1/s^2 and 1/s of the root, N m/rad and N m s/rad of a joint."""
+
+
+@dataclass(frozen=True)
+class RootTarget:
+    """How the root is held by the feet that stand; angles are about axes ahead and to the left."""
+
+    height: float  # m, above the soles that stand
+    roll: float = 0.0  # rad
+    pitch: float = 0.0  # rad, ahead
+    climb: float = 0.0  # m/s, upwards
+    thrust: float = 0.0  # N, upwards, beside what height and climb need
+    height_gains: Gains = (120.0, 22.0)
+    tilt_gains: Gains = (150.0, 25.0)
+    turn_gains: Gains = (60.0, 16.0)
+
+
+@dataclass(frozen=True)
+class PressureTarget:
+    """Where the centre of pressure is, in the frame of a sole: ahead, and outward of the body."""
+
+    ahead: float = 0.0  # m
+    outward: float = 0.0  # m
+    share: float = 0.5  # where both feet stand: from the stance foot to the other one
+    gain: float = 1.5  # m for each m that the extrapolated centre of mass is off its course
+    speed_gain: float = 0.0  # m for each m/s that the body is too fast
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where a foot goes, by a law of balance, and how."""
+
+    law: str = "extrapolated"  # or neutral, pendulum
+    width: float = 0.2  # m, of a step
+    ahead: float = 0.0  # m, beside what the law says
+    gain: float = 0.0  # s, of the law neutral
+    clearance: float = 0.08  # m, of the foot at the middle of its way
+    depth: float = 0.0  # m, below the other sole, where its way ends
+    descent: float = 0.25  # m/s, at which it then goes on
+    least_width: float = 0.1  # m, between the soles
+    most_width: float = 0.6  # m
+    most_ahead: float = 0.75  # m
+    most_behind: float = 0.6  # m
+    length: float = 0.0  # m, of a leg that reaches, from hip to sole
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """SIMBICON's feedback on the angle of a hip: rad/m and rad s/m."""
+
+    sagittal: Gains = (0.0, 0.0)
+    coronal: Gains = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class JointTarget:
+    """A joint's target for a swing leg on the left; it is mirrored for one on the right."""
+
+    joint: str  # its name, or a role and a part, such as `swing.knee`
+    value: Vector  # joint axes: rotation vector, or the angle first; world: roll, pitch, yaw; rad
+    in_world: bool = False  # axes ahead, to the left and up of the way that it is to face
+    feedback: Feedback = Feedback()
+    size: int = 3  # numbers that the file has
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A quantity that is above, or below, a value."""
+
+    quantity: str
+    above: bool
+    value: float
+
+    def holds(self, value: float) -> bool:
+        """Whether it does, of a value of the quantity."""
+        return value > self.value if self.above else value < self.value
+
+
+QUANTITIES = {
+    "time": "s in the state",
+    "stance_load": "N on the stance foot",
+    "swing_load": "N on the swing foot",
+    "load": "N on both feet",
+    "height": "m of the root above the lower sole",
+    "climb": "m/s of the centre of mass upwards",
+    "speed": "m/s of the centre of mass ahead",
+    "command": "m/s and rad/s, the largest part of the commanded velocity",
+    "command_ahead": "m/s, the commanded velocity ahead",
+    "sway": "m from the stance sole towards the other, of the extrapolated centre of mass",
+    "imbalance": "m of the extrapolated centre of mass outside of the feet's rectangle",
+}
+"""What conditions may ask for, and its unit."""
+
+
+@dataclass(frozen=True)
+class End:
+    """An end of a state, where all of its conditions hold."""
+
+    then: str
+    conditions: tuple[Condition, ...]
+    swap: bool = False  # the roles of the sides
+
+    @property
+    def takes_time(self) -> bool:
+        """Whether it needs the state to have lasted for a time."""
+        return any(c.quantity == "time" and c.above and c.value > 0.0 for c in self.conditions)
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of a machine."""
+
+    name: str
+    feet: dict[str, str]  # by role: one of `FEET`
+    duration: float  # s, in which a foot that goes somewhere gets there
+    blend: float  # s, in which targets come over from the state before
+    root: RootTarget
+    pressure: PressureTarget
+    placement: Placement
+    targets: tuple[JointTarget, ...]
+    gains: dict[str, Gains]  # by joint as in `targets`
+    efforts: dict[str, str | Vector]  # by joint likewise: `BALANCE`, or N m
+    bounds: Bounds
+    ends: tuple[End, ...]
+    tracks: bool = False  # by the control law and its gains, not by inverse dynamics
+
+    @property
+    def standing(self) -> tuple[str, ...]:
+        """The roles of the feet that carry."""
+        return tuple(role for role in (STANCE, SWING) if self.feet[role] == STAND)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A state machine: a mirrored one has one state for both sides."""
+
+    file: Path
+    sides: dict[str, dict[str, str]]  # by side: the names of its joints by their parts
+    start: str
+    states: dict[str, State]
+
+    def joint(self, name: str, stance: str) -> str:
+        """The character's joint of a name in a target, where a side is the stance side."""
+        role, dot, part = name.partition(".")
+        if not dot:
+            return name
+        other = next(side for side in self.sides if side != stance)
+        return self.sides[stance if role == STANCE else other][part]

@@ -1,0 +1,70 @@
+"""The behaviour `state_machine`, as the parameters' values say."""
+
+from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
+from controller_node.behaviours.state_machine.body import BodyReader
+from controller_node.behaviours.state_machine.check import check_machine
+from controller_node.behaviours.state_machine.drive import Drive
+from controller_node.behaviours.state_machine.file import read_machine
+from controller_node.behaviours.state_machine.leg import make_leg, standing_frames
+from controller_node.behaviours.state_machine.machine import MachineKit, StateMachine
+from controller_node.behaviours.state_machine.pose import PoseMaker
+from controller_node.planner.settings import NO_PLANNER
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
+from msgs_config.parameters import Parameter, Values
+from msgs_config.shared_parameters import COMMAND_DELAY
+
+STATE_MACHINE = "state_machine"
+
+
+@BEHAVIOURS.register(
+    STATE_MACHINE,
+    Parameter("machine", "walk", "state_machine: a shipped machine, or the path of a .yaml file"),
+)
+def _state_machine(character: Character, values: Values) -> BehaviourChoice:
+    _check(character, values)
+    kit = make_kit(character, values)
+    return BehaviourChoice(lambda: StateMachine(kit), needs_contacts=True)
+
+
+def make_kit(character: Character, values: Values) -> MachineKit:
+    """What a machine works with. Raises ConfigurationError if it does not fit the character."""
+    machine = read_machine(values.text("machine"))
+    check_machine(machine, character)
+    gravity, period = values.number("gravity"), 1.0 / values.integer("rate")
+    model, layout = DynamicsModel(character, gravity), character.layout
+    legs = {
+        side: make_leg(character, *(joints[part] for part in ("hip", "knee", "ankle")))
+        for side, joints in machine.sides.items()
+    }
+    _, upright = standing_frames(character)
+    return MachineKit(
+        machine=machine,
+        layout=layout,
+        legs=legs,
+        reader=BodyReader(model, legs, upright[0]),
+        poses=PoseMaker(character, machine, legs, upright, period),
+        drive=Drive(model, layout, machine, legs, period),
+        gravity=gravity,
+        period=period,
+    )
+
+
+def _check(character: Character, values: Values) -> None:
+    """Raise ConfigurationError if other parameters do not go with a state machine."""
+    if not character.layout.has_floating_base:
+        raise ConfigurationError(
+            f"parameter 'behaviour' is {STATE_MACHINE}, which needs a floating base; "
+            f"'{character.name}' is fixed to the world"
+        )
+    for name, wanted in (("planner", NO_PLANNER), ("reference", "steered"), ("law", "stable_pd")):
+        if values.text(name) != wanted:
+            raise ConfigurationError(
+                f"parameter 'behaviour' is {STATE_MACHINE}, which needs '{name}' to be {wanted}; "
+                f"it is {values.text(name)}"
+            )
+    if values.integer(COMMAND_DELAY.name):
+        raise ConfigurationError(
+            f"parameter 'behaviour' is {STATE_MACHINE}, which needs '{COMMAND_DELAY.name}' to be 0"
+        )

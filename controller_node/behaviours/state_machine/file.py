@@ -1,0 +1,251 @@
+"""The YAML file of a state machine, checked key by key before anything starts.
+
+`docs/state_machines.md` has its keys.
+"""
+
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from controller_node.behaviours.state_machine.description import (
+    BALANCE,
+    FEET,
+    QUANTITIES,
+    STANCE,
+    STAND,
+    SWING,
+    Condition,
+    End,
+    Feedback,
+    Gains,
+    JointTarget,
+    Machine,
+    Placement,
+    PressureTarget,
+    RootTarget,
+    State,
+)
+from controller_node.behaviours.state_machine.laws import PLACEMENT_LAWS
+from controller_node.behaviours.state_machine.support import Bounds
+from msgs_config import files
+from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.geometry.single_rotations import Vector
+from msgs_config.mappings import MappingReader
+
+MACHINES_DIRECTORY = Path(__file__).parent / "data"
+_KEYS = ["sides", "start", "includes", "gains", "bounds", "states"]
+_STATE_KEYS = [
+    *("feet", "duration", "blend", "root", "pressure", "placement", "targets", "gains"),
+    *("efforts", "tracks", "ends"),
+]
+_NEVER = "never"
+_PARTS = ("hip", "knee", "ankle")  # that every side has
+_DEPTH = 8  # of files that include others
+
+
+def shipped_machines() -> list[str]:
+    """The names of the machines that come with the package."""
+    return sorted(path.stem for path in MACHINES_DIRECTORY.glob("*.yaml"))
+
+
+def machine_path(name: str) -> Path:
+    """The file of a shipped machine, or the path itself.
+
+    Raises:
+        ConfigurationError: there is no shipped machine of that name.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return Path(name)
+    if name not in shipped_machines():
+        wrong = one_of("machine", name, shipped_machines())
+        raise ConfigurationError(f"{wrong}; or the path of a .yaml file")
+    return MACHINES_DIRECTORY / f"{name}.yaml"
+
+
+def read_machine(name: str) -> Machine:
+    """Read a shipped machine, or a file. What it names of the character is checked later.
+
+    Raises:
+        ConfigurationError: names the file, the key, the value and what would be right.
+    """
+    return _read(machine_path(name), _DEPTH)
+
+
+def _read(path: Path, depth: int) -> Machine:
+    if not depth:
+        raise ConfigurationError(f"{path}: more than {_DEPTH} files include each other")
+    text = files.read_text(path, ConfigurationError)
+    content = files.parse_yaml_mapping(path, text, ConfigurationError)
+    reader = MappingReader(path, content, ConfigurationError)
+    reader.check_keys(_KEYS)
+    sides = _sides(reader)
+    states: dict[str, State] = {}
+    includes = reader.part("includes")
+    for prefix in includes.content:
+        included = _read(_beside(path, includes.text(prefix)), depth - 1)
+        if included.sides != sides:
+            raise ConfigurationError(f"{path}: the sides must be those of {included.file}")
+        for state in included.states.values():
+            states[f"{prefix}.{state.name}"] = _prefixed(state, prefix)
+    gains = _gains(reader.part("gains"))
+    bounds = _values(reader.part("bounds"), Bounds())
+    parts = reader.part("states")
+    for name in parts.content:
+        states[name] = _state(name, parts.part(name), gains, bounds)
+    if not states:
+        raise reader.wrong("states", content.get("states"), "a mapping of one state or more")
+    return Machine(path, sides, reader.text("start"), states)
+
+
+def _beside(path: Path, name: str) -> Path:
+    return path.parent / name if name.endswith((".yaml", ".yml")) else machine_path(name)
+
+
+def _prefixed(state: State, prefix: str) -> State:
+    """A state of an included machine."""
+    ends = tuple(replace(end, then=f"{prefix}.{end.then}") for end in state.ends)
+    return replace(state, name=f"{prefix}.{state.name}", ends=ends)
+
+
+def _sides(reader: MappingReader) -> dict[str, dict[str, str]]:
+    part = reader.part("sides")
+    sides = {}
+    for side in part.content:
+        joints = part.part(side)
+        sides[side] = {name: joints.text(name) for name in joints.content}
+    if len(sides) != 2 or any(set(each) < set(_PARTS) for each in sides.values()):
+        raise reader.wrong(
+            "sides",
+            reader.content.get("sides"),
+            "two sides, the first of which stands first, each with a hip, a knee and an ankle",
+        )
+    first, second = sides.values()
+    if set(first) != set(second):
+        odd = sorted(set(first) ^ set(second))[0]
+        raise part.wrong(odd, None, "a joint of both sides, or of none")
+    return sides
+
+
+def _state(name: str, reader: MappingReader, gains: dict[str, Gains], bounds: Bounds) -> State:
+    reader.check_keys(_STATE_KEYS)
+    feet = reader.part("feet")
+    feet.check_keys((STANCE, SWING))
+    roles = {role: feet.choice(role, [STAND, *FEET]) for role in (STANCE, SWING)}
+    root = reader.part("root")
+    stands = STAND in roles.values()
+    height = root.number("height", None if stands else 0.0, 0.0, 1e3)
+    return State(
+        name=name,
+        feet=roles,
+        duration=reader.number("duration", 1.0, 1e-3, 1e6),
+        blend=reader.number("blend", 0.0, 0.0, 1e6),
+        root=_values(root, RootTarget(height)),
+        pressure=_values(reader.part("pressure"), PressureTarget()),
+        placement=_placement(reader.part("placement")),
+        targets=_targets(reader.part("targets")),
+        gains={**gains, **_gains(reader.part("gains"))},
+        efforts=_efforts(reader.part("efforts")),
+        bounds=bounds,
+        ends=_ends(reader),
+        tracks=reader.flag("tracks"),
+    )
+
+
+def _values(reader: MappingReader, default: Any) -> Any:
+    """A frozen description with the numbers, pairs and texts that a mapping has."""
+    known = {field.name for field in fields(default)}
+    reader.check_keys(sorted(known))
+    changed: dict[str, Any] = {}
+    for key in known:
+        value = getattr(default, key)
+        if isinstance(value, tuple):
+            changed[key] = reader.numbers(key, len(value), default=list(value))
+        elif isinstance(value, str):
+            changed[key] = reader.content.get(key, value)
+        else:
+            changed[key] = reader.number(key, value, -1e9, 1e9)
+    return type(default)(**changed)
+
+
+def _placement(reader: MappingReader) -> Placement:
+    placement: Placement = _values(reader, Placement())
+    if placement.law not in PLACEMENT_LAWS:
+        raise reader.wrong("law", placement.law, " or ".join(f"'{law}'" for law in PLACEMENT_LAWS))
+    return placement
+
+
+def _gains(reader: MappingReader) -> dict[str, Gains]:
+    return {
+        joint: reader.numbers(joint, 2, (0.0, 1e9))  # type: ignore[misc]
+        for joint in reader.content
+    }
+
+
+def _targets(reader: MappingReader) -> tuple[JointTarget, ...]:
+    return tuple(_target(joint, reader) for joint in reader.content)
+
+
+def _target(joint: str, reader: MappingReader) -> JointTarget:
+    value = reader.content[joint]
+    if isinstance(value, dict):
+        part = reader.part(joint)
+        part.check_keys(("roll", "pitch", "yaw", "sagittal", "coronal"))
+        angles = tuple(part.number(axis, 0.0, -10.0, 10.0) for axis in ("roll", "pitch", "yaw"))
+        pairs = [part.numbers(key, 2, default=[0.0, 0.0]) for key in ("sagittal", "coronal")]
+        feedback = Feedback(*pairs)  # type: ignore[arg-type]
+        return JointTarget(joint, angles, True, feedback)  # type: ignore[arg-type]
+    if isinstance(value, list):
+        x, y, z = reader.numbers(joint, 3, (-10.0, 10.0))
+        return JointTarget(joint, (x, y, z))
+    angle = reader.number(joint, None, -1e3, 1e3)
+    return JointTarget(joint, (angle, 0.0, 0.0), size=1)
+
+
+def _efforts(reader: MappingReader) -> dict[str, str | Vector]:
+    efforts: dict[str, str | Vector] = {}
+    for joint, value in reader.content.items():
+        if value == BALANCE:
+            efforts[joint] = BALANCE
+        elif isinstance(value, list):
+            x, y, z = reader.numbers(joint, 3, (-1e6, 1e6))
+            efforts[joint] = (x, y, z)
+        elif isinstance(value, str):
+            raise reader.wrong(joint, value, f"'{BALANCE}', a number or three, N m")
+        else:
+            efforts[joint] = (reader.number(joint, None, -1e6, 1e6), 0.0, 0.0)
+    return efforts
+
+
+def _ends(reader: MappingReader) -> tuple[End, ...]:
+    items = reader.content.get("ends")
+    if items == _NEVER:
+        return ()
+    if not isinstance(items, list) or not items:
+        raise reader.wrong("ends", items, f"a list of one end or more, or '{_NEVER}'")
+    return tuple(_end(reader, number, item) for number, item in enumerate(items, 1))
+
+
+def _end(reader: MappingReader, number: int, item: object) -> End:
+    holder = MappingReader(
+        reader.place, {f"ends {number}": item}, ConfigurationError, reader.prefix
+    )
+    part = holder.part(f"ends {number}")
+    part.check_keys(("when", "then", "swap"))
+    when = part.part("when")
+    if not when.content:
+        raise part.wrong("when", None, "conditions, such as {time: '> 0.5'}")
+    conditions = tuple(_condition(when, quantity) for quantity in when.content)
+    return End(part.text("then"), conditions, part.flag("swap"))
+
+
+def _condition(when: MappingReader, quantity: str) -> Condition:
+    when.check_keys(QUANTITIES)
+    text = when.content[quantity]
+    sign, number = (text[:1], text[1:].strip()) if isinstance(text, str) else ("", "")
+    try:
+        if sign not in ("<", ">"):
+            raise ValueError
+        return Condition(quantity, sign == ">", float(number))
+    except ValueError:
+        right = f"'> NUMBER' or '< NUMBER', {QUANTITIES[quantity]}"
+        raise when.wrong(quantity, text, right) from None

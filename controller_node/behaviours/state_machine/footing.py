@@ -1,0 +1,156 @@
+"""Where the centre of pressure is to be, and where a foot is to go."""
+
+import math
+from dataclasses import dataclass
+
+from controller_node.behaviours.state_machine import laws
+from controller_node.behaviours.state_machine.body import Foot, in_world
+from controller_node.behaviours.state_machine.description import (
+    STANCE,
+    Placement,
+    State,
+)
+from controller_node.behaviours.state_machine.leg import FootPose, Leg
+from controller_node.behaviours.state_machine.situation import Situation
+from controller_node.behaviours.state_machine.support import Contact
+from controller_node.references.steering.velocity import within
+from msgs_config.geometry.single_rotations import Vector, about_z, add, scale, subtract, yaw
+
+_NARROW = 1e-3  # m, between feet that stand in one place
+_LEAST_SHARE = 0.03  # of the load, on each of two feet
+
+
+def contacts_of(state: State, at: Situation, time: float, legs: dict[str, Leg]) -> list[Contact]:
+    """The feet that carry in a state, and their centres of pressure; `time` s after it began."""
+    standing = [at.stance if role == STANCE else at.swing for role in state.standing]
+    if not standing:
+        return []
+    limits = _limits(legs[standing[0]], state.bounds.sole)
+    if len(standing) == 1:
+        side = standing[0]
+        wanted = _pressure_on_one(state, at, time)
+        sole = at.local(at.foot(side).sole)
+        inside = [sole[axis] + within(wanted[axis] - sole[axis], limits[axis]) for axis in (0, 1)]
+        place = at.world((inside[0], inside[1], sole[2]))
+        return [Contact(legs[side].foot_link, 1.0, place)]
+    return _on_both(state, at, limits, legs)
+
+
+def _limits(leg: Leg, sole: float) -> tuple[float, float]:
+    return sole * leg.half_length, sole * leg.half_width
+
+
+def _pressure_on_one(state: State, at: Situation, time: float) -> tuple[float, float]:
+    """The centre of pressure that leads the extrapolated centre of mass back to its course."""
+    wanted, rate, step_time = state.pressure, at.rate, state.duration
+    grown = math.exp(rate * min(time, step_time))
+    course, width = at.course, state.placement.width
+    nominal = (
+        laws.offset_of_speed(course.forward, step_time, rate) * grown,
+        (
+            at.mirror * laws.offset_of_width(width, step_time, rate)
+            + laws.offset_of_speed(course.left, step_time, rate)
+        )
+        * grown,
+    )
+    there = at.extrapolated
+    x = wanted.ahead + wanted.gain * (there[0] - nominal[0])
+    x += wanted.speed_gain * (at.velocity[0] - course.forward)
+    y = -at.mirror * wanted.outward + wanted.gain * (there[1] - nominal[1])
+    return x, y
+
+
+def _on_both(
+    state: State, at: Situation, limits: tuple[float, float], legs: dict[str, Leg]
+) -> list[Contact]:
+    """Both feet, with the load where the extrapolated centre of mass is led to a share of it."""
+    wanted, other = state.pressure, at.other
+    there = at.extrapolated
+    aim = (wanted.share * other[0] + wanted.ahead, wanted.share * other[1])
+    x, y = (aim[axis] + wanted.gain * (there[axis] - aim[axis]) for axis in (0, 1))
+    across = other[0] * other[0] + other[1] * other[1]
+    share = (x * other[0] + y * other[1]) / max(across, _NARROW * _NARROW)
+    share = min(max(share, _LEAST_SHARE), 1.0 - _LEAST_SHARE)
+    rest = (
+        within(x - share * other[0], limits[0]),
+        within(y - share * other[1], limits[1]),
+    )
+    stance = at.world((rest[0], rest[1], 0.0))
+    swing = at.world((other[0] + rest[0], other[1] + rest[1], other[2]))
+    return [
+        Contact(legs[at.stance].foot_link, 1.0 - share, stance),
+        Contact(legs[at.swing].foot_link, share, swing),
+    ]
+
+
+def landing(state: State, at: Situation, time: float, pressure: Vector) -> tuple[float, float]:
+    """Where the swing foot is to land; from the stance sole, as is the centre of pressure."""
+    law, step_time, rate, course = state.placement, state.duration, at.rate, at.course
+    (x, vx), (y, vy) = at.later(pressure, step_time - time)
+    if law.law == "extrapolated":
+        x += vx / rate - laws.offset_of_speed(course.forward, step_time, rate)
+        y += vy / rate - laws.offset_of_speed(course.left, step_time, rate)
+        y += at.mirror * laws.offset_of_width(law.width, step_time, rate)
+    elif law.law == "neutral":
+        x += laws.neutral_placement(vx, course.forward, step_time, law.gain)
+        y += laws.neutral_placement(vy, course.left, step_time, law.gain)
+        y += at.mirror * 0.5 * law.width
+    else:
+        height = max(at.centre[2], _NARROW)
+        gravity = rate * rate * height
+        x += laws.pendulum_placement(vx, height, gravity) - law.gain * course.forward
+        y += laws.pendulum_placement(vy, height, gravity) - law.gain * course.left
+        y += at.mirror * 0.5 * law.width
+    return reachable(law, x + law.ahead, y, at.mirror)
+
+
+def reachable(law: Placement, x: float, y: float, mirror: float) -> tuple[float, float]:
+    """The nearest place at which the feet neither cross nor straddle."""
+    beside = min(max(mirror * y, law.least_width), law.most_width)
+    return min(max(x, -law.most_behind), law.most_ahead), mirror * beside
+
+
+@dataclass(frozen=True)
+class SwingFoot:
+    """A foot on its way, from where it left."""
+
+    start: Vector  # m, of the sole: in the world, or of one that reaches from the hip
+    start_yaw: float  # rad, world
+
+    @classmethod
+    def leaving(cls, foot: Foot, origin: Vector | None = None) -> "SwingFoot":
+        """A foot that leaves now; `origin` is a hip that it reaches from."""
+        start = foot.sole if origin is None else subtract(foot.sole, origin)
+        return cls(start, yaw(foot.turn))
+
+    def pose(self, state: State, at: Situation, time: float, goal: tuple[float, float]) -> FootPose:
+        """Its pose `time` s after the state began, on its way to a place from the stance sole."""
+        law, share = state.placement, time / state.duration
+        moved = laws.smooth_step(share)
+        stance = at.foot(at.stance).sole
+        end = at.world((goal[0], goal[1], 0.0))
+        low = self.start[2] + moved * (stance[2] - law.depth - self.start[2])
+        low += law.clearance * laws.clearance(share)
+        low -= law.descent * max(time - state.duration, 0.0)
+        place = [self.start[axis] + moved * (end[axis] - self.start[axis]) for axis in (0, 1)]
+        turn = self._yaw(at, moved, max(state.duration - time, 0.0))
+        return FootPose((place[0], place[1], low), about_z(turn))
+
+    def reaching(self, state: State, at: Situation, time: float, hip: Vector) -> FootPose:
+        """Its pose below a hip, ahead by a law of balance, `time` s after the state began."""
+        law, course = state.placement, at.course
+        moved = laws.smooth_step(time / state.duration)
+        ahead = law.ahead + laws.neutral_placement(
+            at.velocity[0], course.forward, state.duration, law.gain
+        )
+        side = laws.neutral_placement(at.velocity[1], course.left, state.duration, law.gain)
+        goal = in_world(course.heading, (ahead, side, -law.length))
+        place = add(scale(1.0 - moved, self.start), scale(moved, goal))
+        raised = law.clearance * laws.clearance(time / state.duration)
+        turn = about_z(self._yaw(at, moved, 0.0))
+        return FootPose(add(add(hip, place), (0.0, 0.0, raised)), turn)
+
+    def _yaw(self, at: Situation, moved: float, rest: float) -> float:
+        """The way that the foot faces, rad, on its way to the heading that will be."""
+        there = at.course.heading + rest * at.course.turn
+        return self.start_yaw + moved * math.remainder(there - self.start_yaw, math.tau)

@@ -1,0 +1,212 @@
+"""The legs of a character: a ball joint, a hinge and a ball joint, and their inverse kinematics."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.layout import JointType
+from msgs_config.character.model import Character, ShapeType
+from msgs_config.errors import ConfigurationError
+from msgs_config.geometry import rotations
+from msgs_config.geometry.single_rotations import (
+    QuaternionXyzw,
+    Vector,
+    add,
+    conjugate,
+    cross,
+    dot,
+    log,
+    multiply,
+    norm,
+    of_axes,
+    rotate,
+    scale,
+    subtract,
+)
+
+_STRAIGHT = 1e-3  # m, from the line of hip and ankle, of a knee at angle 0
+_BENT = 0.05  # rad, of the knee at least: a straight leg has no direction to bend
+_FOLDED = 2.4  # rad, of the knee at most
+
+
+class LegAngles(NamedTuple):
+    """Joint positions of a leg, message form."""
+
+    hip: Vector  # rad, rotation vector
+    knee: float  # rad
+    ankle: Vector  # rad, rotation vector
+
+
+class FootPose(NamedTuple):
+    """The middle of a sole in the world, m, and how the foot is turned against standing."""
+
+    sole: Vector
+    turn: QuaternionXyzw
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A leg, in the frames of its links; `upright` turns each link to how it stands."""
+
+    hip_entries: slice
+    knee_entry: int
+    ankle_entries: slice
+    thigh_link: int
+    foot_link: int
+    foot_inertia: float  # kg m^2, the least
+    hip_in_root: Vector  # m, at rest
+    thigh_length: float  # m
+    shin_length: float  # m
+    knee_sign: float  # of the knee's angle where the shin goes backwards
+    upright: tuple[QuaternionXyzw, QuaternionXyzw, QuaternionXyzw]  # thigh, shin, foot, in world
+    fixed: tuple[QuaternionXyzw, QuaternionXyzw]  # of hip and ankle, child in parent, at angle 0
+    sole_in_foot: Vector  # m, the middle of the sole, in the foot's link frame
+    half_length: float  # m, of the sole
+    half_width: float  # m
+
+    def angles(
+        self, root: Vector, root_xyzw: QuaternionXyzw, foot: FootPose, facing: Vector
+    ) -> LegAngles:
+        """The joint positions at which the foot has a pose; as near to it as the leg reaches.
+
+        The knee bends in the plane of the leg that `facing`, a horizontal direction to the left,
+        is normal to.
+        """
+        hip = add(root, rotate(root_xyzw, self.hip_in_root))
+        foot_xyzw = multiply(foot.turn, self.upright[2])
+        ankle = subtract(foot.sole, rotate(foot_xyzw, self.sole_in_foot))
+        reach = subtract(ankle, hip)
+        thigh, shin = self.thigh_length, self.shin_length
+        distance = min(max(norm(reach), self._distance(_FOLDED)), self._distance(_BENT))
+        along = scale(1.0 / max(norm(reach), 1e-9), reach)
+        left = subtract(facing, scale(dot(facing, along), along))
+        left = scale(1.0 / max(norm(left), 1e-9), left)
+        cosine = (distance * distance - thigh * thigh - shin * shin) / (2.0 * thigh * shin)
+        flexion = math.acos(min(max(cosine, -1.0), 1.0))
+        lead = math.atan2(shin * math.sin(flexion), thigh + shin * math.cos(flexion))
+        thigh_xyzw = multiply(_hanging(along, left, -lead), self.upright[0])
+        shin_xyzw = multiply(_hanging(along, left, flexion - lead), self.upright[1])
+        hip_turn = multiply(conjugate(multiply(root_xyzw, self.fixed[0])), thigh_xyzw)
+        ankle_turn = multiply(conjugate(multiply(shin_xyzw, self.fixed[1])), foot_xyzw)
+        return LegAngles(log(hip_turn), self.knee_sign * flexion, log(ankle_turn))
+
+    def _distance(self, flexion: float) -> float:
+        """From hip to ankle, m, where the knee is bent by an angle."""
+        a, b = self.thigh_length, self.shin_length
+        return math.sqrt(a * a + b * b + 2.0 * a * b * math.cos(flexion))
+
+    @property
+    def longest(self) -> float:
+        """From hip to ankle, m, at most."""
+        return self._distance(_BENT)
+
+
+def _hanging(along: Vector, left: Vector, angle: float) -> QuaternionXyzw:
+    """How a part of a leg that points `along`, then turned about left, is turned from standing."""
+    ahead = cross(left, along)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    down = add(scale(cosine, along), scale(sine, ahead))
+    up = scale(-1.0, down)
+    return of_axes(cross(left, up), left, up)
+
+
+def make_leg(character: Character, hip: str, knee: str, ankle: str) -> Leg:
+    """The leg of three joints of a character.
+
+    Raises:
+        ConfigurationError: they are not a ball joint, a hinge about the sideways axis and a ball
+            joint one below the other, straight at angle 0, with a box as the sole.
+    """
+    links = {link.joint.name: row for row, link in enumerate(character.links)}
+    wanted = {hip: JointType.SPHERICAL, knee: JointType.REVOLUTE, ankle: JointType.SPHERICAL}
+    for name, kind in wanted.items():
+        joint = character.links[links[name]].joint
+        if joint.type is not kind:
+            raise ConfigurationError(
+                f"joint '{name}' is {joint.type.value}; in a leg it must be {kind.value}"
+            )
+    layout = character.layout
+    origins, turns = standing_frames(character)
+    thigh, shin, foot = (links[name] for name in (hip, knee, ankle))
+    places = [origins[row] for row in (thigh, shin, foot)]
+    upright = [turns[row] for row in (thigh, shin, foot)]
+    for place, other in ((places[0], places[1]), (places[0], places[2])):
+        across = math.hypot(place[0] - other[0], place[1] - other[1])
+        if across > _STRAIGHT or other[2] >= place[2]:
+            raise ConfigurationError(
+                f"the leg of '{hip}', '{knee}' and '{ankle}' must hang straight down at angle 0"
+            )
+    axis = rotate(upright[1], character.links[shin].joint.axis_in_child)
+    if abs(axis[1]) < 0.999:
+        raise ConfigurationError(f"joint '{knee}' of a leg must turn about the sideways axis")
+    # parts between root and hip are fixed to the root
+    fixed = [
+        multiply(conjugate(turns[parent]), turns[row])
+        for parent, row in ((0, thigh), (character.links[foot].parent, foot))
+    ]
+    sole, half_length, half_width = _sole(character, foot, upright[2])
+    return Leg(
+        hip_entries=layout.joint(hip).entries,
+        knee_entry=layout.joint(knee).start,
+        ankle_entries=layout.joint(ankle).entries,
+        thigh_link=thigh,
+        foot_link=foot,
+        foot_inertia=_least_inertia(character, foot),
+        hip_in_root=rotate(conjugate(turns[0]), places[0]),
+        thigh_length=places[0][2] - places[1][2],
+        shin_length=places[1][2] - places[2][2],
+        knee_sign=math.copysign(1.0, axis[1]),
+        upright=(upright[0], upright[1], upright[2]),
+        fixed=(fixed[0], fixed[1]),
+        sole_in_foot=sole,
+        half_length=half_length,
+        half_width=half_width,
+    )
+
+
+def standing_frames(character: Character) -> tuple[list[Vector], list[QuaternionXyzw]]:
+    """Origin, m, and orientation of each link at angles 0, upright, facing along x."""
+    model, layout = DynamicsModel(character), character.layout
+    standing = np.zeros(layout.size)
+    facing = rotations.about_z(-character.placement.yaw)
+    upright = rotations.multiply(facing, rotations.exp(np.array(character.rest_position[3:6])))
+    standing[3:6] = rotations.log(upright)
+    model.update(standing, np.zeros(layout.size))
+    origins, turns = model.link_poses()
+    places: list[Vector] = [(x, y, z) for x, y, z in origins.tolist()]
+    return places, [(x, y, z, w) for x, y, z, w in turns.tolist()]
+
+
+def _sole(
+    character: Character, foot: int, upright_xyzw: QuaternionXyzw
+) -> tuple[Vector, float, float]:
+    """Middle of the sole in the link frame, m, half its length ahead and half its width, m."""
+    link = character.links[foot]
+    boxes = [shape for shape in link.collision_shapes or link.shapes if shape.type is ShapeType.BOX]
+    if not boxes:
+        raise ConfigurationError(f"the foot '{link.name}' has no box, so no sole")
+    pose, half = boxes[0].pose, 0.5 * np.array(boxes[0].size)
+    turn = multiply(upright_xyzw, pose.orientation_xyzw)
+    edges = [
+        rotate(turn, (1.0, 0.0, 0.0)),
+        rotate(turn, (0.0, 1.0, 0.0)),
+        rotate(turn, (0.0, 0.0, 1.0)),
+    ]
+    extent = [
+        sum(abs(edge[axis]) * float(half[row]) for row, edge in enumerate(edges))
+        for axis in range(3)
+    ]
+    middle = rotate(upright_xyzw, pose.position)
+    sole = rotate(conjugate(upright_xyzw), (middle[0], middle[1], middle[2] - extent[2]))
+    return sole, extent[0], extent[1]
+
+
+def _least_inertia(character: Character, foot: int) -> float:
+    """The least inertia of a foot about the axes through its ankle, kg m^2."""
+    link = character.links[foot]
+    x, y, z = link.inertial_pose.position
+    arm = x * x + y * y + z * z
+    return min(link.inertia_diagonal) + link.mass * (arm - max(x * x, y * y, z * z))

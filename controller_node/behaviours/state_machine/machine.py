@@ -1,0 +1,177 @@
+"""The behaviour `state_machine`, for one episode."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.behaviours.base import BehaviourOutput, Mode, Observation, Phase
+from controller_node.behaviours.state_machine.body import BodyReader
+from controller_node.behaviours.state_machine.description import (
+    REACH,
+    STANCE,
+    STEP,
+    SWING,
+    Machine,
+    State,
+)
+from controller_node.behaviours.state_machine.drive import Drive
+from controller_node.behaviours.state_machine.footing import SwingFoot, contacts_of, landing
+from controller_node.behaviours.state_machine.laws import smooth_step
+from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.behaviours.state_machine.pose import Pose, PoseMaker
+from controller_node.behaviours.state_machine.situation import Situation, quantity, situation_of
+from controller_node.behaviours.state_machine.support import Contact
+from controller_node.control_laws import GainArrays
+from controller_node.references.base import ReferenceState
+from controller_node.references.steering.reference import Course
+from controller_node.references.transformed import PlanarTransform
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointLayout
+from msgs_config.geometry.single_rotations import Vector
+
+_STANDING = Course()
+
+
+@dataclass(frozen=True, eq=False)
+class MachineKit:
+    """What a machine works with; the same for all episodes."""
+
+    machine: Machine
+    layout: JointLayout
+    legs: dict[str, Leg]  # by side
+    reader: BodyReader
+    poses: PoseMaker
+    drive: Drive
+    gravity: float  # m/s^2
+    period: float  # s
+
+
+class PoseTarget:
+    """The targets of the present tick, which hold until its end."""
+
+    def __init__(self, layout: JointLayout) -> None:
+        self._layout = layout
+        self._still = np.zeros(layout.size)
+        self.pose = Pose(self._still, self._still)  # kept up to date by its owner
+
+    def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
+        """The targets, at whatever time."""
+        position = self._layout.configuration(self.pose.position)
+        return ReferenceState(position, self.pose.velocity, self._still)
+
+
+class StateMachine:
+    """The states of a machine one after another, as they end.
+
+    The roots of its errors are none: nothing commands the root.
+    """
+
+    def __init__(self, kit: MachineKit) -> None:
+        self._kit = kit
+        self.carry = PlanarTransform()
+        sides = list(kit.machine.sides)
+        self._stance, self._swing = sides[0], sides[1]
+        self._state = kit.machine.states[kit.machine.start]
+        self._since = 0.0  # s
+        self._entered = False
+        self._course = _STANDING
+        self._feet: dict[str, SwingFoot] = {}  # by role
+        self._target = PoseTarget(kit.layout)
+        self._before: tuple[FloatArray, float] | None = None  # targets, height, at the last change
+        self._last: tuple[FloatArray, float] | None = None  # those of the last tick
+        self._none = np.zeros(kit.layout.size)
+
+    def advance(self, seen: Observation) -> BehaviourOutput:
+        """The targets and efforts of a tick; the state before them may end first."""
+        kit = self._kit
+        self._course = seen.course or self._course
+        body = kit.reader.read(seen.position, seen.velocity, seen.contacts)
+        at = situation_of(body, self._course, self._stance, self._swing, kit.gravity)
+        if not self._entered:
+            self._enter(self._state, seen.time, at)
+        at = self._go_on(seen.time, at)
+        time = seen.time - self._since
+        contacts = contacts_of(self._state, at, time, kit.legs)
+        pose = self._pose(at, time, contacts)
+        gains = kit.drive.gains(self._state, self._stance, seen.gains)
+        if self._state.tracks:
+            effort = kit.drive.balanced(self._state, at, pose, gains)
+        else:
+            ground, height = self._heights(at, time)
+            effort = kit.drive.supported(
+                self._state, at, pose, gains, contacts, ground + height - self._state.root.height
+            )
+            gains = GainArrays(self._none, self._none, self._none, seen.gains.effort_limits)
+        self._target.pose = pose
+        return BehaviourOutput(self._phase, self._target, gains, effort)
+
+    def _go_on(self, now: float, at: Situation) -> Situation:
+        """Go over to the next state if the present one ends: once a tick at most."""
+        kit, time = self._kit, now - self._since
+        for end in self._state.ends:
+            if all(c.holds(quantity(c.quantity, at, time, kit.legs)) for c in end.conditions):
+                if end.swap:
+                    self._stance, self._swing = self._swing, self._stance
+                    at = situation_of(at.body, at.course, self._stance, self._swing, kit.gravity)
+                self._enter(kit.machine.states[end.then], now, at)
+                break
+        return at
+
+    def _enter(self, state: State, now: float, at: Situation) -> None:
+        self._state, self._since, self._entered = state, now, True
+        self._before = self._last
+        sides = {STANCE: self._stance, SWING: self._swing}
+        self._feet = {}
+        for role, side in sides.items():
+            if state.feet[role] == STEP:
+                self._feet[role] = SwingFoot.leaving(at.foot(side))
+            elif state.feet[role] == REACH:
+                self._feet[role] = SwingFoot.leaving(
+                    at.foot(side), self._kit.poses.hip(side, at.body)
+                )
+        facts = {"assistance": "none", "state": state.name, "stance": self._stance}
+        self._phase = Phase(Mode.STATE, facts)
+
+    def _heights(self, at: Situation, time: float) -> tuple[float, float]:
+        """Height of the soles that stand, and of the root above them, wanted, in m."""
+        state = self._state
+        sides = [self._stance if role == STANCE else self._swing for role in state.standing]
+        soles = [at.foot(side).sole[2] for side in sides or at.body.feet]
+        ground, height = sum(soles) / len(soles), state.root.height
+        start = at.body.root[2] - ground if self._before is None else self._before[1]
+        if time < state.blend:
+            if self._before is None:
+                self._before = (at.body.position, start)
+            height = start + smooth_step(time / state.blend) * (height - start)
+        self._last = (self._target.pose.position, height)
+        return ground, height
+
+    def _pose(self, at: Situation, time: float, contacts: list[Contact]) -> Pose:
+        """The targets of all joints."""
+        kit, state = self._kit, self._state
+        pose = kit.poses.free(state, at)
+        if time < state.blend and self._before is not None:
+            share = smooth_step(time / state.blend)
+            pose.position = kit.poses.between(self._before[0], pose.position, share)
+            pose.position[:6] = at.body.position[:6]
+        pressure = self._pressure(at, contacts)
+        whens = (time, time + kit.period)
+        for role, side in ((STANCE, self._stance), (SWING, self._swing)):
+            doing = state.feet[role]
+            if role in state.standing:
+                kit.poses.follow_leg(pose, side, at.body)
+            elif doing == STEP:
+                goal = landing(state, at, time, pressure)
+                poses = [self._feet[role].pose(state, at, when, goal) for when in whens]
+                kit.poses.set_leg(pose, side, at.body, *poses)
+            elif doing == REACH:
+                hip = kit.poses.hip(side, at.body)
+                poses = [self._feet[role].reaching(state, at, when, hip) for when in whens]
+                kit.poses.set_leg(pose, side, at.body, *poses)
+        return pose
+
+    def _pressure(self, at: Situation, contacts: list[Contact]) -> Vector:
+        """The centre of pressure, from the stance sole; without one that sole itself."""
+        if len(contacts) != 1:
+            return (0.0, 0.0, 0.0)
+        return at.local(contacts[0].pressure)

@@ -1,0 +1,175 @@
+"""The joints' targets of a state: positions, and velocities that lead on from them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.behaviours.state_machine import laws
+from controller_node.behaviours.state_machine.body import Body
+from controller_node.behaviours.state_machine.description import JointTarget, Machine, State
+from controller_node.behaviours.state_machine.leg import FootPose, Leg
+from controller_node.behaviours.state_machine.situation import Situation
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointLayout, JointType
+from msgs_config.character.model import Character
+from msgs_config.geometry.single_rotations import (
+    QuaternionXyzw,
+    Vector,
+    about_x,
+    about_y,
+    about_z,
+    add,
+    conjugate,
+    exp,
+    log,
+    multiply,
+    rotate,
+    scale,
+    yaw,
+)
+
+_LEFT = (0.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A joint that a target may be of."""
+
+    entries: slice
+    is_ball: bool
+    link: int
+    parent: int
+    upright: QuaternionXyzw  # the child link's orientation where the character stands
+    fixed: QuaternionXyzw  # of the child in its parent at angle 0
+    mirror: float  # of a hinge's angle, on the other side
+
+    def mirrored(self, value: Vector) -> Vector:
+        """A rotation vector in joint axes, on the other side of the body."""
+        x, y, z = rotate(self.upright, value)
+        return rotate(conjugate(self.upright), (-x, y, -z))
+
+
+@dataclass
+class Pose:
+    """Targets of all entries, message form."""
+
+    position: FloatArray  # (n,)
+    velocity: FloatArray  # (n,)
+
+
+class PoseMaker:
+    """Makes the targets of each tick."""
+
+    def __init__(
+        self,
+        character: Character,
+        machine: Machine,
+        legs: Mapping[str, Leg],
+        upright: list[QuaternionXyzw],  # of each link of a standing character that faces along x
+        period: float,  # s
+    ) -> None:
+        self._layout: JointLayout = character.layout
+        self._machine, self._legs, self._period = machine, legs, period
+        self._rest = np.array(character.rest_position)
+        self._joints = _joints(character, upright)
+
+    def free(self, state: State, at: Situation) -> Pose:
+        """The targets of a state's own joints; all others have those of the rest pose."""
+        pose = Pose(self._rest.copy(), np.zeros(self._layout.size))
+        pose.position[:6] = at.body.position[:6]
+        for target in state.targets:
+            joint = self._joints[self._machine.joint(target.joint, at.stance)]
+            if joint.is_ball:
+                pose.position[joint.entries] = self._ball(joint, target, at)
+            else:
+                angle = target.value[0] * (1.0 if at.mirror > 0.0 else joint.mirror)
+                pose.position[joint.entries] = angle
+        return pose
+
+    def _ball(self, joint: _Joint, target: JointTarget, at: Situation) -> Vector:
+        """The rotation vector of a ball joint's target, mirrored where the right foot swings."""
+        if not target.in_world:
+            return target.value if at.mirror > 0.0 else joint.mirrored(target.value)
+        roll, pitch, turn = target.value
+        gains, mirror = target.feedback, at.mirror
+        forward = laws.feedback_angle(-pitch, at.centre[0], at.velocity[0], *gains.sagittal)
+        left = laws.feedback_angle(mirror * roll, at.centre[1], at.velocity[1], *gains.coronal)
+        wanted = multiply(
+            about_z(at.course.heading + mirror * turn), multiply(about_y(-forward), about_x(left))
+        )
+        child = multiply(wanted, joint.upright)
+        parent = at.body.turns[joint.parent]
+        return log(multiply(conjugate(multiply(parent, joint.fixed)), child))
+
+    def set_leg(self, pose: Pose, side: str, body: Body, now: FootPose, later: FootPose) -> None:
+        """Have a leg lead its foot through two poses, one period apart, while the root moves."""
+        leg, period = self._legs[side], self._period
+        vx, vy, vz, wx, wy, wz = body.velocity[:6].tolist()
+        root = add(body.root, scale(period, (vx, vy, vz)))
+        root_xyzw = multiply(body.root_xyzw, exp(scale(period, (wx, wy, wz))))
+        here = leg.angles(body.root, body.root_xyzw, now, _facing(now))
+        there = leg.angles(root, root_xyzw, later, _facing(later))
+        rate = 1.0 / period
+        for entries, start, end in (
+            (leg.hip_entries, here.hip, there.hip),
+            (leg.ankle_entries, here.ankle, there.ankle),
+        ):
+            pose.position[entries] = start
+            pose.velocity[entries] = scale(rate, log(multiply(conjugate(exp(start)), exp(end))))
+        pose.position[leg.knee_entry] = here.knee
+        pose.velocity[leg.knee_entry] = rate * (there.knee - here.knee)
+
+    def follow_leg(self, pose: Pose, side: str, body: Body) -> None:
+        """Have a leg's targets be where it is: nothing is asked of its joints."""
+        leg = self._legs[side]
+        for entries in (leg.hip_entries, leg.ankle_entries):
+            pose.position[entries] = body.position[entries]
+            pose.velocity[entries] = body.velocity[entries]
+        pose.position[leg.knee_entry] = body.position[leg.knee_entry]
+        pose.velocity[leg.knee_entry] = body.velocity[leg.knee_entry]
+
+    def hip(self, side: str, body: Body) -> Vector:
+        """Where the hip of a side is, m, world."""
+        return add(body.root, rotate(body.root_xyzw, self._legs[side].hip_in_root))
+
+    def between(self, start: FloatArray, end: FloatArray, share: float) -> FloatArray:
+        """Positions (n,) a share of the way from one to another, rotations the shorter way."""
+        layout = self._layout
+        a, b = layout.configuration(start), layout.configuration(end)
+        way = layout.difference(a, b)
+        mixed: FloatArray = start + share * way
+        for entries in layout.rotation_entries:
+            x, y, z = start[entries].tolist()
+            turn = exp(scale(share, _vector(way[entries])))
+            mixed[entries] = log(multiply(exp((x, y, z)), turn))
+        return mixed
+
+
+def _facing(foot: FootPose) -> Vector:
+    return rotate(about_z(yaw(foot.turn)), _LEFT)
+
+
+def _vector(values: FloatArray) -> Vector:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def _joints(character: Character, upright: list[QuaternionXyzw]) -> dict[str, _Joint]:
+    """The driven joints of a character by name."""
+    joints = {}
+    for row, link in enumerate(character.links):
+        joint = link.joint
+        if joint.type in (JointType.FIXED, JointType.FLOATING):
+            continue
+        axis = rotate(upright[row], joint.axis_in_child)
+        joints[joint.name] = _Joint(
+            entries=character.layout.joint(joint.name).entries,
+            is_ball=joint.type is JointType.SPHERICAL,
+            link=row,
+            parent=link.parent,
+            upright=upright[row],
+            fixed=multiply(conjugate(upright[link.parent]), upright[row]),
+            mirror=1.0 if abs(axis[1]) > abs(axis[0]) + abs(axis[2]) else -1.0,
+        )
+    return joints

@@ -1,0 +1,115 @@
+"""A body on the way that it is told to go: what balance laws and ends of states look at."""
+
+import math
+from dataclasses import dataclass
+
+from controller_node.behaviours.state_machine import laws
+from controller_node.behaviours.state_machine.body import Body, Foot, in_frame, in_world
+from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.references.steering.reference import Course
+from msgs_config.geometry.single_rotations import Vector, add, subtract
+
+_LEAST_HEIGHT = 0.3  # m, of the centre of mass, for the rate of the pendulum
+_LONGEST = 4.0  # units of the pendulum's time, that it is predicted
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """Lengths are along the heading (x), to its left (y) and up, from the stance sole, in m."""
+
+    body: Body
+    course: Course
+    stance: str  # side
+    swing: str
+    mirror: float  # 1 where the swing foot is the left one, else -1
+    rate: float  # 1/s, of the inverted pendulum
+    centre: Vector  # of mass
+    velocity: Vector  # m/s, of the centre of mass
+    other: Vector  # the swing sole
+
+    @property
+    def extrapolated(self) -> tuple[float, float]:
+        """The extrapolated centre of mass."""
+        x, y, _ = self.centre
+        vx, vy, _ = self.velocity
+        return (
+            laws.extrapolated_centre(x, vx, self.rate),
+            laws.extrapolated_centre(y, vy, self.rate),
+        )
+
+    def later(self, pressure: Vector, time: float) -> tuple[tuple[float, float], ...]:
+        """Place and velocity of the centre of mass, along x and y, after a time on a pressure."""
+        grown = math.exp(min(self.rate * max(time, 0.0), _LONGEST))
+        cosh, sinh = 0.5 * (grown + 1.0 / grown), 0.5 * (grown - 1.0 / grown)
+        pairs = []
+        for axis in (0, 1):
+            away, speed = self.centre[axis] - pressure[axis], self.velocity[axis]
+            place = pressure[axis] + away * cosh + speed / self.rate * sinh
+            pairs.append((place, away * self.rate * sinh + speed * cosh))
+        return tuple(pairs)
+
+    def foot(self, side: str) -> Foot:
+        """The foot of a side."""
+        return self.body.feet[side]
+
+    def local(self, point: Vector) -> Vector:
+        """A point of the world, from the stance sole along the heading."""
+        return in_frame(self.course.heading, subtract(point, self.foot(self.stance).sole))
+
+    def world(self, point: Vector) -> Vector:
+        """The inverse of `local`."""
+        return add(self.foot(self.stance).sole, in_world(self.course.heading, point))
+
+
+def situation_of(body: Body, course: Course, stance: str, swing: str, gravity: float) -> Situation:
+    """The situation of a body on a course, one of whose sides is the stance side."""
+    sole, heading = body.feet[stance].sole, course.heading
+    centre = in_frame(heading, subtract(body.centre, sole))
+    other = in_frame(heading, subtract(body.feet[swing].sole, sole))
+    return Situation(
+        body=body,
+        course=course,
+        stance=stance,
+        swing=swing,
+        mirror=1.0 if swing == "left" else -1.0,
+        rate=laws.pendulum_rate(max(centre[2], _LEAST_HEIGHT), gravity),
+        centre=centre,
+        velocity=in_frame(heading, body.centre_velocity),
+        other=other,
+    )
+
+
+def quantity(name: str, at: Situation, time: float, legs: dict[str, Leg]) -> float:
+    """A quantity of `QUANTITIES` in a situation, `time` s after its state began."""
+    stance, swing = at.foot(at.stance), at.foot(at.swing)
+    course = at.course
+    if name == "time":
+        return time
+    if name == "stance_load":
+        return stance.load
+    if name == "swing_load":
+        return swing.load
+    if name == "load":
+        return stance.load + swing.load
+    if name == "height":
+        return at.body.root[2] - min(stance.sole[2], swing.sole[2])
+    if name == "climb":
+        return at.velocity[2]
+    if name == "speed":
+        return at.velocity[0]
+    if name == "command":
+        return max(abs(course.forward), abs(course.left), abs(course.turn))
+    if name == "command_ahead":
+        return course.forward
+    if name == "sway":
+        return at.extrapolated[1] * at.mirror
+    return _imbalance(at, legs[at.stance])
+
+
+def _imbalance(at: Situation, leg: Leg) -> float:
+    """How far the extrapolated centre of mass is outside of the feet's rectangle."""
+    x, y = at.extrapolated
+    beyond = []
+    for value, other, half in ((x, at.other[0], leg.half_length), (y, at.other[1], leg.half_width)):
+        beyond.append(max(min(0.0, other) - half - value, value - max(0.0, other) - half, 0.0))
+    return math.hypot(*beyond)

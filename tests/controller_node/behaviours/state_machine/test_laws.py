@@ -1,0 +1,97 @@
+"""The laws of balance, against the motion of the pendulum that they are made for."""
+
+import math
+
+import pytest
+
+from controller_node.behaviours.state_machine import laws
+
+GRAVITY, HEIGHT, STEP_TIME = 9.81, 0.85, 0.4
+RATE = laws.pendulum_rate(HEIGHT, GRAVITY)
+
+
+def falls(place: float, speed: float, foot: float, time: float) -> tuple[float, float]:
+    """Place and speed of a linear inverted pendulum after a time, by small steps."""
+    count = 20_000
+    step = time / count
+    for _ in range(count):
+        half = speed + 0.5 * step * RATE * RATE * (place - foot)
+        place += step * half
+        speed = half + 0.5 * step * RATE * RATE * (place - foot)
+    return place, speed
+
+
+def test_a_body_comes_to_rest_above_a_foot_at_its_extrapolated_centre() -> None:
+    foot = laws.extrapolated_centre(0.1, 0.7, RATE)
+
+    place, speed = falls(0.1, 0.7, foot, 1.0)
+
+    # what is left of the way and of the speed decays as exp(-w t)
+    assert foot - place == pytest.approx((foot - 0.1) * math.exp(-RATE), rel=1e-3)
+    assert speed == pytest.approx(RATE * (foot - place), rel=1e-3)
+
+
+def test_the_extrapolated_centre_is_where_the_pendulum_takes_it() -> None:
+    place, speed = falls(0.02, 0.3, -0.05, STEP_TIME)
+
+    begun = laws.extrapolated_centre(0.02, 0.3, RATE)
+    later = laws.extrapolated_later(begun, -0.05, RATE, STEP_TIME)
+
+    assert laws.extrapolated_centre(place, speed, RATE) == pytest.approx(later, rel=1e-6)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.4, 1.2])
+def test_steps_by_the_offsets_of_speed_and_width_repeat(speed: float) -> None:
+    """A pendulum that steps by them goes on at the speed, however it began: Hof's two results."""
+    width, x, y = 0.2, (0.0, 0.9), (0.05, -0.1)
+    foot, side = (0.0, 0.0), 1.0
+    track: list[tuple[float, float]] = []
+    for _ in range(40):
+        x, y = falls(*x, foot[0], STEP_TIME), falls(*y, foot[1], STEP_TIME)
+        foot = (
+            laws.extrapolated_centre(*x, RATE) - laws.offset_of_speed(speed, STEP_TIME, RATE),
+            laws.extrapolated_centre(*y, RATE)
+            + side * laws.offset_of_width(width, STEP_TIME, RATE),
+        )
+        track.append(foot)
+        side = -side
+    length = track[-1][0] - track[-2][0]
+    assert length / STEP_TIME == pytest.approx(speed, abs=1e-4)
+    assert abs(track[-1][1] - track[-2][1]) == pytest.approx(width, abs=1e-4)
+
+
+def test_the_neutral_point_keeps_the_speed() -> None:
+    """A leg swept evenly from there through half a stance is below the hip: it pushes no way."""
+    assert laws.neutral_placement(2.0, 2.0, 0.3, 0.1) == pytest.approx(0.3)
+    assert laws.neutral_placement(2.2, 2.0, 0.3, 0.1) > laws.neutral_placement(2.0, 2.0, 0.3, 0.1)
+    assert laws.neutral_placement(0.0, 0.0, 0.3, 0.1) == 0.0
+
+
+def test_the_pendulums_placement_brings_it_to_rest_upright() -> None:
+    """All energy of the speed goes into the rise to the top of the arc, and none is left."""
+    speed = 0.8
+    ahead = laws.pendulum_placement(speed, HEIGHT, GRAVITY)
+
+    length = math.hypot(ahead, HEIGHT)
+    assert GRAVITY * (length - HEIGHT) == pytest.approx(0.5 * speed * speed, rel=1e-9)
+
+
+def test_feedback_steps_to_where_the_body_goes() -> None:
+    assert laws.feedback_angle(0.4, 0.1, 0.5, 0.5, 0.2) == pytest.approx(0.4 + 0.05 + 0.1)
+    assert laws.feedback_angle(0.4, -0.1, -0.5, 0.5, 0.2) < 0.4
+
+
+def test_a_stance_hip_balances_torso_and_swing_hip() -> None:
+    # the torques on the torso of both hips together are what was wanted of it
+    torso, swing = 35.0, -12.0
+    stance = laws.stance_hip_torque(torso, swing)
+
+    assert -(stance + swing) == pytest.approx(torso)
+
+
+def test_a_smooth_step_begins_and_ends_at_rest() -> None:
+    step = 1e-4
+    assert (laws.smooth_step(0.0), laws.smooth_step(0.5), laws.smooth_step(1.0)) == (0.0, 0.5, 1.0)
+    assert laws.smooth_step(step) < step * step
+    assert 1.0 - laws.smooth_step(1.0 - step) < step * step
+    assert (laws.clearance(0.0), laws.clearance(0.5), laws.clearance(1.5)) == (0.0, 1.0, 0.0)
