@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from controller_node.behaviours.state_machine.leg import Leg
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.geometry import fixed_order
 from msgs_config.geometry.single_rotations import (
     QuaternionXyzw,
     Vector,
@@ -22,6 +23,7 @@ class Foot:
     """A foot in a state."""
 
     sole: Vector  # m, the middle
+    velocity: Vector  # m/s, of the foot's centre of mass
     turn: QuaternionXyzw  # against how it stands, facing along x
     load: float  # N, of what touches it, upwards
 
@@ -60,7 +62,12 @@ class BodyReader:
         self._model.update(position, velocity)
         origins, turns = self._model.link_poses()
         feet = {
-            side: _foot(leg, origins[leg.foot_link], turns[leg.foot_link], contacts)
+            side: _foot(
+                leg,
+                (origins[leg.foot_link], turns[leg.foot_link]),
+                fixed_order.apply(self._model.link_jacobian(leg.foot_link)[:3], velocity),
+                contacts,
+            )
             for side, leg in self._legs.items()
         }
         quaternions: list[QuaternionXyzw] = [(x, y, z, w) for x, y, z, w in turns.tolist()]
@@ -79,11 +86,15 @@ class BodyReader:
         )
 
 
-def _foot(leg: Leg, origin: FloatArray, turn: FloatArray, contacts: FloatArray) -> Foot:
+def _foot(
+    leg: Leg, frame: tuple[FloatArray, FloatArray], velocity: FloatArray, contacts: FloatArray
+) -> Foot:
+    """A foot whose link has a frame (origin, orientation) and a velocity in the world."""
+    origin, turn = frame
     x, y, z, w = turn.tolist()
     sole = add(_vector(origin), rotate((x, y, z, w), leg.sole_in_foot))
     against = multiply((x, y, z, w), conjugate(leg.upright[2]))
-    return Foot(sole, against, float(contacts[leg.foot_link, 2]))
+    return Foot(sole, _vector(velocity), against, float(contacts[leg.foot_link, 2]))
 
 
 def _vector(values: FloatArray) -> Vector:

@@ -79,6 +79,8 @@ def _check_target(
     """A ball joint's target has three numbers, a hinge's one."""
     kind = kinds[machine.joint(target.joint, next(iter(machine.sides)))]
     key = f"{place}.targets.{target.joint}"
+    if target.likeness is not None and kind is not JointType.SPHERICAL:
+        raise ConfigurationError(f"{key}: what goes with a leg must be a ball joint")
     if kind is JointType.SPHERICAL and target.size == 1:
         raise ConfigurationError(f"{key}: it is {kind.value}, and must have three numbers")
     if kind is not JointType.SPHERICAL and target.size == 3:

@@ -73,6 +73,14 @@ class Feedback:
 
 
 @dataclass(frozen=True)
+class Likeness:
+    """A joint that goes with a leg, as an arm does with that of the other side."""
+
+    role: str  # of the leg
+    share: Vector  # rad, in joint axes, for each rad that the leg is ahead
+
+
+@dataclass(frozen=True)
 class JointTarget:
     """A joint's target for a swing leg on the left; it is mirrored for one on the right."""
 
@@ -81,6 +89,7 @@ class JointTarget:
     in_world: bool = False  # axes ahead, to the left and up of the way that it is to face
     feedback: Feedback = Feedback()
     size: int = 3  # numbers that the file has
+    likeness: Likeness | None = None
 
 
 @dataclass(frozen=True)
@@ -158,6 +167,7 @@ class Machine:
     sides: dict[str, dict[str, str]]  # by side: the names of its joints by their parts
     start: str
     states: dict[str, State]
+    acceleration: float = 1e9  # m/s^2, at which it takes over commanded velocities
 
     def joint(self, name: str, stance: str) -> str:
         """The character's joint of a name in a target, where a side is the stance side."""

@@ -3,6 +3,7 @@
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.state_machine.body import BodyReader
 from controller_node.behaviours.state_machine.check import check_machine
+from controller_node.behaviours.state_machine.description import Machine
 from controller_node.behaviours.state_machine.drive import Drive
 from controller_node.behaviours.state_machine.file import read_machine
 from controller_node.behaviours.state_machine.leg import make_leg, standing_frames
@@ -31,8 +32,12 @@ def _state_machine(character: Character, values: Values) -> BehaviourChoice:
 def make_kit(character: Character, values: Values) -> MachineKit:
     """What a machine works with. Raises ConfigurationError if it does not fit the character."""
     machine = read_machine(values.text("machine"))
+    return kit_of(machine, character, values.number("gravity"), 1.0 / values.integer("rate"))
+
+
+def kit_of(machine: Machine, character: Character, gravity: float, period: float) -> MachineKit:
+    """What a machine works with: m/s^2, and s of a tick. Raises as `make_kit`."""
     check_machine(machine, character)
-    gravity, period = values.number("gravity"), 1.0 / values.integer("rate")
     model, layout = DynamicsModel(character, gravity), character.layout
     legs = {
         side: make_leg(character, *(joints[part] for part in ("hip", "knee", "ankle")))

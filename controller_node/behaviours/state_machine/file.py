@@ -19,6 +19,7 @@ from controller_node.behaviours.state_machine.description import (
     Feedback,
     Gains,
     JointTarget,
+    Likeness,
     Machine,
     Placement,
     PressureTarget,
@@ -33,7 +34,7 @@ from msgs_config.geometry.single_rotations import Vector
 from msgs_config.mappings import MappingReader
 
 MACHINES_DIRECTORY = Path(__file__).parent / "data"
-_KEYS = ["sides", "start", "includes", "gains", "bounds", "states"]
+_KEYS = ["sides", "start", "includes", "acceleration", "gains", "bounds", "states"]
 _STATE_KEYS = [
     *("feet", "duration", "blend", "root", "pressure", "placement", "targets", "gains"),
     *("efforts", "tracks", "ends"),
@@ -68,21 +69,28 @@ def read_machine(name: str) -> Machine:
     Raises:
         ConfigurationError: names the file, the key, the value and what would be right.
     """
-    return _read(machine_path(name), _DEPTH)
+    path = machine_path(name)
+    return make_machine(path, read_content(path))
 
 
-def _read(path: Path, depth: int) -> Machine:
+def read_content(path: Path) -> dict[str, Any]:
+    """What a file has. Raises ConfigurationError if it is no YAML mapping."""
+    text = files.read_text(path, ConfigurationError)
+    return files.parse_yaml_mapping(path, text, ConfigurationError)
+
+
+def make_machine(path: Path, content: dict[str, Any], depth: int = _DEPTH) -> Machine:
+    """The machine of a file's content, which may include so many files, one in another."""
     if not depth:
         raise ConfigurationError(f"{path}: more than {_DEPTH} files include each other")
-    text = files.read_text(path, ConfigurationError)
-    content = files.parse_yaml_mapping(path, text, ConfigurationError)
     reader = MappingReader(path, content, ConfigurationError)
     reader.check_keys(_KEYS)
     sides = _sides(reader)
     states: dict[str, State] = {}
     includes = reader.part("includes")
     for prefix in includes.content:
-        included = _read(_beside(path, includes.text(prefix)), depth - 1)
+        other = _beside(path, includes.text(prefix))
+        included = make_machine(other, read_content(other), depth - 1)
         if included.sides != sides:
             raise ConfigurationError(f"{path}: the sides must be those of {included.file}")
         for state in included.states.values():
@@ -92,9 +100,10 @@ def _read(path: Path, depth: int) -> Machine:
     parts = reader.part("states")
     for name in parts.content:
         states[name] = _state(name, parts.part(name), gains, bounds)
+    acceleration = reader.number("acceleration", 1e9, 1e-3, 1e9)
     if not states:
         raise reader.wrong("states", content.get("states"), "a mapping of one state or more")
-    return Machine(path, sides, reader.text("start"), states)
+    return Machine(path, sides, reader.text("start"), states, acceleration)
 
 
 def _beside(path: Path, name: str) -> Path:
@@ -189,6 +198,8 @@ def _target(joint: str, reader: MappingReader) -> JointTarget:
     value = reader.content[joint]
     if isinstance(value, dict):
         part = reader.part(joint)
+        if "like" in part.content:
+            return _likeness(joint, part)
         part.check_keys(("roll", "pitch", "yaw", "sagittal", "coronal"))
         angles = tuple(part.number(axis, 0.0, -10.0, 10.0) for axis in ("roll", "pitch", "yaw"))
         pairs = [part.numbers(key, 2, default=[0.0, 0.0]) for key in ("sagittal", "coronal")]
@@ -199,6 +210,15 @@ def _target(joint: str, reader: MappingReader) -> JointTarget:
         return JointTarget(joint, (x, y, z))
     angle = reader.number(joint, None, -1e3, 1e3)
     return JointTarget(joint, (angle, 0.0, 0.0), size=1)
+
+
+def _likeness(joint: str, part: MappingReader) -> JointTarget:
+    """The target of a joint that goes with a leg."""
+    part.check_keys(("like", "share", "rest"))
+    role = part.choice("like", [SWING, STANCE])
+    x, y, z = part.numbers("share", 3, (-10.0, 10.0))
+    a, b, c = part.numbers("rest", 3, (-10.0, 10.0), default=[0.0, 0.0, 0.0])
+    return JointTarget(joint, (a, b, c), likeness=Likeness(role, (x, y, z)))
 
 
 def _efforts(reader: MappingReader) -> dict[str, str | Vector]:

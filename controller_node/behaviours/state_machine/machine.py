@@ -1,6 +1,6 @@
 """The behaviour `state_machine`, for one episode."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from controller_node.behaviours.state_machine.support import Contact
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.steering.reference import Course
+from controller_node.references.steering.velocity import within
 from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
@@ -84,7 +85,7 @@ class StateMachine:
     def advance(self, seen: Observation) -> BehaviourOutput:
         """The targets and efforts of a tick; the state before them may end first."""
         kit = self._kit
-        self._course = seen.course or self._course
+        self._course = self._followed(seen.course or _STANDING)
         body = kit.reader.read(seen.position, seen.velocity, seen.contacts)
         at = situation_of(body, self._course, self._stance, self._swing, kit.gravity)
         if not self._entered:
@@ -104,6 +105,15 @@ class StateMachine:
             gains = GainArrays(self._none, self._none, self._none, seen.gains.effort_limits)
         self._target.pose = pose
         return BehaviourOutput(self._phase, self._target, gains, effort)
+
+    def _followed(self, course: Course) -> Course:
+        """A course whose velocity is taken over no faster than the machine can."""
+        most, before = self._kit.machine.acceleration * self._kit.period, self._course
+        return replace(
+            course,
+            forward=before.forward + within(course.forward - before.forward, most),
+            left=before.left + within(course.left - before.left, most),
+        )
 
     def _go_on(self, now: float, at: Situation) -> Situation:
         """Go over to the next state if the present one ends: once a tick at most."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from controller_node.behaviours.state_machine import laws
 from controller_node.behaviours.state_machine.body import Body
-from controller_node.behaviours.state_machine.description import JointTarget, Machine, State
+from controller_node.behaviours.state_machine.description import STANCE, JointTarget, Machine, State
 from controller_node.behaviours.state_machine.leg import FootPose, Leg
 from controller_node.behaviours.state_machine.situation import Situation
 from msgs_config.arrays import FloatArray
@@ -80,17 +80,28 @@ class PoseMaker:
         pose.position[:6] = at.body.position[:6]
         for target in state.targets:
             joint = self._joints[self._machine.joint(target.joint, at.stance)]
-            if joint.is_ball:
+            if target.likeness is not None:
+                lead, rate = at.lead(at.stance if target.likeness.role == STANCE else at.swing)
+                share = self._mirrored(joint, target.likeness.share, at)
+                rest = self._mirrored(joint, target.value, at)
+                pose.position[joint.entries] = add(rest, scale(lead, share))
+                pose.velocity[joint.entries] = scale(rate, share)
+            elif joint.is_ball:
                 pose.position[joint.entries] = self._ball(joint, target, at)
             else:
                 angle = target.value[0] * (1.0 if at.mirror > 0.0 else joint.mirror)
                 pose.position[joint.entries] = angle
         return pose
 
+    @staticmethod
+    def _mirrored(joint: _Joint, value: Vector, at: Situation) -> Vector:
+        """A rotation vector in joint axes, as it is for the present swing foot."""
+        return value if at.mirror > 0.0 else joint.mirrored(value)
+
     def _ball(self, joint: _Joint, target: JointTarget, at: Situation) -> Vector:
         """The rotation vector of a ball joint's target, mirrored where the right foot swings."""
         if not target.in_world:
-            return target.value if at.mirror > 0.0 else joint.mirrored(target.value)
+            return self._mirrored(joint, target.value, at)
         roll, pitch, turn = target.value
         gains, mirror = target.feedback, at.mirror
         forward = laws.feedback_angle(-pitch, at.centre[0], at.velocity[0], *gains.sagittal)

@@ -52,6 +52,15 @@ class Situation:
         """The foot of a side."""
         return self.body.feet[side]
 
+    def lead(self, side: str) -> tuple[float, float]:
+        """How far a leg is ahead of the root, rad, and how fast it goes there, rad/s."""
+        foot, heading = self.body.feet[side], self.course.heading
+        x, y, z, *_ = self.body.velocity.tolist()
+        away = in_frame(heading, subtract(foot.sole, self.body.root))
+        rate = in_frame(heading, subtract(foot.velocity, (x, y, z)))
+        length = max(-away[2], _LEAST_HEIGHT)
+        return math.atan2(away[0], length), rate[0] / length
+
     def local(self, point: Vector) -> Vector:
         """A point of the world, from the stance sole along the heading."""
         return in_frame(self.course.heading, subtract(point, self.foot(self.stance).sole))

@@ -1,0 +1,1 @@
+"""What machines can do: trials in the simulator, their figures, and the search for parameters."""
