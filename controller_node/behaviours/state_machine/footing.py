@@ -46,7 +46,7 @@ def _pressure_on_one(state: State, at: Situation, time: float) -> tuple[float, f
     grown = math.exp(rate * min(time, step_time))
     course, width = at.course, state.placement.width
     nominal = (
-        laws.offset_of_speed(course.forward, step_time, rate) * grown,
+        laws.offset_of_speed(state.placement.pace * course.forward, step_time, rate) * grown,
         (
             at.mirror * laws.offset_of_width(width, step_time, rate)
             + laws.offset_of_speed(course.left, step_time, rate)
@@ -87,18 +87,19 @@ def landing(state: State, at: Situation, time: float, pressure: Vector) -> tuple
     """Where the swing foot is to land; from the stance sole, as is the centre of pressure."""
     law, step_time, rate, course = state.placement, state.duration, at.rate, at.course
     (x, vx), (y, vy) = at.later(pressure, step_time - time)
+    forward = law.pace * course.forward
     if law.law == "extrapolated":
-        x += vx / rate - laws.offset_of_speed(course.forward, step_time, rate)
+        x += vx / rate - laws.offset_of_speed(forward, step_time, rate)
         y += vy / rate - laws.offset_of_speed(course.left, step_time, rate)
         y += at.mirror * laws.offset_of_width(law.width, step_time, rate)
     elif law.law == "neutral":
-        x += laws.neutral_placement(vx, course.forward, step_time, law.gain)
+        x += laws.neutral_placement(vx, forward, step_time, law.gain)
         y += laws.neutral_placement(vy, course.left, step_time, law.gain)
         y += at.mirror * 0.5 * law.width
     else:
         height = max(at.centre[2], _NARROW)
         gravity = rate * rate * height
-        x += laws.pendulum_placement(vx, height, gravity) - law.gain * course.forward
+        x += laws.pendulum_placement(vx, height, gravity) - law.gain * forward
         y += laws.pendulum_placement(vy, height, gravity) - law.gain * course.left
         y += at.mirror * 0.5 * law.width
     return reachable(law, x + law.ahead, y, at.mirror)

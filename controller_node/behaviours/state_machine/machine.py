@@ -77,6 +77,7 @@ class StateMachine:
         self._entered = False
         self._course = _STANDING
         self._feet: dict[str, SwingFoot] = {}  # by role
+        self._goal: tuple[float, float] | None = None  # of a foot that steps
         self._target = PoseTarget(kit.layout)
         self._before: tuple[FloatArray, float] | None = None  # targets, height, at the last change
         self._last: tuple[FloatArray, float] | None = None  # those of the last tick
@@ -131,7 +132,7 @@ class StateMachine:
         self._state, self._since, self._entered = state, now, True
         self._before = self._last
         sides = {STANCE: self._stance, SWING: self._swing}
-        self._feet = {}
+        self._feet, self._goal = {}, None
         for role, side in sides.items():
             if state.feet[role] == STEP:
                 self._feet[role] = SwingFoot.leaving(at.foot(side))
@@ -171,7 +172,9 @@ class StateMachine:
             if role in state.standing:
                 kit.poses.follow_leg(pose, side, at.body)
             elif doing == STEP:
-                goal = landing(state, at, time, pressure)
+                if self._goal is None or time < state.placement.fixed * state.duration:
+                    self._goal = landing(state, at, time, pressure)
+                goal = self._goal
                 poses = [self._feet[role].pose(state, at, when, goal) for when in whens]
                 kit.poses.set_leg(pose, side, at.body, *poses)
             elif doing == REACH:
