@@ -141,9 +141,7 @@ def walked(
         effort += float(np.sum(moment.effort[6:] ** 2)) / 1e4
     fell = last < trial.seconds - 2.0 / trial.rate
     mean = 1.0 / max(count, 1)
-    return Walk(
-        last, fell, ahead * mean, wanted * mean, aside * mean, turned * mean, effort * mean
-    )
+    return Walk(last, fell, ahead * mean, wanted * mean, aside * mean, turned * mean, effort * mean)
 
 
 def _heading_error(moment: Moment) -> float:

@@ -93,7 +93,7 @@ class Drive:
         Each joint's acceleration is that of implicit PD control of its own inertia. Without
         contacts the body falls, and joints move as wanted all the same.
         """
-        body, period = at.body, self._period
+        body = at.body
         acceleration = self._joint_accelerations(pose, body, gains)
         for role in state.standing:
             leg = self._legs[at.stance if role == STANCE else at.swing]
@@ -111,7 +111,9 @@ class Drive:
         )
         for role in state.standing:
             side = at.stance if role == STANCE else at.swing
-            effort[self._legs[side].ankle_entries] += self._ankle_effort(side, at.body, period)
+            effort[self._legs[side].ankle_entries] += self._ankle_effort(
+                side, at.body, at.course.heading
+            )
         return self.added(state, at, effort)
 
     def _joint_accelerations(self, pose: Pose, body: Body, gains: GainArrays) -> FloatArray:
@@ -146,7 +148,7 @@ class Drive:
         )
         return np.array((rise, *rotate(conjugate(body.root_xyzw), in_world(heading, angular))))
 
-    def _ankle_effort(self, side: str, body: Body, period: float) -> FloatArray:
+    def _ankle_effort(self, side: str, body: Body, heading: float) -> FloatArray:
         """What an ankle (3,) adds so that the sole is level and the knee above the foot, N m."""
         leg, foot = self._legs[side], body.feet[side]
         foot_xyzw = multiply(foot.turn, leg.upright[2])
@@ -156,7 +158,7 @@ class Drive:
         along = scale(1.0 / max(norm(along), 1e-9), along)
         thigh = body.turns[leg.thigh_link]
         ahead = rotate(thigh, rotate(conjugate(leg.upright[0]), _LEFT))
-        wanted = rotate(about_z(yaw(foot.turn)), _LEFT)
+        wanted = rotate(about_z(heading), _LEFT)
         jacobian = self._model.link_jacobian(leg.thigh_link)
         spin = fixed_order.apply(jacobian[3:], body.velocity).tolist()
         swivel = _SWIVEL[0] * dot(cross(ahead, wanted), along)
@@ -164,7 +166,7 @@ class Drive:
         tilt = log(multiply(about_z(yaw(foot.turn)), conjugate(foot.turn)))
         jacobian = self._model.link_jacobian(leg.foot_link)
         rate = fixed_order.apply(jacobian[3:], body.velocity).tolist()
-        p, d = _LEVEL
+        (p, d), period = _LEVEL, self._period
         damped = d + period * p
         share = leg.foot_inertia / (leg.foot_inertia + period * damped)
         level = [share * (p * tilt[axis] - damped * rate[axis]) for axis in (0, 1)]

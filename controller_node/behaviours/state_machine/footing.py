@@ -46,7 +46,7 @@ def _pressure_on_one(state: State, at: Situation, time: float) -> tuple[float, f
     grown = math.exp(rate * min(time, step_time))
     course, width = at.course, state.placement.width
     nominal = (
-        laws.offset_of_speed(state.placement.pace * course.forward, step_time, rate) * grown,
+        laws.offset_of_speed(course.forward, step_time, rate) * grown,
         (
             at.mirror * laws.offset_of_width(width, step_time, rate)
             + laws.offset_of_speed(course.left, step_time, rate)
