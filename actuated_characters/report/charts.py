@@ -38,7 +38,7 @@ _MODES = {
     "BLEND": "tab:blue",
     "LIMP": "tab:brown",
 }
-_OTHER_MODE = "tab:pink"
+_OTHER_MODES = ("tab:pink", "tab:cyan", "tab:olive", "tab:gray", "tab:purple", "gold")
 _BAND = 0.04  # of a panel's height, that the modes take up at its top ...
 _BAND_ABOVE = 0.02  # ... and above it, where colours have a meaning
 _MOMENTS: dict[str, dict[str, Any]] = {
@@ -65,6 +65,15 @@ class Marks:
         each = (self.throws, self.resets, self.changes, self.pauses)
         return {name: times for name, times in zip(_MOMENTS, each, strict=True) if times}
 
+    @property
+    def _mode_colors(self) -> dict[str, str]:
+        """The colour of each mode, and of each state of a machine, in their order."""
+        colors: dict[str, str] = {}
+        for _, _, name in self.modes:
+            others = sum(mode not in _MODES for mode in colors)
+            colors.setdefault(name, _MODES.get(name, _OTHER_MODES[others % len(_OTHER_MODES)]))
+        return colors
+
     def draw(self, axes: Axes, *, filled: bool = True) -> None:
         """Draw them over a panel whose x is time; not filled, where colours have a meaning."""
         for start, duration in self.pushes:
@@ -77,8 +86,9 @@ class Marks:
             for time in times:
                 axes.axvline(time, linewidth=1.0, **_MOMENTS[name])
         band = (1.0 - _BAND, 1.0) if filled else (1.0, 1.0 + _BAND_ABOVE)
+        colors = self._mode_colors
         for start, duration, name in self.modes:
-            color = _MODES.get(name, _OTHER_MODE)
+            color = colors[name]
             end = start + duration
             axes.axvspan(start, end, *band, color=color, linewidth=0, clip_on=False)
 
@@ -87,8 +97,7 @@ class Marks:
         handles: list[Line2D | Patch] = []
         if self.pushes:
             handles.append(Patch(color=_PUSH, alpha=0.5, label="push"))
-        for mode in dict.fromkeys(name for _, _, name in self.modes):
-            handles.append(Patch(color=_MODES.get(mode, _OTHER_MODE), label=mode))
+        handles += [Patch(color=color, label=mode) for mode, color in self._mode_colors.items()]
         handles += [Line2D([], [], label=name, **_MOMENTS[name]) for name in self._moments]
         if handles:
             figure.legend(

@@ -22,6 +22,12 @@ class ModeSpan:
     duration: float  # s
     facts: Mapping[str, Any]  # that led to it
 
+    @property
+    def label(self) -> str:
+        """The mode, or of a state machine its state and the foot that stands."""
+        state, stance = self.facts.get("state"), self.facts.get("stance")
+        return self.mode if state is None else f"{state}, {stance}"
+
 
 @dataclass(frozen=True)
 class ThrowMark:

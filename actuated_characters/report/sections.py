@@ -69,7 +69,7 @@ class CharacterReport:
             changes=sorted({change.time for change in facts.changes}),
             pauses=recording.times[self._pauses].tolist(),
             throws=[throw.start for throw in facts.throws],
-            modes=[(span.start, span.duration, span.mode) for span in self._modes],
+            modes=[(span.start, span.duration, span.label) for span in self._modes],
         )
         self._timeline = charts.Timeline(recording.times, breaks, marks)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_velocities import plan_velocities
-from actuated_characters.runs.planned_wrenches import PlannedPush, parse_push, push_schedule
+from actuated_characters.runs.planned_wrenches import parse_push, push_schedule
 from controller_node.behaviours.base import Observation
 from controller_node.behaviours.state_machine.description import Machine
 from controller_node.behaviours.state_machine.factory import kit_of

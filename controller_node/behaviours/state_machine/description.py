@@ -115,6 +115,7 @@ QUANTITIES = {
     "height": "m of the root above the lower sole",
     "climb": "m/s of the centre of mass upwards",
     "speed": "m/s of the centre of mass ahead",
+    "motion": "m/s of the centre of mass over the ground",
     "command": "m/s and rad/s, the largest part of the commanded velocity",
     "command_ahead": "m/s, the commanded velocity ahead",
     "sway": "m from the stance sole towards the other, of the extrapolated centre of mass",

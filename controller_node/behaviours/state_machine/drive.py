@@ -109,11 +109,9 @@ class Drive:
             state.bounds,
             (body.root, body.root_xyzw, body.centre),
         )
-        for role in state.standing:
-            side = at.stance if role == STANCE else at.swing
-            effort[self._legs[side].ankle_entries] += self._ankle_effort(
-                side, at.body, at.course.heading
-            )
+        for contact in contacts:
+            leg = self._legs[contact.side]
+            effort[leg.ankle_entries] += self._ankle_effort(contact, at.body, at.course.heading)
         return self.added(state, at, effort)
 
     def _joint_accelerations(self, pose: Pose, body: Body, gains: GainArrays) -> FloatArray:
@@ -148,9 +146,9 @@ class Drive:
         )
         return np.array((rise, *rotate(conjugate(body.root_xyzw), in_world(heading, angular))))
 
-    def _ankle_effort(self, side: str, body: Body, heading: float) -> FloatArray:
+    def _ankle_effort(self, contact: Contact, body: Body, heading: float) -> FloatArray:
         """What an ankle (3,) adds so that the sole is level and the knee above the foot, N m."""
-        leg, foot = self._legs[side], body.feet[side]
+        leg, foot = self._legs[contact.side], body.feet[contact.side]
         foot_xyzw = multiply(foot.turn, leg.upright[2])
         hip = add(body.root, rotate(body.root_xyzw, leg.hip_in_root))
         ankle = subtract(foot.sole, rotate(foot_xyzw, leg.sole_in_foot))
@@ -170,7 +168,8 @@ class Drive:
         damped = d + period * p
         share = leg.foot_inertia / (leg.foot_inertia + period * damped)
         level = [share * (p * tilt[axis] - damped * rate[axis]) for axis in (0, 1)]
-        torque = add((level[0], level[1], 0.0), scale(-swivel, along))
+        turn = -share * d * rate[2]
+        torque = add((level[0], level[1], turn), scale(-contact.share * swivel, along))
         return np.array(rotate(conjugate(foot_xyzw), torque))
 
     def added(self, state: State, at: Situation, effort: FloatArray) -> FloatArray:

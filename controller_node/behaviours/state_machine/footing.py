@@ -32,7 +32,7 @@ def contacts_of(state: State, at: Situation, time: float, legs: dict[str, Leg]) 
         sole = at.local(at.foot(side).sole)
         inside = [sole[axis] + within(wanted[axis] - sole[axis], limits[axis]) for axis in (0, 1)]
         place = at.world((inside[0], inside[1], sole[2]))
-        return [Contact(legs[side].foot_link, 1.0, place)]
+        return [Contact(side, legs[side].foot_link, 1.0, place)]
     return _on_both(state, at, limits, legs)
 
 
@@ -78,8 +78,8 @@ def _on_both(
     stance = at.world((rest[0], rest[1], 0.0))
     swing = at.world((other[0] + rest[0], other[1] + rest[1], other[2]))
     return [
-        Contact(legs[at.stance].foot_link, 1.0 - share, stance),
-        Contact(legs[at.swing].foot_link, share, swing),
+        Contact(at.stance, legs[at.stance].foot_link, 1.0 - share, stance),
+        Contact(at.swing, legs[at.swing].foot_link, share, swing),
     ]
 
 

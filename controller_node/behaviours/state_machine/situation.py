@@ -106,6 +106,8 @@ def quantity(name: str, at: Situation, time: float, legs: dict[str, Leg]) -> flo
         return at.velocity[2]
     if name == "speed":
         return at.velocity[0]
+    if name == "motion":
+        return math.sqrt(at.velocity[0] * at.velocity[0] + at.velocity[1] * at.velocity[1])
     if name == "command":
         return max(abs(course.forward), abs(course.left), abs(course.turn))
     if name == "command_ahead":

@@ -35,6 +35,7 @@ _LEAST_HEIGHT = 0.1  # m, of the centre of mass above the soles
 class Contact:
     """A foot that carries a share of the load, at a centre of pressure."""
 
+    side: str
     link: int
     share: float  # of 1
     pressure: Vector  # m, world

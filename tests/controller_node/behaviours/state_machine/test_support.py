@@ -41,7 +41,7 @@ def solve(wanted: np.ndarray, bounds: Bounds) -> tuple[np.ndarray, np.ndarray, D
     effort = support_effort(
         model,
         wanted,
-        [Contact(FOOT, 1.0, pressure)],
+        [Contact("right", FOOT, 1.0, pressure)],
         bounds,
         ((x, y, z), (qx, qy, qz, qw), (cx, cy, cz)),
     )

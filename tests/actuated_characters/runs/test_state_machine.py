@@ -1,0 +1,74 @@
+"""A state machine over topics: the states of one process, its states on ~/mode, replayed."""
+
+from pathlib import Path
+
+import pytest
+
+from actuated_characters.bags.recording import read_recording
+from actuated_characters.replay.replay import replay
+from actuated_characters.replay.through_topics import replay_states
+from actuated_characters.report.reactions import mode_spans
+from actuated_characters.runs.execution import run_in_process
+from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.planned_velocities import PlannedVelocity, plan_velocities
+from actuated_characters.runs.planned_wrenches import parse_push
+from actuated_characters.runs.run_directory import prepare_directory
+from benchmarks.athletics.trial import Trial, moments
+from controller_node.behaviours.state_machine.file import read_machine
+from tests.support.ros import Processes
+from tests.support.runs import Run, run_plan, summary_of
+
+COMMANDS = "0.5,0,0.3@0.2 0,0,0@1.8"
+
+
+def planned() -> tuple[RunPlan, list[PlannedVelocity]]:
+    plan = make_plan("humanoid", 3.0, {}, {}, {"behaviour": "state_machine", "machine": "walk"})
+    return plan_velocities(plan, COMMANDS)
+
+
+@pytest.mark.slow
+def test_a_run_over_topics_is_the_one_in_one_process_and_is_replayed_to_the_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, velocities = planned()
+    push = parse_push("root:60,0,0@1.1", plan)
+    alone, sent = tmp_path / "alone", tmp_path / "sent"
+    prepare_directory(alone, overwrite=False)
+    run_in_process(plan, alone, pushes=[push])
+
+    run_plan(plan, sent, velocities=velocities, pushes=[push])
+
+    assert summary_of(sent)["state_hash"] == summary_of(alone)["state_hash"]
+    recording = read_recording(sent)
+    assert recording.position[-1, 0] - recording.position[0, 0] > 0.2
+    labels = [span.label for span in mode_spans(recording)]
+    assert labels[:4] == ["stand, right", "shift, right", "step, right", "step, left"]
+    assert replay([recording]).identical
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    again = replay_states(sent, progress=lambda _: None, tell=lambda _: None)
+    assert again.identical and again.states == 721
+
+
+@pytest.mark.slow
+def test_a_trial_has_the_states_of_a_run() -> None:
+    """What the benchmarks and the search for parameters run is the product, to the bit."""
+    from actuated_characters.runs.in_process import ticks_in_process
+
+    trial = Trial(1.6, "0.5,0,0@0.1", ("root:60,0,0@1.1",))
+    plan = trial.plan()
+    pushes = [parse_push(text, plan) for text in trial.pushes]
+
+    ticks = [tick.state for tick in ticks_in_process(plan, pushes)]
+    seen = list(moments(trial, read_machine("walk"), plan))
+
+    assert len(seen) == len(ticks) == 384
+    for moment, state in zip(seen, ticks, strict=True):
+        assert (moment.position == state.position).all()
+        assert (moment.velocity == state.velocity).all()
+
+
+def test_the_command_says_what_is_wrong_with_a_machine(processes: Processes) -> None:
+    run = Run(processes, "run", "--machine", "wlak", "--duration", "1")
+
+    run.process.wait(60.0)
+    assert "unknown machine 'wlak'; did you mean 'walk'?" in run.error

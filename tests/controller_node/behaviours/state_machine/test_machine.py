@@ -1,0 +1,171 @@
+"""The state machine `walk` in the simulator, and what other machines' states do there."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.planned_velocities import plan_velocities
+from actuated_characters.runs.planned_wrenches import parse_push
+from controller_node.parameters import make_controller
+
+MACHINE = {"behaviour": "state_machine"}
+SIDES = """
+sides:
+  right: {hip: right_hip, knee: right_knee, ankle: right_ankle, shoulder: right_shoulder}
+  left: {hip: left_hip, knee: left_knee, ankle: left_ankle, shoulder: left_shoulder}
+"""
+
+
+def planned(seconds: float, commands: str = "", **controller: object) -> RunPlan:
+    settings = {**MACHINE, **controller}
+    plan = make_plan("humanoid", seconds, {}, {"wrench_duration": 0.2}, settings)
+    return plan_velocities(plan, commands)[0] if commands else plan
+
+
+def run(plan: RunPlan, *pushes: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Positions (t, n), efforts (t, n) and the names of the states of a run."""
+    controller = make_controller(plan.character, plan.reference, plan.controller)
+    positions, efforts, states = [], [], []
+    given = [parse_push(text, plan) for text in pushes]
+    for tick in ticks_in_process(plan, given, controller=controller):
+        assert controller.mode is not None and tick.following.effort is not None
+        positions.append(tick.following.position)
+        efforts.append(tick.following.effort)
+        facts = controller.mode.phase.facts
+        name = f"{facts['state']} {facts['stance']}"
+        if states[-1:] != [name]:
+            states.append(name)
+    return np.array(positions), np.array(efforts), states
+
+
+def test_it_stands_by_joint_torques_alone() -> None:
+    positions, efforts, states = run(planned(1.5))
+
+    assert states == ["stand right"]
+    assert positions[-1, 2] == pytest.approx(0.76, abs=0.005)
+    assert np.abs(positions[-1, :2]).max() < 0.03
+    assert not efforts[:, :6].any()
+    limits = planned(0.1).character.effort_limits()[2:]
+    assert (planned(0.1).character.layout.norms(efforts)[:, 2:] <= limits + 1e-9).all()
+
+
+@pytest.mark.slow
+def test_it_walks_as_it_is_told_and_stops() -> None:
+    positions, efforts, states = run(planned(7.0, "0.6,0,0@0.5 0,0,0@4.5"))
+
+    assert states[:4] == ["stand right", "shift right", "step right", "step left"]
+    assert states[-1].startswith("stand")
+    speed = (positions[4 * 240, 0] - positions[3 * 240, 0]) / 1.0
+    assert speed == pytest.approx(0.6, abs=0.1)
+    assert abs(positions[-1, 1]) < 0.15
+    assert np.abs(positions[-1, :2] - positions[-120, :2]).max() < 0.03  # it stands
+    assert not efforts[:, :6].any()
+
+
+@pytest.mark.slow
+def test_it_turns_and_goes_sideways() -> None:
+    positions, _, _ = run(planned(6.0, "0,0.2,0@0.5 0,0,0.6@3"))
+
+    assert positions[3 * 240, 1] == pytest.approx(0.2 * 2.0, abs=0.15)
+    start, end = (np.array([positions[row, 3:6]]) for row in (0, -1))
+    turned = _yaw(end) - _yaw(start)
+    assert turned == pytest.approx(0.6 * 2.7, abs=0.3)
+
+
+def _yaw(rotation_vector: np.ndarray) -> float:
+    from msgs_config.geometry import rotations
+
+    standing = rotations.ABOUT_X_QUARTER_TURN_XYZW
+    root = rotations.exp(rotation_vector[0])
+    return float(rotations.yaw(rotations.multiply(root, rotations.conjugate(standing))))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("force", ["120,0,0", "-120,0,0", "0,60,0", "0,-60,0"])
+def test_a_push_is_borne_standing_or_by_a_step(force: str) -> None:
+    positions, _, states = run(planned(4.5), f"root:{force}@1")
+
+    assert positions[:, 2].min() > 0.7
+    assert states[-1].startswith("stand")
+    assert len(states) == 1 or any(name.startswith("step") for name in states)
+
+
+def test_targets_in_the_world_stay_and_right_is_a_mirror_of_left(tmp_path: Path) -> None:
+    file = tmp_path / "arms.yaml"
+    file.write_text(
+        SIDES
+        + """
+start: one
+states:
+  one:
+    feet: {stance: stand, swing: stand}
+    root: {height: 0.8, pitch: 0.2}
+    blend: 0.3
+    targets:
+      swing.shoulder: {roll: 0.5, pitch: -0.4}
+      chest: {pitch: 0.0, yaw: 0.3}
+    ends: [{when: {time: "> 1"}, then: one, swap: true}]
+"""
+    )
+    plan = planned(2.0, machine=str(file))
+    layout = plan.character.layout
+
+    positions, _, states = run(plan)
+
+    assert states == ["one right", "one left"]
+    before, after = positions[235], positions[-1]
+    left, right = (layout.joint(f"{side}_shoulder").entries for side in ("left", "right"))
+    # x ahead and y up are mirrored, z to the right is not
+    np.testing.assert_allclose(after[right], before[left] * (-1, -1, 1), atol=0.05)
+    assert np.abs(before[left]).max() > 0.3
+    assert np.abs(before[right]).max() < 0.05
+    # the root leans, and the chest is upright all the same
+    chest = before[layout.joint("chest").entries]
+    assert chest[2] == pytest.approx(0.2, abs=0.05)
+
+
+def test_a_state_that_tracks_balances_the_torso_by_the_stance_hip(tmp_path: Path) -> None:
+    """SIMBICON's torques: those of both hips on the torso together are what holds it."""
+    file = tmp_path / "simbicon.yaml"
+    file.write_text(
+        SIDES
+        + """
+start: one
+states:
+  one:
+    feet: {stance: free, swing: free}
+    tracks: true
+    root: {tilt_gains: [300, 30], turn_gains: [300, 30], pitch: 0.3}
+    targets:
+      swing.hip: {pitch: -0.4, sagittal: [0.5, 0.2], coronal: [0.5, 0.2]}
+      swing.knee: -0.8
+    efforts: {stance.hip: balance, stance.knee: 5}
+    ends: never
+"""
+    )
+    plan = planned(0.1, machine=str(file))
+    controller = make_controller(plan.character, plan.reference, plan.controller)
+    layout = plan.character.layout
+    hip = layout.joint("right_hip").entries
+
+    tick = next(ticks_in_process(plan, controller=controller))
+
+    assert tick.following.effort is not None
+    effort = tick.following.effort[hip]
+    # at rest, upright: the torso is to lean by 0.3 rad about the left axis, which is -z of the hip
+    # (z to the right); the swing hip, told to go ahead by 0.4 rad + 0.5 d + 0.2 v, drives it back
+    assert effort[2] == pytest.approx(90.0 - 500.0 * (0.4 + 0.5 * _ahead(plan)), rel=0.05)
+    swing = tick.following.effort[layout.joint("left_hip").entries]
+    assert swing[2] > 5.0  # softened by the implicit law
+
+
+def _ahead(plan: RunPlan) -> float:
+    """How far the centre of mass is ahead of the sole at rest, m."""
+    from msgs_config.character.dynamics import DynamicsModel
+
+    model = DynamicsModel(plan.character)
+    rest = np.array(plan.character.rest_position)
+    return float(model.centre_of_mass_at(rest)[0]) - 0.045
