@@ -42,7 +42,8 @@ class PressureTarget:
     ahead: float = 0.0  # m
     outward: float = 0.0  # m
     share: float = 0.5  # where both feet stand: from the stance foot to the other one
-    gain: float = 1.5  # m for each m that the extrapolated centre of mass is off its course
+    gain: float = 1.5  # m for each m that the extrapolated centre of mass is off its course, ahead
+    side_gain: float = 1.5  # likewise, sideways
     speed_gain: float = 0.0  # m for each m/s that the body is too fast
 
 

@@ -56,7 +56,7 @@ def _pressure_on_one(state: State, at: Situation, time: float) -> tuple[float, f
     there = at.extrapolated
     x = wanted.ahead + wanted.gain * (there[0] - nominal[0])
     x += wanted.speed_gain * (at.velocity[0] - course.forward)
-    y = -at.mirror * wanted.outward + wanted.gain * (there[1] - nominal[1])
+    y = -at.mirror * wanted.outward + wanted.side_gain * (there[1] - nominal[1])
     return x, y
 
 
@@ -67,7 +67,8 @@ def _on_both(
     wanted, other = state.pressure, at.other
     there = at.extrapolated
     aim = (wanted.share * other[0] + wanted.ahead, wanted.share * other[1])
-    x, y = (aim[axis] + wanted.gain * (there[axis] - aim[axis]) for axis in (0, 1))
+    x = aim[0] + wanted.gain * (there[0] - aim[0])
+    y = aim[1] + wanted.side_gain * (there[1] - aim[1])
     across = other[0] * other[0] + other[1] * other[1]
     share = (x * other[0] + y * other[1]) / max(across, _NARROW * _NARROW)
     share = min(max(share, _LEAST_SHARE), 1.0 - _LEAST_SHARE)
