@@ -56,7 +56,7 @@ class Placement:
     pace: float = 1.0  # the speed that the law is told, as a share of the commanded one
     ahead: float = 0.0  # m, beside what the law says
     gain: float = 0.0  # s, of the law neutral
-    fixed: float = 0.7  # share of `duration` after which the place is what it is
+    fixed: float = 0.7  # share of `duration` after which the place ahead is what it is
     clearance: float = 0.08  # m, of the foot at the middle of its way
     depth: float = 0.0  # m, below the other sole, where its way ends
     descent: float = 0.25  # m/s, at which it then goes on

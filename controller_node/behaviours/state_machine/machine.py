@@ -172,9 +172,10 @@ class StateMachine:
             if role in state.standing:
                 kit.poses.follow_leg(pose, side, at.body)
             elif doing == STEP:
-                if self._goal is None or time < state.placement.fixed * state.duration:
-                    self._goal = landing(state, at, time, pressure)
-                goal = self._goal
+                goal = landing(state, at, time, pressure)
+                if self._goal is not None and time >= state.placement.fixed * state.duration:
+                    goal = (self._goal[0], goal[1])
+                self._goal = goal
                 poses = [self._feet[role].pose(state, at, when, goal) for when in whens]
                 kit.poses.set_leg(pose, side, at.body, *poses)
             elif doing == REACH:
