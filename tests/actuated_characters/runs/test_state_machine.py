@@ -15,7 +15,7 @@ from actuated_characters.runs.planned_wrenches import parse_push
 from actuated_characters.runs.run_directory import prepare_directory
 from benchmarks.athletics.trial import Trial, moments
 from controller_node.behaviours.state_machine.file import read_machine
-from tests.support.ros import Processes
+from tests.support.ros import Processes, SimulatorClient, tick_of
 from tests.support.runs import Run, run_plan, summary_of
 
 COMMANDS = "0.5,0,0.3@0.2 0,0,0@1.8"
@@ -72,3 +72,22 @@ def test_the_command_says_what_is_wrong_with_a_machine(processes: Processes) -> 
 
     run.process.wait(60.0)
     assert "unknown machine 'wlak'; did you mean 'walk'?" in run.error
+
+
+@pytest.mark.slow
+def test_a_plain_script_drives_it_over_cmd_vel(
+    processes: Processes, client: SimulatorClient
+) -> None:
+    example = Path(__file__).parents[3] / "examples" / "drive.py"
+    processes.python(str(example))
+    processes.controller("humanoid", behaviour="state_machine", reference="steered")
+    processes.simulator("humanoid", max_ticks=1200, contact_breaking_threshold=0.1)
+
+    client.spin_until(lambda: len(client.states) > 0, "a state")
+    client.spin_until(lambda: tick_of(client.states.last) > 1150, "5 s of simulated time", 120.0)
+
+    state = client.states.last
+    place = dict(zip(state.name, state.position, strict=True))
+    assert place["root_z"] > 0.7
+    # 0.8 m/s in a circle of 1.6 m to the left, from the first second or so on
+    assert place["root_x"] > 0.8 and place["root_y"] > 0.3
