@@ -120,7 +120,7 @@ QUANTITIES = {
     "command": "m/s and rad/s, the largest part of the commanded velocity",
     "command_ahead": "m/s, the commanded velocity ahead",
     "sway": "m from the stance sole towards the other, of the extrapolated centre of mass",
-    "imbalance": "m of the extrapolated centre of mass outside of the feet's rectangle",
+    "imbalance": "m of the extrapolated centre of mass outside of what the feet bear",
 }
 """What conditions may ask for, and its unit."""
 

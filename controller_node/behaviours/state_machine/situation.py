@@ -10,6 +10,7 @@ from controller_node.references.steering.reference import Course
 from msgs_config.geometry.single_rotations import Vector, add, subtract
 
 _LEAST_HEIGHT = 0.3  # m, of the centre of mass, for the rate of the pendulum
+_STEADY = 0.6  # of a sole, from its middle, that bears a body that stands
 _LONGEST = 4.0  # units of the pendulum's time, that it is predicted
 
 
@@ -121,6 +122,9 @@ def _imbalance(at: Situation, leg: Leg) -> float:
     """How far the extrapolated centre of mass is outside of the feet's rectangle."""
     x, y = at.extrapolated
     beyond = []
-    for value, other, half in ((x, at.other[0], leg.half_length), (y, at.other[1], leg.half_width)):
+    for value, other, half in (
+        (x, at.other[0], _STEADY * leg.half_length),
+        (y, at.other[1], _STEADY * leg.half_width),
+    ):
         beyond.append(max(min(0.0, other) - half - value, value - max(0.0, other) - half, 0.0))
     return math.hypot(*beyond)

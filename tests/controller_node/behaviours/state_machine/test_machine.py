@@ -90,7 +90,7 @@ def test_a_push_is_borne_standing_or_by_a_step(force: str) -> None:
 
     assert positions[:, 2].min() > 0.7
     assert states[-1].startswith("stand")
-    assert len(states) == 1 or any(name.startswith("step") for name in states)
+    assert len(states) == 1 or any(name.startswith("catch") for name in states)
 
 
 def test_targets_in_the_world_stay_and_right_is_a_mirror_of_left(tmp_path: Path) -> None:
