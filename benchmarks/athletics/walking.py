@@ -35,7 +35,7 @@ COLUMNS = ("kind", "walk", "fell at, s", "speed of wanted, m/s", "aside, m/s", "
 
 
 @dataclass(frozen=True)
-class Case:
+class PlannedWalk:
     """A walk, and from when on it is measured."""
 
     kind: str
@@ -44,14 +44,14 @@ class Case:
     since: float  # s
 
 
-def cases(kind: str, options: argparse.Namespace, folder: Path) -> Iterator[Case]:
+def cases(kind: str, options: argparse.Namespace, folder: Path) -> Iterator[PlannedWalk]:
     """The walks of a kind."""
     rate, seconds = options.rate, options.seconds
     rng = np.random.default_rng(options.seed)
     if kind == "speeds":
         for speed in SPEEDS:
             trial = Trial(seconds, f"{speed},0,0@0.5", rate=rate)
-            yield Case(kind, f"{speed:g} m/s", trial, 5.0)
+            yield PlannedWalk(kind, f"{speed:g} m/s", trial, 5.0)
     elif kind == "headings":
         for part in range(8):
             heading = math.remainder(part * math.tau / 8, math.tau)
@@ -59,7 +59,7 @@ def cases(kind: str, options: argparse.Namespace, folder: Path) -> Iterator[Case
             turn = math.copysign(TURN, heading) if heading else 0.0
             commands = f"0.6,0,{turn:g}@1 0.6,0,0@{turned:.4f}" if heading else "0.6,0,0@1"
             trial = Trial(seconds, commands, rate=rate)
-            yield Case(kind, f"{math.degrees(heading):.0f} degrees", trial, turned + 4.0)
+            yield PlannedWalk(kind, f"{math.degrees(heading):.0f} degrees", trial, turned + 4.0)
     elif kind == "pushes":
         for number in range(24):
             x, y = ((1, 0), (-1, 0), (0, 1), (0, -1))[(0, 1, 2, 0, 1, 3)[number % 6]]
@@ -68,16 +68,16 @@ def cases(kind: str, options: argparse.Namespace, folder: Path) -> Iterator[Case
             push = f"root:{x * force:g},{y * force:g},0@{at:.4f}"
             world: dict[str, object] = {"wrench_duration": 0.2}
             trial = Trial(12.0, "0.6,0,0@0.5", (push,), rate, world)
-            yield Case(kind, f"{push} N", trial, 8.0)
+            yield PlannedWalk(kind, f"{push} N", trial, 8.0)
     else:
         for number in range(8):
             heights = np.cumsum(STEP * rng.choice((-1.0, 1.0), 12)).tolist()
             path = write_terrain(folder, f"steps_{number}", heights, 1.2 + 0.1 * number)
             trial = Trial(20.0, "0.6,0,0@0.5", rate=rate, simulator={"terrain": str(path)})
-            yield Case(kind, f"steps {number}", trial, 5.0)
+            yield PlannedWalk(kind, f"steps {number}", trial, 5.0)
 
 
-def row(case: Case, walk: Walk) -> tuple[str, ...]:
+def row(case: PlannedWalk, walk: Walk) -> tuple[str, ...]:
     """A line of the table."""
     return (
         case.kind,
@@ -97,7 +97,7 @@ def main() -> int:
     except ActuatedCharactersError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    table, held = Table(*COLUMNS), dict[str, list[bool]]()
+    table, upright = Table(*COLUMNS), dict[str, list[bool]]()
     with tempfile.TemporaryDirectory() as name:
         chosen = [
             case for kind in options.kinds or KINDS for case in cases(kind, options, Path(name))
@@ -106,13 +106,13 @@ def main() -> int:
             for case in track(chosen, "walking", console=Console(stderr=True)):
                 walk = walked(case.trial, machine, case.since)
                 table.add_row(*row(case, walk))
-                held.setdefault(case.kind, []).append(not walk.fell)
+                upright.setdefault(case.kind, []).append(not walk.fell)
                 if options.verbose:
                     print(*row(case, walk), sep=" | ", flush=True)
         except KeyboardInterrupt:
             print("interrupted; these are the walks so far", file=sys.stderr)
     Console().print(table)
-    for kind, each in held.items():
+    for kind, each in upright.items():
         print(f"{kind}: {sum(each)} of {len(each)} without a fall")
     return 0
 

@@ -92,12 +92,12 @@ def _check_target(
 
 def _check_reached(machine: Machine) -> None:
     """Every state but the included ones must be reached."""
-    reached, waiting = {machine.start}, [machine.start]
-    while waiting:
-        for end in machine.states[waiting.pop()].ends:
+    reached, queue = {machine.start}, [machine.start]
+    while queue:
+        for end in machine.states[queue.pop()].ends:
             if end.then not in reached:
                 reached.add(end.then)
-                waiting.append(end.then)
+                queue.append(end.then)
     for name in machine.states:
         if name not in reached and "." not in name:
             raise ConfigurationError(f"{machine.file}: states.{name}: no state ends in it")
@@ -121,13 +121,13 @@ def _check_time(machine: Machine) -> None:
 def _circle(following: dict[str, list[str]], path: list[str]) -> list[str]:
     """The first way from the beginning of a path back to it."""
     seen: set[str] = set()
-    waiting = [path]
-    while waiting:
-        way = waiting.pop()
+    queue = [path]
+    while queue:
+        way = queue.pop()
         for name in following[way[-1]]:
             if name == path[0]:
                 return [*way, name]
             if name not in seen:
                 seen.add(name)
-                waiting.append([*way, name])
+                queue.append([*way, name])
     return []

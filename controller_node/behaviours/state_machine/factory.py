@@ -4,7 +4,7 @@ from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.state_machine.body import BodyReader
 from controller_node.behaviours.state_machine.check import check_machine
 from controller_node.behaviours.state_machine.description import Machine
-from controller_node.behaviours.state_machine.drive import Drive
+from controller_node.behaviours.state_machine.effort_maker import EffortMaker
 from controller_node.behaviours.state_machine.file import read_machine
 from controller_node.behaviours.state_machine.leg import make_leg, standing_frames
 from controller_node.behaviours.state_machine.machine import MachineKit, StateMachine
@@ -50,7 +50,7 @@ def kit_of(machine: Machine, character: Character, gravity: float, period: float
         legs=legs,
         reader=BodyReader(model, legs, upright[0]),
         poses=PoseMaker(character, machine, legs, upright, period),
-        drive=Drive(model, layout, machine, legs, period),
+        efforts=EffortMaker(model, layout, machine, legs, period),
         gravity=gravity,
         period=period,
     )

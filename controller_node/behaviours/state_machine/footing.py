@@ -66,9 +66,9 @@ def _on_both(
     """Both feet, with the load where the extrapolated centre of mass is led to a share of it."""
     wanted, other = state.pressure, at.other
     there = at.extrapolated
-    aim = (wanted.share * other[0] + wanted.ahead, wanted.share * other[1])
-    x = aim[0] + wanted.gain * (there[0] - aim[0])
-    y = aim[1] + wanted.side_gain * (there[1] - aim[1])
+    goal = (wanted.share * other[0] + wanted.ahead, wanted.share * other[1])
+    x = goal[0] + wanted.gain * (there[0] - goal[0])
+    y = goal[1] + wanted.side_gain * (there[1] - goal[1])
     across = other[0] * other[0] + other[1] * other[1]
     share = (x * other[0] + y * other[1]) / max(across, _NARROW * _NARROW)
     share = min(max(share, _LEAST_SHARE), 1.0 - _LEAST_SHARE)

@@ -134,7 +134,8 @@ def make_leg(character: Character, hip: str, knee: str, ankle: str) -> Leg:
     places = [origins[row] for row in (thigh, shin, foot)]
     upright = [turns[row] for row in (thigh, shin, foot)]
     for place, other in ((places[0], places[1]), (places[0], places[2])):
-        across = math.hypot(place[0] - other[0], place[1] - other[1])
+        x, y, _ = subtract(place, other)
+        across = math.sqrt(x * x + y * y)
         if across > _STRAIGHT or other[2] >= place[2]:
             raise ConfigurationError(
                 f"the leg of '{hip}', '{knee}' and '{ankle}' must hang straight down at angle 0"
@@ -195,10 +196,9 @@ def _sole(
         rotate(turn, (0.0, 1.0, 0.0)),
         rotate(turn, (0.0, 0.0, 1.0)),
     ]
-    extent = [
-        sum(abs(edge[axis]) * float(half[row]) for row, edge in enumerate(edges))
-        for axis in range(3)
-    ]
+    a, b, c = half.tolist()
+    x, y, z = edges
+    extent = [abs(x[axis]) * a + abs(y[axis]) * b + abs(z[axis]) * c for axis in range(3)]
     middle = rotate(upright_xyzw, pose.position)
     sole = rotate(conjugate(upright_xyzw), (middle[0], middle[1], middle[2] - extent[2]))
     return sole, extent[0], extent[1]

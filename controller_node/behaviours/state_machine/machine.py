@@ -14,7 +14,7 @@ from controller_node.behaviours.state_machine.description import (
     Machine,
     State,
 )
-from controller_node.behaviours.state_machine.drive import Drive
+from controller_node.behaviours.state_machine.effort_maker import EffortMaker
 from controller_node.behaviours.state_machine.footing import SwingFoot, contacts_of, landing
 from controller_node.behaviours.state_machine.laws import smooth_step
 from controller_node.behaviours.state_machine.leg import Leg
@@ -42,7 +42,7 @@ class MachineKit:
     legs: dict[str, Leg]  # by side
     reader: BodyReader
     poses: PoseMaker
-    drive: Drive
+    efforts: EffortMaker
     gravity: float  # m/s^2
     period: float  # s
 
@@ -95,12 +95,12 @@ class StateMachine:
         time = seen.time - self._since
         contacts = contacts_of(self._state, at, time, kit.legs)
         pose = self._pose(at, time, contacts)
-        gains = kit.drive.gains(self._state, self._stance, seen.gains)
+        gains = kit.efforts.gains(self._state, self._stance, seen.gains)
         if self._state.tracks:
-            effort = kit.drive.balanced(self._state, at, pose, gains)
+            effort = kit.efforts.balanced(self._state, at, pose, gains)
         else:
             ground, height = self._heights(at, time)
-            effort = kit.drive.supported(
+            effort = kit.efforts.supported(
                 self._state, at, pose, gains, contacts, ground + height - self._state.root.height
             )
             gains = GainArrays(self._none, self._none, self._none, seen.gains.effort_limits)
@@ -148,7 +148,7 @@ class StateMachine:
         state = self._state
         sides = [self._stance if role == STANCE else self._swing for role in state.standing]
         soles = [at.foot(side).sole[2] for side in sides or at.body.feet]
-        ground, height = sum(soles) / len(soles), state.root.height
+        ground, height = 0.5 * (soles[0] + soles[-1]), state.root.height
         start = at.body.root[2] - ground if self._before is None else self._before[1]
         if time < state.blend:
             if self._before is None:

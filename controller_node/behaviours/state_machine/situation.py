@@ -127,4 +127,5 @@ def _imbalance(at: Situation, leg: Leg) -> float:
         (y, at.other[1], _STEADY * leg.half_width),
     ):
         beyond.append(max(min(0.0, other) - half - value, value - max(0.0, other) - half, 0.0))
-    return math.hypot(*beyond)
+    ahead, aside = beyond
+    return math.sqrt(ahead * ahead + aside * aside)

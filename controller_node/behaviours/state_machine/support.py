@@ -77,7 +77,7 @@ def ground_wrench(
 def bounded(force: Vector, spin: float, bounds: Bounds, weight: float) -> tuple[Vector, float]:
     """The nearest force and moment about z that the ground can bear: friction gives way first."""
     up = min(max(force[2], bounds.least * weight), bounds.most * weight)
-    across = (force[0] * force[0] + force[1] * force[1]) ** 0.5
+    across = math.sqrt(force[0] * force[0] + force[1] * force[1])
     share = min(1.0, bounds.friction * up / max(across, 1e-9))
     most = bounds.spin * up
     return (share * force[0], share * force[1], up), min(max(spin, -most), most)

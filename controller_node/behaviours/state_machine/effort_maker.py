@@ -45,7 +45,7 @@ _LEVEL = (80.0, 0.8)  # likewise, keeps its sole on the ground
 _LEFT = (0.0, 1.0, 0.0)
 
 
-class Drive:
+class EffortMaker:
     """Makes efforts of targets; the model is in the present state."""
 
     def __init__(
@@ -90,7 +90,7 @@ class Drive:
     ) -> FloatArray:
         """The effort (n,) by which the body moves as wanted, its feet pressed on the ground.
 
-        Each joint's acceleration is that of implicit PD control of its own inertia. Without
+        Each joint's acceleration is that of implicit PD control against its inertia. Without
         contacts the body falls, and joints move as wanted all the same.
         """
         body = at.body
