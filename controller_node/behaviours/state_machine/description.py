@@ -14,6 +14,9 @@ FEET = (STAND, STEP, REACH, FREE)
 """What a leg does: carries, goes to a place on the ground, reaches below the hip, or has targets of
 joints alone."""
 
+HIP, CENTRE = "hip", "centre"
+"""What a foot that reaches goes ahead of: its hip, or the centre of mass."""
+
 BALANCE = "balance"
 """The effort of a stance hip that keeps the torso, by SIMBICON's balance of torques."""
 
@@ -65,6 +68,8 @@ class Placement:
     most_ahead: float = 0.75  # m
     most_behind: float = 0.6  # m
     length: float = 0.0  # m, of a leg that reaches, from hip to sole
+    origin: str = HIP  # or centre, of mass: what a leg that reaches goes ahead of
+    stance_time: float = 0.0  # s, that it will stand, of the law neutral; 0: the state's duration
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,9 @@ from typing import Any
 
 from controller_node.behaviours.state_machine.description import (
     BALANCE,
+    CENTRE,
     FEET,
+    HIP,
     QUANTITIES,
     STANCE,
     STAND,
@@ -180,6 +182,8 @@ def _placement(reader: MappingReader) -> Placement:
     placement: Placement = _values(reader, Placement())
     if placement.law not in PLACEMENT_LAWS:
         raise reader.wrong("law", placement.law, " or ".join(f"'{law}'" for law in PLACEMENT_LAWS))
+    if placement.origin not in (HIP, CENTRE):
+        raise reader.wrong("origin", placement.origin, f"'{HIP}' or '{CENTRE}'")
     return placement
 
 

@@ -4,8 +4,9 @@ import math
 from dataclasses import dataclass
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.body import Foot, in_world
+from controller_node.behaviours.state_machine.body import Foot, in_frame, in_world
 from controller_node.behaviours.state_machine.description import (
+    CENTRE,
     STANCE,
     Placement,
     State,
@@ -142,10 +143,12 @@ class SwingFoot:
         """Its pose below a hip, ahead by a law of balance, `time` s after the state began."""
         law, course = state.placement, at.course
         moved = laws.smooth_step(time / state.duration)
-        ahead = law.ahead + laws.neutral_placement(
-            at.velocity[0], course.forward, state.duration, law.gain
-        )
-        side = laws.neutral_placement(at.velocity[1], course.left, state.duration, law.gain)
+        stance_time = law.stance_time or state.duration
+        (vx, vy, _), (v, w) = at.velocity, (course.forward, course.left)
+        ahead = law.ahead + laws.neutral_placement(vx, v, stance_time, law.gain)
+        side = laws.neutral_placement(vy, w, stance_time, law.gain)
+        if law.origin == CENTRE:
+            ahead += in_frame(course.heading, subtract(at.body.centre, hip))[0]
         goal = in_world(course.heading, (ahead, side, -law.length))
         place = add(scale(1.0 - moved, self.start), scale(moved, goal))
         raised = law.clearance * laws.clearance(time / state.duration)
