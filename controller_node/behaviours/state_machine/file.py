@@ -36,7 +36,7 @@ from msgs_config.geometry.single_rotations import Vector
 from msgs_config.mappings import MappingReader
 
 MACHINES_DIRECTORY = Path(__file__).parent / "data"
-_KEYS = ["sides", "start", "includes", "acceleration", "gains", "bounds", "states"]
+_KEYS = ["sides", "start", "includes", "joins", "acceleration", "gains", "bounds", "states"]
 _STATE_KEYS = [
     *("feet", "duration", "blend", "root", "pressure", "placement", "targets", "gains"),
     *("efforts", "tracks", "ends"),
@@ -102,6 +102,11 @@ def make_machine(path: Path, content: dict[str, Any], depth: int = _DEPTH) -> Ma
     parts = reader.part("states")
     for name in parts.content:
         states[name] = _state(name, parts.part(name), gains, bounds)
+    joins = reader.part("joins")
+    for name in joins.content:
+        if name not in states:
+            raise ConfigurationError(f"{path}: joins: {one_of('state', name, list(states))}")
+        states[name] = replace(states[name], ends=_ends(joins, name) + states[name].ends)
     acceleration = reader.number("acceleration", 1e9, 1e-3, 1e9)
     if not states:
         raise reader.wrong("states", content.get("states"), "a mapping of one state or more")
@@ -157,7 +162,7 @@ def _state(name: str, reader: MappingReader, gains: dict[str, Gains], bounds: Bo
         gains={**gains, **_gains(reader.part("gains"))},
         efforts=_efforts(reader.part("efforts")),
         bounds=bounds,
-        ends=_ends(reader),
+        ends=_ends(reader, "ends"),
         tracks=reader.flag("tracks"),
     )
 
@@ -240,20 +245,18 @@ def _efforts(reader: MappingReader) -> dict[str, str | Vector]:
     return efforts
 
 
-def _ends(reader: MappingReader) -> tuple[End, ...]:
-    items = reader.content.get("ends")
+def _ends(reader: MappingReader, key: str) -> tuple[End, ...]:
+    items = reader.content.get(key)
     if items == _NEVER:
         return ()
     if not isinstance(items, list) or not items:
-        raise reader.wrong("ends", items, f"a list of one end or more, or '{_NEVER}'")
-    return tuple(_end(reader, number, item) for number, item in enumerate(items, 1))
+        raise reader.wrong(key, items, f"a list of one end or more, or '{_NEVER}'")
+    return tuple(_end(reader, f"{key} {number}", item) for number, item in enumerate(items, 1))
 
 
-def _end(reader: MappingReader, number: int, item: object) -> End:
-    holder = MappingReader(
-        reader.place, {f"ends {number}": item}, ConfigurationError, reader.prefix
-    )
-    part = holder.part(f"ends {number}")
+def _end(reader: MappingReader, key: str, item: object) -> End:
+    holder = MappingReader(reader.place, {key: item}, ConfigurationError, reader.prefix)
+    part = holder.part(key)
     part.check_keys(("when", "then", "swap"))
     when = part.part("when")
     if not when.content:

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.body import Foot, in_frame, in_world
+from controller_node.behaviours.state_machine.body import Body, Foot, in_frame, in_world
 from controller_node.behaviours.state_machine.description import (
     CENTRE,
     STANCE,
@@ -15,7 +15,15 @@ from controller_node.behaviours.state_machine.leg import FootPose, Leg
 from controller_node.behaviours.state_machine.situation import Situation
 from controller_node.behaviours.state_machine.support import Contact
 from controller_node.references.steering.velocity import within
-from msgs_config.geometry.single_rotations import Vector, about_z, add, scale, subtract, yaw
+from msgs_config.geometry.single_rotations import (
+    Vector,
+    about_z,
+    add,
+    cross,
+    scale,
+    subtract,
+    yaw,
+)
 
 _NARROW = 1e-3  # m, between feet that stand in one place
 _LEAST_SHARE = 0.03  # of the load, on each of two feet
@@ -117,14 +125,13 @@ def reachable(law: Placement, x: float, y: float, mirror: float) -> tuple[float,
 class SwingFoot:
     """A foot on its way, from where it left."""
 
-    start: Vector  # m, of the sole: in the world, or of one that reaches from the hip
+    start: Vector  # m, of the sole, world
     start_yaw: float  # rad, world
 
     @classmethod
-    def leaving(cls, foot: Foot, origin: Vector | None = None) -> "SwingFoot":
-        """A foot that leaves now; `origin` is a hip that it reaches from."""
-        start = foot.sole if origin is None else subtract(foot.sole, origin)
-        return cls(start, yaw(foot.turn))
+    def leaving(cls, foot: Foot) -> "SwingFoot":
+        """A foot that leaves now."""
+        return cls(foot.sole, yaw(foot.turn))
 
     def pose(self, state: State, at: Situation, time: float, goal: tuple[float, float]) -> FootPose:
         """Its pose `time` s after the state began, on its way to a place from the stance sole."""
@@ -139,23 +146,50 @@ class SwingFoot:
         turn = self._yaw(at, moved, max(state.duration - time, 0.0))
         return FootPose((place[0], place[1], low), about_z(turn))
 
-    def reaching(self, state: State, at: Situation, time: float, hip: Vector) -> FootPose:
-        """Its pose below a hip, ahead by a law of balance, `time` s after the state began."""
+    def _yaw(self, at: Situation, moved: float, rest: float) -> float:
+        """The way that the foot faces, rad, on its way to the heading that will be."""
+        there = at.course.heading + rest * at.course.turn
+        return _turned(self.start_yaw, there, moved)
+
+
+@dataclass(frozen=True)
+class ReachingFoot:
+    """A foot that goes to a place below its hip, from where it was and as it moved."""
+
+    start: Vector  # m, of the sole, from the hip, world axes
+    velocity: Vector  # m/s, of the foot from the hip
+    start_yaw: float  # rad, world
+
+    @classmethod
+    def leaving(cls, foot: Foot, body: Body, hip: Vector) -> "ReachingFoot":
+        """A foot that leaves now."""
+        x, y, z, *_ = body.velocity.tolist()
+        moving = add((x, y, z), cross(body.spin, subtract(hip, body.root)))
+        return cls(subtract(foot.sole, hip), subtract(foot.velocity, moving), yaw(foot.turn))
+
+    def pose(self, state: State, at: Situation, time: float, hip: Vector) -> FootPose:
+        """Its pose `time` s after the state began, below a hip.
+
+        Where it goes ahead of the centre of mass, it goes half a step's width beside it.
+        """
         law, course = state.placement, at.course
-        moved = laws.smooth_step(time / state.duration)
+        share = time / state.duration
+        moved, carried = laws.smooth_step(share), law.carry * laws.carried_on(share)
         stance_time = law.stance_time or state.duration
         (vx, vy, _), (v, w) = at.velocity, (course.forward, course.left)
         ahead = law.ahead + laws.neutral_placement(vx, v, stance_time, law.gain)
         side = laws.neutral_placement(vy, w, stance_time, law.gain)
         if law.origin == CENTRE:
-            ahead += in_frame(course.heading, subtract(at.body.centre, hip))[0]
+            x, y, _ = in_frame(course.heading, subtract(at.body.centre, hip))
+            ahead, side = ahead + x, side + y - math.copysign(0.5 * law.width, y)
         goal = in_world(course.heading, (ahead, side, -law.length))
         place = add(scale(1.0 - moved, self.start), scale(moved, goal))
-        raised = law.clearance * laws.clearance(time / state.duration)
-        turn = about_z(self._yaw(at, moved, 0.0))
+        place = add(place, scale(state.duration * carried, self.velocity))
+        raised = law.clearance * laws.clearance(share)
+        turn = about_z(_turned(self.start_yaw, at.course.heading, moved))
         return FootPose(add(add(hip, place), (0.0, 0.0, raised)), turn)
 
-    def _yaw(self, at: Situation, moved: float, rest: float) -> float:
-        """The way that the foot faces, rad, on its way to the heading that will be."""
-        there = at.course.heading + rest * at.course.turn
-        return self.start_yaw + moved * math.remainder(there - self.start_yaw, math.tau)
+
+def _turned(start: float, end: float, moved: float) -> float:
+    """A share of the shorter way from one heading to another, rad."""
+    return start + moved * math.remainder(end - start, math.tau)

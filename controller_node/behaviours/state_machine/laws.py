@@ -106,6 +106,16 @@ def smooth_step(share: float) -> float:
     return s * s * s * (10.0 + s * (-15.0 + 6.0 * s))
 
 
+def carried_on(share: float) -> float:
+    """What a first velocity adds to a movement, from 0 with slope 1 to 0 with slope 0 at 1.
+
+    `s - 6 s^3 + 8 s^4 - 3 s^5`, without acceleration at either end: beside `smooth_step`, Hermite's
+    other polynomial of the fifth degree.
+    """
+    s = min(max(share, 0.0), 1.0)
+    return s * (1.0 + s * s * (-6.0 + s * (8.0 - 3.0 * s)))
+
+
 def clearance(share: float) -> float:
     """The height of a swing foot, from 0 over 1 at the middle back to 0: `16 s^2 (1 - s)^2`."""
     s = min(max(share, 0.0), 1.0)

@@ -15,7 +15,12 @@ from controller_node.behaviours.state_machine.description import (
     State,
 )
 from controller_node.behaviours.state_machine.effort_maker import EffortMaker
-from controller_node.behaviours.state_machine.footing import SwingFoot, contacts_of, landing
+from controller_node.behaviours.state_machine.footing import (
+    ReachingFoot,
+    SwingFoot,
+    contacts_of,
+    landing,
+)
 from controller_node.behaviours.state_machine.laws import smooth_step
 from controller_node.behaviours.state_machine.leg import Leg
 from controller_node.behaviours.state_machine.pose import Pose, PoseMaker
@@ -77,6 +82,7 @@ class StateMachine:
         self._entered = False
         self._course = _STANDING
         self._feet: dict[str, SwingFoot] = {}  # by role
+        self._reaching: dict[str, ReachingFoot] = {}  # likewise
         self._goal: tuple[float, float] | None = None  # of a foot that steps
         self._target = PoseTarget(kit.layout)
         self._before: tuple[FloatArray, float] | None = None  # targets, height, at the last change
@@ -137,9 +143,8 @@ class StateMachine:
             if state.feet[role] == STEP:
                 self._feet[role] = SwingFoot.leaving(at.foot(side))
             elif state.feet[role] == REACH:
-                self._feet[role] = SwingFoot.leaving(
-                    at.foot(side), self._kit.poses.hip(side, at.body)
-                )
+                hip = self._kit.poses.hip(side, at.body)
+                self._reaching[role] = ReachingFoot.leaving(at.foot(side), at.body, hip)
         facts = {"assistance": "none", "state": state.name, "stance": self._stance}
         self._phase = Phase(Mode.STATE, facts)
 
@@ -180,7 +185,7 @@ class StateMachine:
                 kit.poses.set_leg(pose, side, at.body, *poses)
             elif doing == REACH:
                 hip = kit.poses.hip(side, at.body)
-                poses = [self._feet[role].reaching(state, at, when, hip) for when in whens]
+                poses = [self._reaching[role].pose(state, at, when, hip) for when in whens]
                 kit.poses.set_leg(pose, side, at.body, *poses)
         return pose
 
