@@ -37,6 +37,9 @@ def add_study(commands: "Commands[argparse.ArgumentParser]") -> None:
         "--output", type=Path, default=Path("studies"), metavar="DIR", help="(%(default)s)/NAME"
     )
     study.add_argument("--overwrite", action="store_true", help="replace what is in DIR/NAME")
+    study.add_argument(
+        "--fine", action="store_true", help="more runs where they make a finer figure (athletics)"
+    )
     study.add_argument("--keep-runs", action="store_true", help="keep the bags in DIR/NAME/runs")
 
 
@@ -54,10 +57,10 @@ def _study(options: argparse.Namespace) -> None:
         os.environ.setdefault("ROS_DOMAIN_ID", str(domain))
         for number, (name, directory) in enumerate(directories.items(), start=1):
             label = f"{name} ({number} of {len(names)})" if len(names) > 1 else name
-            _run_study(load_study(name), label, directory, keep_runs=options.keep_runs)
+            _run_study(load_study(name), label, directory, options)
 
 
-def _run_study(study: "Study", label: str, directory: Path, *, keep_runs: bool) -> None:
+def _run_study(study: "Study", label: str, directory: Path, options: argparse.Namespace) -> None:
     """Run a study with its progress on standard error, write and print its results."""
     from actuated_characters.studies.framework.runner import TopicRunner
 
@@ -72,7 +75,10 @@ def _run_study(study: "Study", label: str, directory: Path, *, keep_runs: bool) 
             total = max(float(study.runs), float(len(done)))
             bar.update(task, completed=sum(done.values()), total=total, state=run)
 
-        result = study.run(TopicRunner(directory, keep_runs=keep_runs, report=report))
+        runner = TopicRunner(
+            directory, keep_runs=options.keep_runs, report=report, fine=options.fine
+        )
+        result = study.run(runner)
         bar.update(task, completed=bar.tasks[task].total, state="")
     files = result.write(directory)
     rows = [[show(cell) for cell in row.values()] for row in result.rows]

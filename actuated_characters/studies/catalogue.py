@@ -19,6 +19,7 @@ NAMES = (
     "clips",
     "balance",
     "reactions",
+    "athletics",
 )
 
 

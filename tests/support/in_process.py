@@ -6,7 +6,7 @@ import numpy as np
 
 from actuated_characters.bags.recording import ModeChange, Recording
 from actuated_characters.metrics.run_metrics import Measurement, Tick
-from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_throws import plan_throws
 from actuated_characters.studies.catalogue import load_study
 from actuated_characters.studies.framework.result import StudyResult
@@ -31,6 +31,8 @@ from tests.support.physics import read_wrenches
 class InProcessRunner:
     """Runs a study's cases one by one; files that they need go to a directory."""
 
+    fine = False
+
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self.cases: list[RunSpec] = []  # that were run
@@ -38,9 +40,7 @@ class InProcessRunner:
     def run(self, case: RunSpec) -> RunResult:
         """Run a case to its end, or until it diverges."""
         self.cases.append(case)
-        plan = make_plan(
-            case.character, case.duration, case.reference, case.simulator, case.controller
-        )
+        plan, _ = case.plan()
         run = _Run(plan, case)
         diverged = ""
         try:

@@ -9,7 +9,6 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.runs.execution import run_over_topics
-from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned_throws import plan_throws
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.run_directory import prepare_directory, read_metrics
@@ -31,17 +30,17 @@ _UNREAD = [  # topics, at a cost each tick
 class TopicRunner:
     """Runs cases as processes that speak over topics."""
 
-    def __init__(self, directory: Path, *, keep_runs: bool, report: Report) -> None:
+    def __init__(
+        self, directory: Path, *, keep_runs: bool, report: Report, fine: bool = False
+    ) -> None:
         """Files go below `directory`; a run's are removed once they were read, or kept."""
         self._directory = directory
-        self._keep_runs = keep_runs
+        self._keep_runs, self.fine = keep_runs, fine
         self._report = report
 
     def run(self, case: RunSpec) -> RunResult:
         """Run a case; one that diverges ends there."""
-        plan = make_plan(
-            case.character, case.duration, case.reference, case.simulator, case.controller
-        )
+        plan, velocities = case.plan()
         throws, _ = plan_throws(plan, case.throws)
         directory = self._directory / "runs" / case.label
         prepare_directory(directory, overwrite=True)
@@ -56,6 +55,7 @@ class TopicRunner:
                 recording={"exclude": _UNREAD if case.contacts else [*_UNREAD, "contacts"]},
                 pushes=case.pushes,
                 throws=throws,
+                velocities=velocities,
             )
         except RunError as error:
             if _DIVERGED not in str(error):

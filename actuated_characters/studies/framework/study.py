@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Protocol
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.planned_velocities import PlannedVelocity, plan_velocities
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies.framework.result import StudyResult
 from msgs_config.character.model import Vector
@@ -28,7 +30,15 @@ class RunSpec:
     controller: Mapping[str, object] = field(default_factory=dict)  # of controller_node
     pushes: Sequence[PlannedPush] = ()  # each for the simulator's `wrench_duration`
     throws: Sequence[str] = ()  # as `--throw` has them
+    commands: str = ""  # velocities as `--cmd-vel` has them
     contacts: bool = False  # whether to record them
+
+    def plan(self) -> tuple[RunPlan, list[PlannedVelocity]]:
+        """The run, and the velocities that are sent to it."""
+        plan = make_plan(
+            self.character, self.duration, self.reference, self.simulator, self.controller
+        )
+        return plan_velocities(plan, self.commands) if self.commands else (plan, [])
 
 
 def plan_push(time: float, rate: int, link: str, force: Vector) -> PlannedPush:
@@ -53,6 +63,8 @@ class RunResult:
 
 class StudyRunner(Protocol):
     """Makes the runs of a study."""
+
+    fine: bool  # whether more runs than usual are wanted, where they make a finer figure
 
     def run(self, case: RunSpec) -> RunResult:
         """Run a case over topics, to its end or until it diverges.
