@@ -66,7 +66,7 @@ def longest_flight(recording: Recording) -> tuple[float, float]:
 
     A character that is put down touches nothing in its first tick.
     """
-    airborne: BoolArray = ~loaded(recording).any(axis=1)
+    airborne: BoolArray = loaded(recording).sum(axis=1) == 0
     airborne[0] = False
     edges = np.flatnonzero(np.diff(np.r_[0, airborne, 0]))
     times = recording.times

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import read_recording
@@ -13,6 +14,7 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_velocities import PlannedVelocity, plan_velocities
 from actuated_characters.runs.planned_wrenches import parse_push
 from actuated_characters.runs.run_directory import prepare_directory
+from actuated_characters.studies.athletics.measures import longest_flight
 from benchmarks.athletics.trial import Trial, moments
 from controller_node.behaviours.state_machine.file import read_machine
 from tests.support.ros import Processes, SimulatorClient, tick_of
@@ -47,6 +49,28 @@ def test_a_run_over_topics_is_the_one_in_one_process_and_is_replayed_to_the_bit(
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     again = replay_states(sent, progress=lambda _: None, tell=lambda _: None)
     assert again.identical and again.states == 721
+
+
+@pytest.mark.slow
+def test_a_jump_over_topics_is_the_one_in_one_process_and_flies_by_its_recorded_contacts(
+    tmp_path: Path,
+) -> None:
+    plan = make_plan("humanoid", 3.0, {}, {}, {"behaviour": "state_machine", "machine": "jump"})
+    push = parse_push("root:20,-10,0@1.4", plan)
+    alone, sent = tmp_path / "alone", tmp_path / "sent"
+    prepare_directory(alone, overwrite=False)
+    run_in_process(plan, alone, pushes=[push])
+
+    run_plan(plan, sent, pushes=[push], recording={"exclude": []})
+
+    assert summary_of(sent)["state_hash"] == summary_of(alone)["state_hash"]
+    recording = read_recording(sent)
+    start, flight = longest_flight(recording)
+    assert 1.6 < start < 1.9 and flight >= 0.25
+    labels = [span.facts["state"] for span in mode_spans(recording)]
+    assert labels == ["stand", "crouch", "thrust", "flight", "land", "rest"]
+    assert not np.nan_to_num(recording.effort)[:, :6].any()
+    assert replay([recording]).identical
 
 
 @pytest.mark.slow

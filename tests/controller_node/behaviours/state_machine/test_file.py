@@ -114,6 +114,9 @@ def test_each_shipped_machine_can_be_planned(name: str) -> None:
         ({"states__one__feet__swing": "hop"}, "feet.swing is 'hop'; it must be 'stand' or"),
         ({"states__one__feet__swing": "reach"}, "a foot that reaches needs 'placement.length'"),
         ({"states__one__placement": {"law": "guess"}}, "placement.law is 'guess'; it must be"),
+        ({"states__one__placement": {"origin": "toe"}}, "placement.origin is 'toe'; it must be"),
+        ({"joins": {"bth": []}}, "joins: unknown state 'bth'; did you mean 'both'?"),
+        ({"joins": {"both": []}}, "joins.both is a list; it must be a list of one end or more"),
         ({"states__one__placement": {"wdith": 0.2}}, "unknown key 'states.one.placement.wdith'"),
         (
             {"states__one__targets": {"swing.knee": {"pitch": 0.4}}},
@@ -157,6 +160,30 @@ def test_states_of_an_included_machine_have_its_prefix(tmp_path: Path) -> None:
 
     assert {"both", "one", "walk.stand", "walk.step"} <= set(states)
     assert all(end.then in states for state in states.values() for end in state.ends)
+
+
+def test_a_join_ends_an_included_state_before_its_own_ends(tmp_path: Path) -> None:
+    content = machine(
+        includes={"walk": "walk"},
+        joins={
+            "walk.step": [
+                {"when": {"time": "> 0.1", "speed": "> 0.9"}, "then": "one", "swap": True}
+            ]
+        },
+        sides=yaml.safe_load((Path(read_machine("walk").file)).read_text())["sides"],
+        states__one__ends__0__then="walk.stand",
+    )
+    file = tmp_path / "machine.yaml"
+    file.write_text(yaml.safe_dump(content))
+
+    joined = read_machine(str(file))
+
+    first, *others = joined.states["walk.step"].ends
+    assert (first.then, first.swap) == ("one", True)
+    assert [end.then for end in others] == [
+        f"walk.{end.then}" for end in read_machine("walk").states["step"].ends
+    ]
+    check_machine(joined, HUMANOID)
 
 
 @pytest.mark.parametrize(

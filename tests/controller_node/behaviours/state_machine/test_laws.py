@@ -95,3 +95,18 @@ def test_a_smooth_step_begins_and_ends_at_rest() -> None:
     assert laws.smooth_step(step) < step * step
     assert 1.0 - laws.smooth_step(1.0 - step) < step * step
     assert (laws.clearance(0.0), laws.clearance(0.5), laws.clearance(1.5)) == (0.0, 1.0, 0.0)
+
+
+def test_a_movement_carries_on_at_its_first_velocity_and_ends_at_rest() -> None:
+    step = 1e-4
+    slope = [
+        (laws.carried_on(share + step) - laws.carried_on(share - step)) / (2.0 * step)
+        for share in (step, 1.0 - step)
+    ]
+
+    assert laws.carried_on(0.0) == laws.carried_on(1.0) == laws.carried_on(1.5) == 0.0
+    assert slope == pytest.approx([1.0, 0.0], abs=1e-5)
+    # neither end has an acceleration
+    for share in (0.0, 1.0 - 2.0 * step):
+        near = [laws.carried_on(share + k * step) for k in range(3)]
+        assert (near[2] - 2.0 * near[1] + near[0]) / step**2 == pytest.approx(0.0, abs=0.02)

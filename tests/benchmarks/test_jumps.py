@@ -1,0 +1,41 @@
+"""A jump of the machine `jump`, as its benchmark measures it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.athletics.jumps import FLIGHT, jump, nudge
+from controller_node.behaviours.state_machine.file import read_machine
+
+
+def test_nudges_are_small_and_of_their_seeds() -> None:
+    pushes = [nudge(seed) for seed in range(1, 41)]
+
+    forces, times = zip(*(text.removeprefix("root:").split("@") for text in pushes), strict=True)
+    sizes = [np.hypot(*(float(number) for number in force.split(",")[:2])) for force in forces]
+    assert 10.0 <= min(sizes) < 12.0 and 28.0 < max(sizes) <= 30.0
+    assert min(float(time) for time in times) < 0.8 and max(float(time) for time in times) > 2.8
+    assert nudge(1) == pushes[0] and len(set(pushes)) == 40
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("push", ["", nudge(2)])
+def test_it_flies_for_a_quarter_of_a_second_and_stands(push: str) -> None:
+    seen = jump(read_machine("jump"), 0, push)
+
+    assert seen.succeeded
+    # a body that flies for T rises by less than g T^2 / 8 where it lands with bent knees
+    assert FLIGHT < seen.flight < 0.5
+    assert 0.03 < seen.rise < 9.81 * seen.flight**2 / 8.0 + 0.05
+
+
+def test_a_jump_that_has_no_flight_does_not_count() -> None:
+    machine = read_machine("jump")
+    stays = replace(machine.states["stand"], ends=())
+    standing = replace(machine, states={"stand": stays})
+
+    seen = jump(standing, 0, "")
+
+    assert seen.stands and seen.flight == 0.0
+    assert not seen.succeeded
