@@ -1,8 +1,8 @@
 """A jump of the machine `jump`, as its benchmark measures it."""
 
+import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from benchmarks.athletics.jumps import FLIGHT, jump, nudge
@@ -13,7 +13,7 @@ def test_nudges_are_small_and_of_their_seeds() -> None:
     pushes = [nudge(seed) for seed in range(1, 41)]
 
     forces, times = zip(*(text.removeprefix("root:").split("@") for text in pushes), strict=True)
-    sizes = [np.hypot(*(float(number) for number in force.split(",")[:2])) for force in forces]
+    sizes = [math.hypot(*(float(number) for number in force.split(",")[:2])) for force in forces]
     assert 10.0 <= min(sizes) < 12.0 and 28.0 < max(sizes) <= 30.0
     assert min(float(time) for time in times) < 0.8 and max(float(time) for time in times) > 2.8
     assert nudge(1) == pushes[0] and len(set(pushes)) == 40
@@ -37,5 +37,5 @@ def test_a_jump_that_has_no_flight_does_not_count() -> None:
 
     seen = jump(standing, 0, "")
 
-    assert seen.stands and seen.flight == 0.0
+    assert seen.stands and seen.flight < 0.01  # of the first ticks, put down
     assert not seen.succeeded

@@ -70,6 +70,7 @@ class Placement:
     length: float = 0.0  # m, of a leg that reaches, from hip to sole
     origin: str = HIP  # or centre, of mass: what a leg that reaches goes ahead of
     carry: float = 0.0  # the share of its velocity that a leg that reaches sets out with
+    retract: float = 0.0  # the share of the body's speed at which it goes back as it lands
     stance_time: float = 0.0  # s, that it will stand, of the law neutral; 0: the state's duration
 
 

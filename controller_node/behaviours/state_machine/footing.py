@@ -185,6 +185,8 @@ class ReachingFoot:
         goal = in_world(course.heading, (ahead, side, -law.length))
         place = add(scale(1.0 - moved, self.start), scale(moved, goal))
         place = add(place, scale(state.duration * carried, self.velocity))
+        back = -law.retract * state.duration * laws.led_back(share)
+        place = add(place, in_world(course.heading, (back * vx, back * vy, 0.0)))
         raised = law.clearance * laws.clearance(share)
         turn = about_z(_turned(self.start_yaw, at.course.heading, moved))
         return FootPose(add(add(hip, place), (0.0, 0.0, raised)), turn)

@@ -116,6 +116,16 @@ def carried_on(share: float) -> float:
     return s * (1.0 + s * s * (-6.0 + s * (8.0 - 3.0 * s)))
 
 
+def led_back(share: float) -> float:
+    """What a last velocity adds to a movement, from 0 with slope 0 to 0 with slope 1 at 1, and on.
+
+    `-4 s^3 + 7 s^4 - 3 s^5`: `carried_on` from the other end, with its sign. A foot that is led
+    back like this meets the ground at the ground's speed.
+    """
+    s = max(share, 0.0)
+    return s - 1.0 if s > 1.0 else s * s * s * (-4.0 + s * (7.0 - 3.0 * s))
+
+
 def clearance(share: float) -> float:
     """The height of a swing foot, from 0 over 1 at the middle back to 0: `16 s^2 (1 - s)^2`."""
     s = min(max(share, 0.0), 1.0)

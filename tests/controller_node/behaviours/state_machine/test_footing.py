@@ -75,3 +75,14 @@ def test_it_sets_out_from_where_it_is_and_carries_on_as_it_moved(kit: MachineKit
         assert now.sole == pytest.approx(foot.sole, abs=1e-9)
         assert speed == pytest.approx([carry * value for value in foot.velocity], abs=1e-2)
     assert max(abs(value) for value in foot.velocity) > 0.3
+
+
+def test_a_foot_that_retracts_lands_at_the_speed_of_the_ground(kit: MachineKit) -> None:
+    at, step = moving(kit, 1.0), 1e-5
+    here, later = (
+        reached(kit, at, time, retract=1.0, clearance=0.0) for time in (0.2 - step, 0.2 + step)
+    )
+    held = reached(kit, at, 0.2, retract=0.0)
+
+    assert here.sole == pytest.approx(held.sole, abs=1e-4)
+    assert (later.sole[0] - here.sole[0]) / (2.0 * step) == pytest.approx(-1.0, abs=1e-2)

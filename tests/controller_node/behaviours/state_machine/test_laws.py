@@ -110,3 +110,12 @@ def test_a_movement_carries_on_at_its_first_velocity_and_ends_at_rest() -> None:
     for share in (0.0, 1.0 - 2.0 * step):
         near = [laws.carried_on(share + k * step) for k in range(3)]
         assert (near[2] - 2.0 * near[1] + near[0]) / step**2 == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_foot_that_is_led_back_has_its_last_velocity_at_the_end_and_from_there_on() -> None:
+    shares = (0.0, 0.2, 0.5, 0.9, 1.0)
+
+    # it is the other movement, seen from the other end
+    for share in shares:
+        assert laws.led_back(share) == pytest.approx(-laws.carried_on(1.0 - share), abs=1e-12)
+    assert laws.led_back(1.25) == 0.25
