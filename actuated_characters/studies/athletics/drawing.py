@@ -49,7 +49,7 @@ def draw_walks(result: StudyResult, runs: Mapping[str, Recording], wanted: Cours
 
 def _draw_feet(panel: "Axes", recording: Recording) -> None:
     """The feet that touch the ground, and below them the states."""
-    times, rows = recording.times, loaded(recording)
+    times, rows, sides = recording.times, loaded(recording), ["right foot", "left foot"]
     for column in range(len(FEET)):
         edges = np.flatnonzero(np.diff(np.r_[0, rows[:, column], 0])).reshape(-1, 2)
         bars = [(float(times[a]), float(times[b] - times[a])) for a, b in edges]
@@ -63,8 +63,8 @@ def _draw_feet(panel: "Axes", recording: Recording) -> None:
         panel.plot([], [], color=f"C{2 + place % 8}", linewidth=5, label=name)
     if names:
         panel.legend(ncols=3, fontsize="x-small", loc="upper right", title="state")
-    panel.set_yticks([0, 1, 2], ["state", "right foot", "left foot"])
-    panel.set_ylim(-0.5, 4.2 if names else 2.6)
+    panel.set_yticks(*(([0, 1, 2], ["state", *sides]) if names else ([1, 2], sides)))
+    panel.set_ylim(-0.5 if names else 0.5, 4.2 if names else 2.6)
 
 
 def draw_jump(result: StudyResult, recording: Recording) -> None:
