@@ -8,6 +8,7 @@ for 0.25 s, without contact of either foot, and then stands for 3 s, still and u
 import argparse
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from msgs_config.runtime.process import limit_threads
@@ -26,7 +27,24 @@ from msgs_config.errors import ActuatedCharactersError  # noqa: E402
 from msgs_config.geometry import rotations  # noqa: E402
 
 FLIGHT, STANDING = 0.25, 3.0  # s, at least
+SEARCHED = (
+    "states.crouch.root.height=0.02",
+    "states.crouch.root.pitch=0.06",
+    "states.thrust.root.climb=0.06",
+    "states.thrust.root.pitch=0.06",
+    "states.thrust.pressure.ahead=0.008",
+    "states.flight.duration=0.02",
+    "states.flight.placement.length=0.01",
+    "states.flight.placement.ahead=0.02",
+    "states.flight.placement.gain=0.04",
+    "states.land.root.height=0.02",
+    "states.land.root.pitch=0.05",
+    "states.land.pressure.gain=0.2",
+    "states.land.pressure.side_gain=0.2",
+)
+"""Where numbers are in the file, and how far a search first moves them."""
 SECONDS = 6.5
+_AIM = 0.3  # s, of flight, of a search
 STILL, UPRIGHT = 0.1, 0.98  # m/s of the root; cosine of its tilt
 _FIRST, _LAST = 0.5, 3.1  # s
 _LEAST, _MOST, _LASTS = 10.0, 30.0, 0.2  # N, N, s
@@ -41,6 +59,7 @@ class Jump:
     flight: float  # s, the longest without contact
     rise: float  # m, of the root above where it left the ground
     standing: float  # s, after it
+    unrest: float  # m, that the root moves over the ground after it
     stands: bool  # still and upright at the end
 
     @property
@@ -75,8 +94,24 @@ def jump(machine: Machine, seed: int, push: str, rate: int = 240) -> Jump:
         flight=(end - start) / rate,
         rise=float(max(heights) - heights[0]) if heights else 0.0,
         standing=0.0 if fell else last.time - ticks[end - 1].time,
+        unrest=sum(math.hypot(*tick.velocity[:2].tolist()) for tick in ticks[end:]) / rate,
         stands=not fell and upright and still,
     )
+
+
+def draw_nudges(rng: np.random.Generator, count: int, rate: int) -> list[str]:
+    """Nudges of seeds that a search draws, whatever the rate."""
+    return [nudge(int(seed)) for seed in rng.integers(1, 1 << 30, count)]
+
+
+def search_cost(machine: Machine, pushes: Sequence[str]) -> float:
+    """The mean cost of a machine: a fall, what is missing of a flight of 0.3 s, and the unrest."""
+    costs = []
+    for push in pushes:
+        seen = jump(machine, 0, push)
+        short = max(0.0, _AIM - seen.flight) / _AIM
+        costs.append(10.0 * (not seen.stands) + 10.0 * short + seen.unrest)
+    return sum(costs) / len(costs)
 
 
 def _flight(ticks: list[Moment]) -> tuple[int, int]:

@@ -2,8 +2,9 @@
 
 Each candidate walks some short trials in the simulator, at speeds and turns and under pushes that
 change from generation to generation. Its cost is what it fell short of them, the error of its
-speed, its drift aside, the error of its heading, and its effort. The best machine so far is
-written after every generation; Ctrl-C ends the search and keeps it.
+speed, its drift aside, the error of its heading, and its effort. With `--task jump` it jumps,
+nudged. The best machine so far is written after every generation; Ctrl-C ends the search and keeps
+it.
 
 Source: Hansen and Ostermeier 2001, "Completely Derandomized Self-Adaptation in Evolution
 Strategies"; the extra `search` brings the package `cma`.
@@ -11,8 +12,9 @@ Strategies"; the extra `search` brings the package `cma`.
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ limit_threads()
 import numpy as np  # noqa: E402 - after the limit on threads
 import yaml  # noqa: E402
 
+from benchmarks.athletics import jumps  # noqa: E402
 from benchmarks.athletics.trial import Trial, Walk, walked  # noqa: E402
 from controller_node.behaviours.state_machine.description import Machine  # noqa: E402
 from controller_node.behaviours.state_machine.file import (  # noqa: E402
@@ -118,13 +121,29 @@ def cost(machine: Machine, given: Sequence[Trial]) -> float:
     return float(np.mean([cost_of(walked(trial, machine, 3.5), trial.seconds) for trial in given]))
 
 
+@dataclass(frozen=True)
+class Task:
+    """What a machine is to do."""
+
+    searched: Sequence[str]
+    draw: Callable[[np.random.Generator, int, int], Sequence[Any]]  # trials: how many, Hz
+    cost: Callable[[Machine, Sequence[Any]], float]
+
+
+TASKS = {
+    "walk": Task(SEARCHED, trials, cost),
+    "jump": Task(jumps.SEARCHED, jumps.draw_nudges, jumps.search_cost),
+}
+
+
 def search(options: argparse.Namespace) -> None:
     """Search until the generations are over, or Ctrl-C."""
     import cma
 
-    path = machine_path(options.machine)
+    task = TASKS[options.task]
+    path = machine_path(options.machine or options.task)
     content = read_content(path)
-    places, steps = zip(*(text.split("=") for text in options.move or SEARCHED), strict=True)
+    places, steps = zip(*(text.split("=") for text in options.move or task.searched), strict=True)
     spans = np.array([float(step) for step in steps])
     start = [holder[key] for holder, key in (place_of(content, place) for place in places)]
     settings = {
@@ -136,11 +155,11 @@ def search(options: argparse.Namespace) -> None:
     evolution = cma.CMAEvolutionStrategy(start, 0.3, settings)
     rng = np.random.default_rng(options.seed)
     for generation in range(1, options.generations + 1):
-        given = trials(rng, options.trials, options.rate)
+        given = task.draw(rng, options.trials, options.rate)
         asked = evolution.ask()
         costs = []
         for number, candidate in enumerate(asked, 1):
-            costs.append(_cost_or_worst(path, changed(content, places, candidate), given))
+            costs.append(_cost_or_worst(task, path, changed(content, places, candidate), given))
             done = f"generation {generation}: {number} of {len(asked)}, cost {costs[-1]:.3f}"
             print(done, end="\r", file=sys.stderr, flush=True)
         evolution.tell(asked, costs)
@@ -151,10 +170,10 @@ def search(options: argparse.Namespace) -> None:
         print(f"  {numbers}", flush=True)
 
 
-def _cost_or_worst(path: Path, content: dict[str, Any], given: Sequence[Trial]) -> float:
+def _cost_or_worst(task: Task, path: Path, content: dict[str, Any], given: Sequence[Any]) -> float:
     """The cost of a file's content; more than that of any fall if it is no machine."""
     try:
-        return cost(make_machine(path, content), given)
+        return task.cost(make_machine(path, content), given)
     except ConfigurationError:
         return 3.0 * FALL
 
@@ -167,7 +186,8 @@ def write(path: Path, content: dict[str, Any]) -> None:
 def main() -> int:
     """Search as the options say."""
     parser = argparse.ArgumentParser("python -m benchmarks.athletics.search", description=__doc__)
-    parser.add_argument("--machine", default="walk", help="to begin with: a name or a file (walk)")
+    parser.add_argument("--task", choices=TASKS, default="walk", help="(walk)")
+    parser.add_argument("--machine", help="to begin with: a name or a file (that of the task)")
     parser.add_argument("--output", type=Path, default=Path("found.yaml"), help="(found.yaml)")
     parser.add_argument(
         "--move",

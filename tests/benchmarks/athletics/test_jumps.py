@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.athletics.jumps import FLIGHT, jump, nudge
-from controller_node.behaviours.state_machine.file import read_machine
+from benchmarks.athletics.jumps import FLIGHT, SEARCHED, jump, nudge, search_cost
+from benchmarks.athletics.search import place_of
+from controller_node.behaviours.state_machine.file import machine_path, read_content, read_machine
 
 
 def test_nudges_are_small_and_of_their_seeds() -> None:
@@ -37,5 +38,15 @@ def test_a_jump_that_has_no_flight_does_not_count() -> None:
 
     seen = jump(standing, 0, "")
 
+    assert search_cost(standing, [""]) >= 9.0  # no flight at all costs ten
     assert seen.stands and seen.flight < 0.01  # of the first ticks, put down
     assert not seen.succeeded
+
+
+def test_a_search_moves_numbers_that_the_file_has() -> None:
+    content = read_content(machine_path("jump"))
+
+    for text in SEARCHED:
+        place, step = text.split("=")
+        holder, key = place_of(content, place)
+        assert isinstance(holder[key], float) and 0.0 < float(step) < 1.0
