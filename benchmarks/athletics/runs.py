@@ -1,15 +1,17 @@
-"""Runs of the machine `run`, nudged: `python -m benchmarks.athletics.runs`.
+"""Runs of the machine in `run.yaml` here, nudged: `python -m benchmarks.athletics.runs`.
 
-Each run begins standing, gets faster up to a speed, and is measured for 20 s from then on, while a
-nudge of 10 to 30 N acts on its root for 0.2 s every 4 s, from a random side at a random moment. A
-run counts that does not fall, is as fast as it is to be in the mean, and has both feet in the air
-at least a tenth of the time.
+It is an attempt: it runs, but slowly, and so it is none of the shipped machines. Each run begins
+standing, gets faster up to a speed, and is measured for 20 s from then on, while a nudge of 10 to
+30 N acts on its root for 0.2 s every 4 s, from a random side at a random moment. A run counts that
+does not fall, is as fast as it is to be in the mean, and has both feet in the air at least a tenth
+of the time.
 """
 
 import argparse
 import math
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 from msgs_config.runtime.process import limit_threads
 
@@ -27,6 +29,7 @@ from msgs_config.errors import ActuatedCharactersError  # noqa: E402
 
 SPEED, AIRBORNE = 2.0, 0.1  # m/s and share of the time, at least
 MEASURED = 20.0  # s
+ATTEMPT = Path(__file__).with_name("run.yaml")
 _BEGINS = 1.0  # s
 _EVERY, _LEAST, _MOST, _LASTS = 4.0, 10.0, 30.0, 0.2  # s, N, N, s
 
@@ -43,7 +46,7 @@ class Run:
 
     def succeeded(self, speed: float) -> bool:
         """Whether it ran at a speed in m/s, and did not fall."""
-        return self.lasted >= MEASURED and self.speed >= speed and self.airborne >= AIRBORNE
+        return self.lasted > MEASURED - 0.01 and self.speed >= speed and self.airborne >= AIRBORNE
 
 
 def nudges(seed: int, since: float, seconds: float) -> list[str]:
@@ -94,7 +97,9 @@ def run(machine: Machine, seed: int, speed: float, seconds: float = MEASURED) ->
 def main() -> int:
     """Run, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--machine", default="run", help="a shipped one, or a file (%(default)s)")
+    parser.add_argument(
+        "--machine", default=str(ATTEMPT), help="a shipped one, or a file (run.yaml)"
+    )
     parser.add_argument("--speed", type=float, default=SPEED, help="m/s, commanded (%(default)s)")
     parser.add_argument("--runs", type=int, default=5, help="(%(default)s)")
     parser.add_argument("--first-seed", type=int, default=1, help="of the nudges (%(default)s)")

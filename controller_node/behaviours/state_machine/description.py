@@ -179,6 +179,8 @@ class Machine:
     start: str
     states: dict[str, State]
     acceleration: float = 1e9  # m/s^2, at which it takes over commanded velocities
+    speed: float = 1e9  # m/s, ahead and sideways, the largest that it takes over
+    pace: float = 1.0  # the speed ahead that its laws are told, as a share of the commanded one
 
     def joint(self, name: str, stance: str) -> str:
         """The character's joint of a name in a target, where a side is the stance side."""

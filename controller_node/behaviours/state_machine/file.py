@@ -36,7 +36,10 @@ from msgs_config.geometry.single_rotations import Vector
 from msgs_config.mappings import MappingReader
 
 MACHINES_DIRECTORY = Path(__file__).parent / "data"
-_KEYS = ["sides", "start", "includes", "joins", "acceleration", "gains", "bounds", "states"]
+_KEYS = [
+    *("sides", "start", "includes", "joins", "acceleration", "speed", "pace", "gains", "bounds"),
+    "states",
+]
 _STATE_KEYS = [
     *("feet", "duration", "blend", "root", "pressure", "placement", "targets", "gains"),
     *("efforts", "tracks", "ends"),
@@ -110,7 +113,8 @@ def make_machine(path: Path, content: dict[str, Any], depth: int = _DEPTH) -> Ma
     acceleration = reader.number("acceleration", 1e9, 1e-3, 1e9)
     if not states:
         raise reader.wrong("states", content.get("states"), "a mapping of one state or more")
-    return Machine(path, sides, reader.text("start"), states, acceleration)
+    speed, pace = reader.number("speed", 1e9, 1e-3, 1e9), reader.number("pace", 1.0, 0.1, 10.0)
+    return Machine(path, sides, reader.text("start"), states, acceleration, speed, pace)
 
 
 def _beside(path: Path, name: str) -> Path:

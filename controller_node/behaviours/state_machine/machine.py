@@ -114,12 +114,15 @@ class StateMachine:
         return BehaviourOutput(self._phase, self._target, gains, effort)
 
     def _followed(self, course: Course) -> Course:
-        """A course whose velocity is taken over no faster than the machine can."""
-        most, before = self._kit.machine.acceleration * self._kit.period, self._course
+        """A course whose velocity is taken over as far and as fast as the machine can."""
+        machine, before = self._kit.machine, self._course
+        most = machine.acceleration * self._kit.period
+        forward = machine.pace * within(course.forward, machine.speed)
+        left = within(course.left, machine.speed)
         return replace(
             course,
-            forward=before.forward + within(course.forward - before.forward, most),
-            left=before.left + within(course.left - before.left, most),
+            forward=before.forward + within(forward - before.forward, most),
+            left=before.left + within(left - before.left, most),
         )
 
     def _go_on(self, now: float, at: Situation) -> Situation:

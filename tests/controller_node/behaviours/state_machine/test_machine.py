@@ -169,3 +169,32 @@ def _ahead(plan: RunPlan) -> float:
     model = DynamicsModel(plan.character)
     rest = np.array(plan.character.rest_position)
     return float(model.centre_of_mass_at(rest)[0]) - 0.045
+
+
+@pytest.mark.parametrize(
+    ("limits", "goes"), [("speed: 0.2", False), ("speed: 0.2\npace: 2", True), ("pace: 0.4", False)]
+)
+def test_a_machine_takes_over_a_command_up_to_its_speed_and_at_its_pace(
+    tmp_path: Path, limits: str, goes: bool
+) -> None:
+    file = tmp_path / "slow.yaml"
+    file.write_text(
+        SIDES
+        + limits
+        + """
+start: one
+states:
+  one:
+    feet: {stance: stand, swing: stand}
+    root: {height: 0.8}
+    ends: [{when: {command_ahead: "> 0.3"}, then: two}]
+  two:
+    feet: {stance: stand, swing: stand}
+    root: {height: 0.8}
+    ends: never
+"""
+    )
+
+    _, _, states = run(planned(0.7, "0.5,0,0@0.05", machine=str(file)))
+
+    assert states == ["one right", "two right"][: 1 + goes]
