@@ -68,7 +68,7 @@ class Jump:
         return self.flight >= FLIGHT and self.standing >= STANDING and self.stands
 
 
-def nudge(seed: int) -> str:
+def small_push(seed: int) -> str:
     """A small push of a seed."""
     draws = np.random.default_rng(seed)
     time, side = draws.uniform(_FIRST, _LAST), draws.uniform(-math.pi, math.pi)
@@ -101,7 +101,7 @@ def jump(machine: Machine, seed: int, push: str, rate: int = 240) -> Jump:
 
 def draw_nudges(rng: np.random.Generator, count: int, rate: int) -> list[str]:
     """Nudges of seeds that a search draws, whatever the rate."""
-    return [nudge(int(seed)) for seed in rng.integers(1, 1 << 30, count)]
+    return [small_push(int(seed)) for seed in rng.integers(1, 1 << 30, count)]
 
 
 def search_cost(machine: Machine, pushes: Sequence[str]) -> float:
@@ -145,7 +145,7 @@ def main() -> int:
     seeds = range(options.first_seed, options.first_seed + options.runs)
     try:
         machine = read_machine(options.machine)
-        tasks = [(0, ""), *((seed, nudge(seed)) for seed in seeds)]
+        tasks = [(0, ""), *((seed, small_push(seed)) for seed in seeds)]
         jumps = [jump(machine, *task) for task in track(tasks, console=console)]
     except ActuatedCharactersError as error:
         raise SystemExit(f"error: {error}") from error

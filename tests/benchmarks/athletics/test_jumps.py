@@ -5,23 +5,23 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.athletics.jumps import FLIGHT, SEARCHED, jump, nudge, search_cost
+from benchmarks.athletics.jumps import FLIGHT, SEARCHED, jump, search_cost, small_push
 from benchmarks.athletics.search import place_of
 from controller_node.behaviours.state_machine.file import machine_path, read_content, read_machine
 
 
 def test_nudges_are_small_and_of_their_seeds() -> None:
-    pushes = [nudge(seed) for seed in range(1, 41)]
+    pushes = [small_push(seed) for seed in range(1, 41)]
 
     forces, times = zip(*(text.removeprefix("root:").split("@") for text in pushes), strict=True)
     sizes = [math.hypot(*(float(number) for number in force.split(",")[:2])) for force in forces]
     assert 10.0 <= min(sizes) < 12.0 and 28.0 < max(sizes) <= 30.0
     assert min(float(time) for time in times) < 0.8 and max(float(time) for time in times) > 2.8
-    assert nudge(1) == pushes[0] and len(set(pushes)) == 40
+    assert small_push(1) == pushes[0] and len(set(pushes)) == 40
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("push", ["", nudge(2)])
+@pytest.mark.parametrize("push", ["", small_push(2)])
 def test_it_flies_for_a_quarter_of_a_second_and_stands(push: str) -> None:
     seen = jump(read_machine("jump"), 0, push)
 

@@ -82,7 +82,7 @@ def test_a_foot_that_retracts_lands_at_the_speed_of_the_ground(kit: MachineKit) 
     here, later = (
         reached(kit, at, time, retract=1.0, clearance=0.0) for time in (0.2 - step, 0.2 + step)
     )
-    held = reached(kit, at, 0.2, retract=0.0)
+    fixed = reached(kit, at, 0.2, retract=0.0)
 
-    assert here.sole == pytest.approx(held.sole, abs=1e-4)
+    assert here.sole == pytest.approx(fixed.sole, abs=1e-4)
     assert (later.sole[0] - here.sole[0]) / (2.0 * step) == pytest.approx(-1.0, abs=1e-2)
