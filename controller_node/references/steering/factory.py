@@ -29,7 +29,7 @@ PARAMETERS = (
     ),
     Parameter(
         "steering.braking",
-        1.6,
+        2.2,
         "likewise, while it slows down",
         unit="m/s^2",
         minimum=0.01,

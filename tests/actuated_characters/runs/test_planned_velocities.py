@@ -45,9 +45,9 @@ def test_the_plans_reference_goes_where_the_velocities_lead() -> None:
     plan, _ = plan_velocities(plan_of(5.0), "0.7,0,0@1 0,0,0@4")
 
     assert isinstance(plan.reference, SteeredReference)
-    # 3 s of 0.7 m/s, less the way to get there at 1.3 m/s^2, and the way to stop at 1.6 m/s^2
+    # 3 s of 0.7 m/s, less the way to get there at 1.3 m/s^2, and the way to stop at 2.2 m/s^2
     assert plan.reference.course(5 * RATE).x == pytest.approx(
-        2.1 - 0.245 / 1.3 + 0.245 / 1.6, abs=0.01
+        2.1 - 0.245 / 1.3 + 0.245 / 2.2, abs=0.01
     )
     assert plan.reference.course(5 * RATE).forward == 0.0
 
