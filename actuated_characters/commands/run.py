@@ -150,6 +150,10 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
     for name in ("behaviour", "planner", "collision"):
         _set_option(name, getattr(options, name), controller)
     if options.machine is not None:
+        if options.behaviour not in (None, "state_machine"):
+            raise ConfigurationError(
+                f"--machine goes with --behaviour state_machine, not {options.behaviour}"
+            )
         _set_option("machine", options.machine, controller)
         _set_option("behaviour", "state_machine", controller)
     character = load_character(options.character, collides(simulator | controller))

@@ -109,6 +109,9 @@ def main() -> int:
                 upright.setdefault(case.kind, []).append(not walk.fell)
                 if options.verbose:
                     print(*row(case, walk), sep=" | ", flush=True)
+        except ActuatedCharactersError as error:
+            print(f"error: {error}", file=sys.stderr)
+            return 1
         except KeyboardInterrupt:
             print("interrupted; these are the walks so far", file=sys.stderr)
     Console().print(table)

@@ -13,6 +13,9 @@ _PROGRAM = "actuated_characters"
 _COMMANDS = {
     "play": "a humanoid that walks in the browser, to be pushed; needs the extra 'view'",
     "play --scene brawl": "another scene",
+    "play --scene drive": "a humanoid that the arrow keys steer; needs 'view' and 'plan'",
+    'run --machine walk --cmd-vel "0.9,0,0.3@1" --duration 10': "walks by laws of balance",
+    "motion import my_capture.bvh": "a clip of your own capture, for --clip",
     "run --clip walk --duration 20": "a recorded run, and its figures",
     "run --view --clip dance_a": "any run in the browser",
     "run --clip backflip --duration 1.75 --planner predictive": "by joint torques "

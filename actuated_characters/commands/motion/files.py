@@ -52,7 +52,8 @@ def plan_conversions(
     """
     path = Path(source)
     if path.is_dir():
-        folder = output or path.with_name(path.name + (beside or "-clips"))
+        whole = path.resolve()
+        folder = output or whole.with_name(whole.name + (beside or "-clips"))
         if folder.exists() and not folder.is_dir():
             raise ConfigurationError(f"--output {folder}: it must be a folder, as {source} is one")
         conversions = [

@@ -21,7 +21,7 @@ from actuated_characters.commands.motion.files import (
     make_folder_of,
     plan_conversions,
 )
-from msgs_config.errors import ClipError
+from msgs_config.errors import ClipError, RecordingError
 
 if TYPE_CHECKING:  # it takes a while to import
     from actuated_characters.motion.clips.importing import ImportedClip
@@ -80,6 +80,10 @@ def _import(options: argparse.Namespace) -> int:
     conversions = plan_conversions(
         options.source, options.output, _BVH, _SUFFIX, beside="", overwrite=options.overwrite
     )
+    for conversion in conversions:
+        picture = _picture(conversion)
+        if not (options.no_picture or options.overwrite) and picture.exists():
+            raise RecordingError(f"{picture} exists already; --overwrite replaces it")
     joints = None if options.map is None else read_map(options.map)
     settings = RetargetingSettings(joints, options.up, options.units)
     target = TargetBody(load_character(options.character))

@@ -152,7 +152,7 @@ def describe_quality(quality: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "limits touched", ", ".join(texts) or "none"
         fastest = f"{quality['fastest_joint_rad_s']:.1f} rad/s, {quality['fastest_joint']}"
         yield "fastest joint", fastest
-    if "worst_joint" in quality:
+    if {"worst_joint", "worst_joint_mean_rad", "worst_joint_max_rad"} <= quality.keys():
         yield (
             "worst joint",
             f"{quality['worst_joint']}: {quality['worst_joint_mean_rad']:.3f} rad from the "

@@ -108,7 +108,11 @@ def blend(first: MotionClip, second: MotionClip, duration: float) -> MotionClip:
         point: _joined(first, second, point, begins, duration)
         for point in {**first.contacts, **second.contacts}
     }
-    made = replace(first, motion=one, times=times, contacts=contacts, wraps=False)
+    licences = [each.source["licence"] for each in (first, second) if "licence" in each.source]
+    source = dict(first.source)
+    if licences:
+        source["licence"] = "; ".join(dict.fromkeys(map(str, licences)))
+    made = replace(first, motion=one, times=times, contacts=contacts, wraps=False, source=source)
     name = second.source.get("file", second.source.get("clip", "another clip"))
     return replace(made, motion=_moved(made, way)).edited(
         f"{name} after it, blended {duration:g} s"

@@ -1,6 +1,7 @@
 """BVH files made into clips of a character."""
 
 import hashlib
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,8 @@ def _source(path: Path, motion: BvhMotion, made: RetargetedMotion, licence: str)
 
 def _part_of(path: Path, motion: BvhMotion, start: float, end: float | None) -> BvhMotion:
     """The frames of a motion from a time to another one, s."""
+    if not (math.isfinite(start) and (end is None or math.isfinite(end))):
+        raise ClipError(f"{path}: from {start:g} s to {end:g} s: both must be finite")
     frames = len(motion.values)
     last = frames - 1 if end is None else round(end / motion.frame_time)
     first = round(start / motion.frame_time)

@@ -18,7 +18,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import ClipError
 
 SOURCE, CONTACTS, QUALITY = "Source", "Contacts", "Quality"
-SUFFIXES = (".json", ".txt")
+_FIGURES = ("_m", "_m_s", "_rad", "_rad_s")  # names of figures end in their units
 _ROUNDING = 1e-6  # s
 
 Spans = tuple[tuple[float, float], ...]
@@ -91,6 +91,8 @@ def read_motion_clip(character: Character, name_or_path: str) -> MotionClip:
     file = ClipFile(character, name_or_path)
     frames: ClipFrames = file.frames
     source = _mapping(file, SOURCE)
+    if not isinstance(source.get("edits", []), list):
+        raise ClipError(f"{file.path}: {SOURCE}: edits must be a list")
     return MotionClip(
         character=character,
         times=frames.times,
@@ -98,7 +100,7 @@ def read_motion_clip(character: Character, name_or_path: str) -> MotionClip:
         wraps=frames.wraps,
         contacts=_contacts(file, float(frames.times[-1])),
         source=source or {"clip": file.path.name},
-        quality=_mapping(file, QUALITY),
+        quality=_quality(file),
     )
 
 
@@ -109,6 +111,16 @@ def _mapping(file: ClipFile, key: str) -> dict[str, Any]:
             f"{file.path}: {key} is {json.dumps(content)[:60]}; it must be a JSON object"
         )
     return content
+
+
+def _quality(file: ClipFile) -> dict[str, Any]:
+    quality = _mapping(file, QUALITY)
+    for name, value in quality.items():
+        is_number = isinstance(value, int | float) or value is None
+        if name.endswith(_FIGURES) and not is_number:
+            shown = json.dumps(value)[:60]
+            raise ClipError(f"{file.path}: {QUALITY}: {name} is {shown}; it must be a number")
+    return quality
 
 
 def _contacts(file: ClipFile, duration: float) -> dict[str, Spans]:

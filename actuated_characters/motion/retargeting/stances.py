@@ -61,7 +61,7 @@ def with_stances(
         lift = _swing_clearance(touching[0] | touching[1], frame_time)
         foot = goals.surface.links == target.map[f"{side}_ankle"]
         clearance[:, foot] += lift[:, np.newaxis]
-        if contacts[f"{side}_hand"]:
+        if contacts[f"{side}_hand"] and f"{side}_wrist" in target.map:
             _hold_hand(points, target, loose, f"{side}_wrist", contacts[f"{side}_hand"], frame_time)
     places, weights = np.stack(points.places, axis=1), np.stack(points.weights, axis=1)
     links: IntArray = np.array(points.links, dtype=np.intp)

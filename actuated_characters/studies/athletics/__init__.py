@@ -1,6 +1,7 @@
 """Athletes by state machine: their states, speed and heading, and the pushes that they survive."""
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -25,9 +26,10 @@ _COMMANDS = "0.5,0,0@0.5 0.9,0,0@3 0.9,0,0.4@5 0,0,0@8"
 _LENGTH = 11.0  # s
 _JUMP_LENGTH = 4.5
 _SETTLED = 2.0  # s, from which on speeds are compared
+_PLANNER = "planner"
 _WALKS: Mapping[str, Mapping[str, object]] = {
     "walk": {"behaviour": "state_machine", "machine": "walk"},
-    "planner": {"planner": "predictive"},
+    _PLANNER: {"planner": "predictive"},
 }
 _PUSH_COMMANDS, _PUSH_TIME, _PUSH_END = "0.6,0,0@0.2", 3.0, 6.5
 _USUAL, _FINE = (4, 4), (12, 6)  # directions, runs for each
@@ -35,7 +37,8 @@ _USUAL, _FINE = (4, 4), (12, 6)  # directions, runs for each
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
     """Steer walks by a machine and by the planner, jump, and push the walking machine."""
-    walks = {name: _steered(name) for name in _WALKS}
+    plans = find_spec("numba") is not None
+    walks = {name: _steered(name) for name in _WALKS if plans or name != _PLANNER}
     runs = {name: runner.run(case).recording for name, case in walks.items()}
     wanted = commanded(walks["walk"])
     jump = runner.run(
@@ -47,9 +50,11 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     draw_walks(result, runs, wanted)
     draw_jump(result, jump.recording)
     directions, halvings = _FINE if runner.fine else _USUAL
-    names = list(_WALKS) if runner.fine else ["walk"]
+    names = list(walks) if runner.fine else ["walk"]
     maps = {name: _pushed(runner, name, directions, halvings) for name in names}
     draw_pushes(result, maps)
+    if not plans:
+        result.remarks.append("without the planner beside it, which needs the extra 'plan'")
     result.remarks.append(
         "pushes: 0.2 s at the root, while it walks at 0.6 m/s; finer, and the planner's, by --fine"
     )

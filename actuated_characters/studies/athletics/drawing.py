@@ -15,7 +15,7 @@ from actuated_characters.studies.athletics.measures import (
     longest_flight,
     taken,
 )
-from actuated_characters.studies.athletics.pushes import PushMap
+from actuated_characters.studies.athletics.pushes import LARGEST, PushMap
 from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import StudyResult
 
@@ -86,18 +86,20 @@ def draw_pushes(result: StudyResult, maps: Mapping[str, PushMap]) -> None:
     """By direction: the largest impulse that was survived, and the least that threw it down."""
     (panel,) = result.add_panels(f"{result.name}_pushes", 1, 1, (6.0, 6.0))
     for number, (name, pushes) in enumerate(maps.items()):
+        fell = np.array(pushes.fell)
+        fell[fell >= LARGEST] = np.nan  # nothing that was tried threw it down
         for values, style, what in (
-            (pushes.survived, "-", "survives"),
-            (pushes.fell, ":", "falls"),
+            (np.array(pushes.survived), "-", "survives"),
+            (fell, ":", "falls"),
         ):
-            x, y = (pushes.along(values, axis) for axis in (0, 1))
+            x, y = (pushes.along(values.tolist(), axis) for axis in (0, 1))
             panel.plot(x, y, f"C{number}{style}o", markersize=4, label=f"{name} {what}")
         result.add_curves(
             f"{result.name}_pushes_{name}",
             {
                 "direction_rad": np.array(pushes.directions),
                 "survives_N_s": np.array(pushes.survived),
-                "falls_N_s": np.array(pushes.fell),
+                "falls_N_s": fell,
             },
         )
     panel.set_aspect("equal")

@@ -67,6 +67,7 @@ KEYS = (
     Key("Turn right", "arrowright", turn=-_TURN),
     Key("Turn right, running", "arrowright", "shift", turn=-_TURN),
     Key("Stop", "space", forward=0.0, turn=0.0),
+    Key("Stop, running", "space", "shift", forward=0.0, turn=0.0),
 )
 
 

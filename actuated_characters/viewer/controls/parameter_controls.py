@@ -37,6 +37,10 @@ class ParameterControls:
         if shown != self._shown:
             self._shown = shown
             self._build()
+        for _, handle in self._controls.values():
+            handle.visible = False  # until the node has said that it has it
+        for folder in self._folders.values():
+            folder.visible = False
         self._ask(self._controls)
 
     def _build(self) -> None:
