@@ -24,6 +24,7 @@ from controller_node.controller_settings import (
     ControllerSettings,
     EffectiveGains,
     check_planned,
+    check_unaided,
     effective_gains,
 )
 from controller_node.effort_series import EffortSeries
@@ -41,7 +42,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.effort_limits import EffortLimits
 from msgs_config.character.model import Character
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, MotionError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.state import StampedReference, StampedState
@@ -82,10 +83,10 @@ class Controller:
         check_inertia(self._model, character)
         self._context = LawContext(self.layout, self._model, self.clock.period_s, series)
         self._balance = BalanceController(character, character.feet) if character.feet else None
+        self._choice = behaviour or BehaviourChoice()
         self.check(settings)
         self._settings = settings
         self._limits = EffortLimits(self.layout, settings.gains.effort_limits)  # those met last
-        self._choice = behaviour or BehaviourChoice()
         self.needs_contacts = self._choice.needs_contacts  # of the tick before, to answer a state
         self.opponent = self._choice.opponent  # the character whose place it needs too; or none
         self._own_reference = reference
@@ -148,6 +149,8 @@ class Controller:
             )
         if self.planner is not None:
             check_planned(settings)
+        if self._choice.makes_effort:
+            check_unaided(settings)
 
     def check_agreement(self, probe: DynamicsSample) -> None:
         """Raise CharacterError if a simulator's probe is not what the model expects."""
@@ -165,6 +168,8 @@ class Controller:
             MotionError: the character cannot follow it.
             LayoutError: a degree of freedom does not exist, or part of a ball joint is missing.
         """
+        if self._choice.makes_effort:
+            raise MotionError("the behaviour tracks no trajectory; cmd_vel steers it")
         self._enter_episode(episode_ns)
         self._tracked.replace(points, start_ns, now_ns, self._behaviour.carry)
         self._behaviour.carry = PlanarTransform()

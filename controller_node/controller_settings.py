@@ -30,6 +30,18 @@ def check_planned(settings: ControllerSettings) -> None:
         raise ConfigurationError("a planner keeps balance itself; 'balance.enabled' must be false")
 
 
+def check_unaided(settings: ControllerSettings) -> None:
+    """Raise ConfigurationError if settings add to a behaviour that makes the effort itself."""
+    if settings.law != "stable_pd":
+        raise ConfigurationError(
+            f"the behaviour makes the effort beside the law stable_pd; 'law' is {settings.law}"
+        )
+    if settings.balance is not None:
+        raise ConfigurationError(
+            "the behaviour keeps balance itself; 'balance.enabled' must be false"
+        )
+
+
 @dataclass(frozen=True)
 class EffectiveGains:
     """The gains in force until settings or strengths change."""

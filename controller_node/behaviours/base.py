@@ -122,6 +122,7 @@ class BehaviourChoice:
     make: Callable[[], Behaviour] = Tracking
     needs_contacts: bool = False
     opponent: str = ""  # the character whose place it needs, if it needs one
+    makes_effort: bool = False  # in place of a law and a trajectory's targets
 
     def check(self, around: Surroundings) -> None:
         """Raise ConfigurationError if what it needs with each state is not there."""

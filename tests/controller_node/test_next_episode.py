@@ -126,16 +126,16 @@ def test_in_real_time_a_reset_changes_the_reference_too(
     references = client.listen(topics.REFERENCE.of(CONTROLLER))
     processes.simulator(mode="realtime")
     processes.controller(reference="step", step__size=0.2, step__time=0.0)
-    go_on(client)
-    assert client.set_parameter(CONTROLLER, "reference", "hold") == (True, "")
-    begun = go_on(client)
     (rest,) = character("pendulum").rest_position
 
     def is_at(position: float) -> bool:
         found = references.messages
         return bool(found) and found[-1].position[0] == pytest.approx(position)
 
-    client.spin_until(lambda: is_at(rest + 0.2), "the step")
+    client.spin_until(lambda: is_at(rest + 0.2), "the step")  # the simulator waits for nobody
+    assert client.set_parameter(CONTROLLER, "reference", "hold") == (True, "")
+    begun = go_on(client)
+    assert is_at(rest + 0.2)
 
     client.reset()
 

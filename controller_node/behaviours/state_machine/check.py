@@ -55,6 +55,10 @@ def _check_state(machine: Machine, state: State, kinds: dict[str, JointType]) ->
             f"'{STEP}' or '{REACH}'"
         )
     for joint, effort in state.efforts.items():
+        if effort == BALANCE and joint != f"{STANCE}.hip":
+            raise ConfigurationError(
+                f"{place}.efforts.{joint} is '{BALANCE}', which is for '{STANCE}.hip' alone"
+            )
         if effort == BALANCE and not state.tracks:
             raise ConfigurationError(
                 f"{place}.efforts.{joint} is '{BALANCE}', which goes with 'tracks: true'"

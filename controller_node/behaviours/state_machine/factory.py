@@ -26,7 +26,7 @@ STATE_MACHINE = "state_machine"
 def _state_machine(character: Character, values: Values) -> BehaviourChoice:
     _check(character, values)
     kit = make_kit(character, values)
-    return BehaviourChoice(lambda: StateMachine(kit), needs_contacts=True)
+    return BehaviourChoice(lambda: StateMachine(kit), needs_contacts=True, makes_effort=True)
 
 
 def make_kit(character: Character, values: Values) -> MachineKit:
@@ -69,6 +69,10 @@ def _check(character: Character, values: Values) -> None:
                 f"parameter 'behaviour' is {STATE_MACHINE}, which needs '{name}' to be {wanted}; "
                 f"it is {values.text(name)}"
             )
+    if values.number("gravity") <= 0.0:
+        raise ConfigurationError(
+            f"parameter 'behaviour' is {STATE_MACHINE}, which needs 'gravity' to be more than 0"
+        )
     if values.integer(COMMAND_DELAY.name):
         raise ConfigurationError(
             f"parameter 'behaviour' is {STATE_MACHINE}, which needs '{COMMAND_DELAY.name}' to be 0"

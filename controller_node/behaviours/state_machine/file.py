@@ -133,11 +133,13 @@ def _sides(reader: MappingReader) -> dict[str, dict[str, str]]:
     for side in part.content:
         joints = part.part(side)
         sides[side] = {name: joints.text(name) for name in joints.content}
-    if len(sides) != 2 or any(set(each) < set(_PARTS) for each in sides.values()):
+    whole = all(set(_PARTS) <= set(each) for each in sides.values())
+    if set(sides) != {"left", "right"} or not whole:
         raise reader.wrong(
             "sides",
             reader.content.get("sides"),
-            "two sides, the first of which stands first, each with a hip, a knee and an ankle",
+            "'left' and 'right', of which the first stands first, each with a hip, a knee and an "
+            "ankle",
         )
     first, second = sides.values()
     if set(first) != set(second):

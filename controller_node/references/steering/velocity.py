@@ -41,7 +41,8 @@ class SteeringLimits:
 
     def approach(self, speed: float, wanted: float, period: float) -> float:
         """The speed in m/s that is nearest to a wanted one after a period in s."""
-        most = self.braking if abs(wanted) < abs(speed) else self.acceleration
+        slows = abs(wanted) < abs(speed) or wanted * speed < 0.0
+        most = self.braking if slows else self.acceleration
         return speed + within(wanted - speed, most * period)
 
 

@@ -88,7 +88,8 @@ def test_each_shipped_machine_can_be_planned(name: str) -> None:
             {"sides__left__hip": "left_hop"},
             "sides.left.hip: unknown joint 'left_hop'; did you mean 'left_hip'?",
         ),
-        ({"sides__left__ankle": None}, "sides is a dict; it must be two sides"),
+        ({"sides__left__ankle": None}, "sides is a dict; it must be 'left' and 'right'"),
+        ({"sides__left": {"hip": "left_hip", "shoulder": "left_shoulder"}}, "each with a hip, a"),
         ({"sides__left__tail": "neck"}, "sides.tail is None; it must be a joint of both sides"),
         (
             {"states__one__ends": None},
@@ -194,6 +195,7 @@ def test_a_join_ends_an_included_state_before_its_own_ends(tmp_path: Path) -> No
         ({"law": "pd"}, "needs 'law' to be stable_pd; it is pd"),
         ({"planner": "predictive"}, "needs 'planner' to be none; it is predictive"),
         ({"command_delay_ticks": 1}, "needs 'command_delay_ticks' to be 0"),
+        ({"gravity": 0.0}, "needs 'gravity' to be more than 0"),
     ],
 )
 def test_other_parameters_that_do_not_go_with_a_machine_are_said(

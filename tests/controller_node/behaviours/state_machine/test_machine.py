@@ -1,5 +1,6 @@
 """The state machine `walk` in the simulator, and what other machines' states do there."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,10 @@ from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_velocities import plan_velocities
 from actuated_characters.runs.planned_wrenches import parse_push
+from controller_node.balance import BalanceGains
 from controller_node.parameters import make_controller
+from controller_node.references.trajectory import TrajectoryPoints
+from msgs_config.errors import ConfigurationError, MotionError
 
 MACHINE = {"behaviour": "state_machine"}
 SIDES = """
@@ -198,3 +202,23 @@ states:
     _, _, states = run(planned(0.7, "0.5,0,0@0.05", machine=str(file)))
 
     assert states == ["one right", "two right"][: 1 + goes]
+
+
+def test_law_and_balance_that_would_add_to_a_machine_are_refused_and_so_is_a_trajectory() -> None:
+    plan = planned(1.0)
+    controller = make_controller(plan.character, plan.reference, plan.controller)
+    gains = controller.settings.gains
+
+    for settings, says in (
+        (replace(controller.settings, law="pd_gravity"), "'law' is pd_gravity"),
+        (
+            replace(controller.settings, balance=BalanceGains(1000.0, 600.0, 0.3)),
+            "'balance.enabled' must be false",
+        ),
+    ):
+        with pytest.raises(ConfigurationError, match=says):
+            controller.settings = settings
+    assert controller.settings.gains is gains
+    points = TrajectoryPoints(("chest_rx",), np.array([1.0]), np.zeros((1, 1)), None)
+    with pytest.raises(MotionError, match="tracks no trajectory"):
+        controller.set_trajectory(points, start_ns=0, now_ns=0, episode_ns=0)
