@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuated_characters.motion.clips.motion_clip import MotionClip, Spans
-from actuated_characters.motion.retargeting.joint_names import LEFT, RIGHT
+from actuated_characters.motion.retargeting.skeleton_map import other_side
 from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import ClipFrames
 from msgs_config.arrays import FloatArray
@@ -127,13 +127,8 @@ def mirror(clip: MotionClip) -> MotionClip:
     """
     from actuated_characters.motion.clips.mirroring import mirrored_motion
 
-    contacts = {_other(point): spans for point, spans in clip.contacts.items()}
+    contacts = {other_side(point): spans for point, spans in clip.contacts.items()}
     return clip.edited("mirrored", motion=mirrored_motion(clip), contacts=contacts)
-
-
-def _other(point: str) -> str:
-    side, _, part = point.partition("_")
-    return {LEFT: f"{RIGHT}_{part}", RIGHT: f"{LEFT}_{part}"}.get(side, point)
 
 
 def _part(clip: MotionClip, first: int, last: int, how: str) -> MotionClip:

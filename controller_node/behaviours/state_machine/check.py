@@ -1,4 +1,4 @@
-"""Whether a state machine fits a character, and can go on for ever."""
+"""Whether a state machine fits a character, and always goes on."""
 
 from controller_node.behaviours.state_machine.description import (
     BALANCE,

@@ -98,11 +98,6 @@ class Leg:
         a, b = self.thigh_length, self.shin_length
         return math.sqrt(a * a + b * b + 2.0 * a * b * math.cos(flexion))
 
-    @property
-    def longest(self) -> float:
-        """From hip to ankle, m, at most."""
-        return self._distance(_BENT)
-
 
 def _hanging(along: Vector, left: Vector, angle: float) -> QuaternionXyzw:
     """How a part of a leg that points `along`, then turned about left, is turned from standing."""

@@ -38,7 +38,6 @@ class _Joint:
 
     entries: slice
     is_ball: bool
-    link: int
     parent: int
     upright: QuaternionXyzw  # the child link's orientation where the character stands
     fixed: QuaternionXyzw  # of the child in its parent at angle 0
@@ -177,7 +176,6 @@ def _joints(character: Character, upright: list[QuaternionXyzw]) -> dict[str, _J
         joints[joint.name] = _Joint(
             entries=character.layout.joint(joint.name).entries,
             is_ball=joint.type is JointType.SPHERICAL,
-            link=row,
             parent=link.parent,
             upright=upright[row],
             fixed=multiply(conjugate(upright[link.parent]), upright[row]),

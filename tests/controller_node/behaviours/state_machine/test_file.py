@@ -56,7 +56,14 @@ def read(tmp_path: Path, content: dict[str, Any]) -> None:
 
 
 def test_a_machine_is_read(tmp_path: Path) -> None:
-    read(tmp_path, machine())
+    file = tmp_path / "machine.yaml"
+    file.write_text(yaml.safe_dump(machine()))
+
+    found = read_machine(str(file))
+
+    check_machine(found, HUMANOID)
+    assert list(found.states) == ["both", "one"]
+    assert found.states["both"].ends[0].then == "one"
 
 
 @pytest.mark.parametrize("name", shipped_machines())
