@@ -278,7 +278,7 @@ class ControllerNode(ComposableNode):
         controller = self._controller
         controller.while_planning(self._serve)
         self._awaited.use(controller)
-        self._stamped_topics.use(controller)
+        self._stamped_topics.use(controller, None)
         self._outputs.drive(self._setups.in_force.driven)
         self._simulators.check_again()
         self._publish_configuration()
@@ -305,5 +305,7 @@ class ControllerNode(ComposableNode):
         coming = self._setups.upcoming
         if coming is not None and coming is not before:
             self._log_warnings(coming.warnings)
+        upcoming = None if coming is None else coming.controller
+        self._stamped_topics.use(self._controller, upcoming)
         self._publish_first_state()
         self._publish_configuration()

@@ -35,17 +35,21 @@ class StampedTopics:
         self._velocities: list[StampedSubscription] = []
         self._strengths = self._subscribe(topics.STRENGTH, use=self._set_strengths)
         self._now_ns = self._episode_ns = 0
-        self.use(controller)
+        self.use(controller, None)
 
-    def use(self, controller: Controller) -> None:
-        """Ask this controller from now on."""
+    def use(self, controller: Controller, upcoming: Controller | None) -> None:
+        """Ask this controller from now on, and after it that of the next episode, if another one.
+
+        What that one is asked for is heard already: it may count from its first state on.
+        """
         self._controller = controller
-        if controller.is_steered and not self._velocities:
+        is_steered = any(each and each.is_steered for each in (controller, upcoming))
+        if is_steered and not self._velocities:
             self._velocities = [
                 self._subscribe(topics.CMD_VEL_STAMPED, use=self._steer_stamped),
                 self._subscribe(topics.CMD_VEL, use=self._steer),
             ]
-        elif not controller.is_steered:
+        elif not is_steered:
             for each in self._velocities:
                 each.close()
             self._velocities = []
@@ -67,8 +71,9 @@ class StampedTopics:
         """
         self._now_ns, self._episode_ns = state_ns, episode_ns
         self._trajectories.take()
-        for each in self._velocities:
-            each.take()
+        if self._controller.is_steered:
+            for each in self._velocities:
+                each.take()
         self._strengths.take()
 
     def _set_trajectory(self, raw: bytes) -> None:

@@ -1,6 +1,7 @@
 """A recorded run whose parameters were changed at its resets."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from rclpy.context import Context
@@ -9,7 +10,7 @@ from std_msgs.msg import String
 from msgs_config.messages import topics
 from tests.support.physics import character
 from tests.support.recorded_nodes import recorded
-from tests.support.ros import SimulatorClient
+from tests.support.ros import SimulatorClient, stamp_ns
 
 BEGINS = (0, 31, 72, 113, 150)
 """The rows of the first states of the episodes."""
@@ -18,13 +19,19 @@ MOON = 1.62  # m/s^2
 SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
 
 
-def record_changed_episodes(folder: Path, context: Context) -> tuple[Path, list[String]]:
-    """A walk; a run on the moon; a limp fall there; a reactive walk; a steered one.
+class ChangedEpisodes(NamedTuple):
+    """The run, and what its nodes have published."""
 
-    Returns the run, and the configurations that the simulator has published.
-    """
+    run: Path
+    configurations: list[String]  # of the simulator
+    velocities_ns: list[int]  # the stamps of the active ones
+
+
+def record_changed_episodes(folder: Path, context: Context) -> ChangedEpisodes:
+    """A walk; a run on the moon; a limp fall there; a reactive walk; a steered one."""
     client = SimulatorClient(context)
     velocities = client.speak(topics.CMD_VEL_STAMPED)
+    active = client.listen(topics.ACTIVE_CMD_VEL.of(CONTROLLER))
 
     def step(count: int) -> None:
         change(SIMULATOR, step_count=count)
@@ -35,6 +42,10 @@ def record_changed_episodes(folder: Path, context: Context) -> tuple[Path, list[
     def change(node: str, **values: object) -> None:
         for name, value in values.items():
             assert client.set_parameter(node, name, value) == (True, ""), name
+
+    def steer(speed: float) -> None:
+        velocities.publish(TwistStamped(twist=Twist(linear=Vector3(x=speed))))
+        assert velocities.wait_for_all_acked()
 
     with recorded(folder / "changed") as processes:
         simulator = processes.simulator(
@@ -61,13 +72,14 @@ def record_changed_episodes(folder: Path, context: Context) -> tuple[Path, list[
         assert client.reset().success
         step(BEGINS[4] - BEGINS[3] - 1)
         change(CONTROLLER, behaviour="tracking", reference="steered")
+        client.spin_until(lambda: velocities.get_subscription_count() == 2, "who hears velocities")
+        steer(0.8)  # counts from the first state of the episode on
         assert client.reset().success
         step(3)
-        client.spin_until(lambda: velocities.get_subscription_count() == 2, "who hears velocities")
-        velocities.publish(TwistStamped(twist=Twist(linear=Vector3(x=1.0))))
-        assert velocities.wait_for_all_acked()
+        steer(1.0)
         assert client.pause(False).success
         assert simulator.wait() == 0
+    velocities_ns = [stamp_ns(message) for message in active.messages]
     configurations = list(client.configuration.messages)
     client.close()
-    return folder / "changed" / "run", configurations
+    return ChangedEpisodes(folder / "changed" / "run", configurations, velocities_ns)

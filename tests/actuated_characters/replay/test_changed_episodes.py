@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rclpy.context import Context
-from std_msgs.msg import String
 
 from actuated_characters.bags.recording import Recording, read_recording, read_recordings
 from actuated_characters.cli import main
@@ -19,7 +18,13 @@ from controller_node import parameters as controller
 from controller_node.references.factory import make_motion
 from msgs_config.messages.configuration import SINCE
 from msgs_config.parameters import resolve
-from tests.support.changed_episodes import BEGINS, MOON, TICKS, record_changed_episodes
+from tests.support.changed_episodes import (
+    BEGINS,
+    MOON,
+    TICKS,
+    ChangedEpisodes,
+    record_changed_episodes,
+)
 from tests.support.physics import character
 from tests.support.runs import summary_of
 
@@ -33,13 +38,13 @@ def folder(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def changed(folder: Path, context: Context) -> tuple[Path, list[String]]:
+def changed(folder: Path, context: Context) -> ChangedEpisodes:
     return record_changed_episodes(folder, context)
 
 
 @pytest.fixture(scope="module")
-def run(changed: tuple[Path, list[String]]) -> Path:
-    return changed[0]
+def run(changed: ChangedEpisodes) -> Path:
+    return changed.run
 
 
 @pytest.fixture(scope="module")
@@ -68,9 +73,9 @@ def test_each_episode_begins_where_its_reference_does(recording: Recording) -> N
 
 
 def test_the_simulator_says_before_each_episode_what_holds_in_it(
-    changed: tuple[Path, list[String]], recording: Recording
+    changed: ChangedEpisodes, recording: Recording
 ) -> None:
-    told = [json.loads(message.data) for message in changed[1]]
+    told = [json.loads(message.data) for message in changed.configurations]
 
     assert [each[SINCE] for each in told] == [
         None,
@@ -105,7 +110,11 @@ def test_characters_move_by_the_gravity_of_their_episode(recording: Recording) -
             assert residual(recording, row, gravity + 1.0) > 1e-3
 
 
-def test_a_steered_episode_hears_velocities(recording: Recording) -> None:
+def test_a_steered_episode_hears_velocities_from_its_first_state_on(
+    changed: ChangedEpisodes, recording: Recording
+) -> None:
+    stamps = recording.stamps_ns
+    assert changed.velocities_ns == [stamps[BEGINS[4]], stamps[BEGINS[4] + 4]]
     begin, last = recording.reference_position[BEGINS[4]], recording.reference_position[TICKS - 1]
     assert np.linalg.norm((last - begin)[:2]) > 0.01  # m
 
