@@ -29,6 +29,8 @@ from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.topics import Outgoing
 from msgs_config.runtime.throttle import Throttle
 
+_FLUSH_TIME = 0.5  # s, at the most
+
 
 class Reply(NamedTuple):
     """The reply to a state; a state that comes again gets it again, without another computation."""
@@ -72,10 +74,14 @@ class Publishers:
         self._published_outlook: Outlook | None = None
 
     def publish_initial_state(self, state: StampedState) -> None:
-        """Publish in which state the reference begins."""
+        """Publish in which state the reference begins; a simulator has it when this returns.
+
+        It may be reset next, by whoever has changed the reference.
+        """
         self._initial_states.publish(
             self._reference_encoder.encode(state.stamp_ns, state.position, state.velocity)
         )
+        topics.flush((self._initial_states,), _FLUSH_TIME)
 
     def bind(self, session: str) -> None:
         """Name the simulator's session in what answers its states."""

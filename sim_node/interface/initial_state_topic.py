@@ -1,7 +1,7 @@
 """The states in which references begin, as their controllers publish them."""
 
 import time
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Mapping
 
 from rclpy.node import Node
 
@@ -64,7 +64,7 @@ class InitialStates:
         """
         watchdog = Watchdog(timeout=self._timeout)
         watchdog.restart(time.monotonic())
-        while missing := [each for each in self._subscriptions if each.look() is None]:
+        while missing := self._missing(found := self._look()):
             if stop:
                 return {}
             yield UNTIL_A_MESSAGE
@@ -76,7 +76,7 @@ class InitialStates:
                     )
                 self._node.get_logger().warning(f"waiting for the initial state; {sentence}")
         self._complete = True
-        return self.newest()
+        return found
 
     def newest(self) -> dict[str, StampedState]:
         """The states that were published last, by the characters' names.
@@ -85,8 +85,17 @@ class InitialStates:
         """
         if not self._complete:
             return {}
+        found = self._look()
+        for each in self._missing(found):
+            self._node.get_logger().warning(f"the start stays what it was; {each.describe()}")
+        return found
+
+    def _look(self) -> dict[str, StampedState]:
         found = {each.name: each.look() for each in self._subscriptions}
         return {name: state for name, state in found.items() if state is not None}
+
+    def _missing(self, found: Mapping[str, StampedState]) -> list["_Subscription"]:
+        return [each for each in self._subscriptions if each.name not in found]
 
 
 class _Subscription:
