@@ -56,6 +56,7 @@ class CharacterSnapshot:
     pushes: tuple[ExternalWrench, ...]
     delayed: tuple[FloatArray, ...]  # (n,) each, commands on their way
     saturated_ticks: IntArray  # (b,)
+    start: tuple[FloatArray, FloatArray]  # (n,) each, position and velocity of later episodes
 
 
 class SimulatedCharacter:
@@ -161,6 +162,7 @@ class SimulatedCharacter:
             self.pushes,
             tuple(self._delayed),
             self.saturated_ticks.copy(),
+            (self._position, self._velocity),
         )
 
     def restore(self, snapshot: CharacterSnapshot) -> None:
@@ -169,6 +171,7 @@ class SimulatedCharacter:
         self.contacts, self.pushes = snapshot.contacts, snapshot.pushes
         self._delayed = deque(snapshot.delayed)
         self.saturated_ticks = snapshot.saturated_ticks.copy()
+        self._position, self._velocity = snapshot.start
         self._body.forget_reading()
 
     def link_frames(self) -> tuple[FloatArray, FloatArray]:

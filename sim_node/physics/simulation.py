@@ -32,8 +32,9 @@ class SimulationSettings:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A state between two ticks, for any simulation of equal setups and settings."""
+    """A state between two ticks, for any simulation of equal setups."""
 
+    settings: SimulationSettings  # of the episode
     tick: int
     episode: int
     characters: tuple[CharacterSnapshot, ...]
@@ -187,6 +188,7 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """The present state, for this simulation or one in another process."""
         return Snapshot(
+            self.settings,
             self.tick,
             self.episode,
             tuple(character.snapshot() for character in self.characters),
@@ -202,6 +204,10 @@ class Simulation:
         That holds of states that a step has led to; in a world without a step yet, the engine has
         not found out what touches.
         """
+        if snapshot.settings != self.settings:
+            self.settings = snapshot.settings
+            self._world.close()
+            self._world = self._fresh_world()
         self._world.from_bytes(snapshot.world, snapshot.balls)
         self.tick, self.episode = snapshot.tick, snapshot.episode
         self.throws, self._thrown_at = snapshot.throws, snapshot.thrown_at

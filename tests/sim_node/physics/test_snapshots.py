@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
+from msgs_config.messages.state import StampedState
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_settings
 from sim_node.world_parameters import STEADY_CONTACTS
@@ -110,3 +112,24 @@ def test_efforts_on_the_root_act_where_the_saved_state_has_it() -> None:
         simulation.load_snapshot(saved)
 
         np.testing.assert_array_equal(advance(plan, simulation, TICKS), followed)
+
+
+def test_a_snapshot_has_what_a_reset_has_changed(plan: RunPlan, simulation: Simulation) -> None:
+    advance(plan, simulation, 20)
+    moon = replace(simulation.settings.world, gravity=1.62)
+    moved = simulation.characters[0].state.position.copy()
+    moved[-1] += 0.05
+    start = StampedState(0, moved, np.zeros(len(moved)), None)
+    simulation.reset(moon, {simulation.characters[0].setup.name: start})
+    advance(plan, simulation, 20)
+    saved = simulation.snapshot()
+    followed = advance(plan, simulation, TICKS)
+    simulation.reset()
+    again = advance(plan, simulation, TICKS)
+
+    with fresh(plan) as other:
+        other.load_snapshot(saved)
+
+        assert advance(plan, other, TICKS).tobytes() == followed.tobytes()
+        other.reset()
+        assert advance(plan, other, TICKS).tobytes() == again.tobytes()
