@@ -30,6 +30,20 @@ def in_force(settings: Sequence[NodeParameters], stamp_ns: int) -> dict[str, Any
     return found
 
 
+def between(
+    settings: Sequence[NodeParameters], first_ns: int, last_ns: int
+) -> tuple[NodeParameters, ...]:
+    """Those that are in force in some of the states of these stamps."""
+    kept: list[NodeParameters] = []
+    for each in settings:
+        since_ns = -1 if each.after_stamp_ns is None else each.after_stamp_ns
+        if since_ns < first_ns:
+            kept = []  # the one before has ended
+        if since_ns < last_ns:
+            kept.append(each)
+    return tuple(kept)
+
+
 class SimulatorConfigurations:
     """The configurations of one simulator, which says again what it is when a reset changes it."""
 

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from actuated_characters.bags.format.storage import SUFFIXES
-from actuated_characters.bags.node_parameters import NodeParameters, in_force
+from actuated_characters.bags.node_parameters import NodeParameters, between, in_force
 from actuated_characters.bags.plans import PlanArrays
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rebuilding import RecordedWorld
@@ -122,7 +122,13 @@ class Recording:
         by_tick = ("effort", "contacts", "applied_wrench", "throws")
         cut = {name: getattr(self, name)[rows] for name in by_state}
         cut |= {name: getattr(self, name)[ticks] for name in by_tick}
-        return replace(self, parameters=self.parameters_at(rows.start), **cut)
+        last_ns = int(cut["stamps_ns"][-1])
+        return replace(
+            self,
+            parameters=self.parameters_at(rows.start),
+            simulator=between(self.simulator, int(cut["stamps_ns"][0]), last_ns),
+            **cut,
+        )
 
 
 def read_recording(path: Path, character: str | None = None) -> Recording:

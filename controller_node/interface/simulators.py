@@ -244,7 +244,7 @@ class Simulators:
         if self._binding.bound != found.session:
             return
         if not is_first:
-            return  # a reset has changed it; `disagreement` tells
+            return  # a reset has changed it; `disagrees` tells
         if known.error is not None and self._binding.release():
             return  # its first state came before it, and another simulator may be there
         self._judge(known)

@@ -79,6 +79,7 @@ def record_changed_episodes(folder: Path, context: Context) -> ChangedEpisodes:
         steer(1.0)
         assert client.pause(False).success
         assert simulator.wait() == 0
+    client.spin_until(lambda: len(active.messages) >= 2, "both active velocities")
     velocities_ns = [stamp_ns(message) for message in active.messages]
     configurations = list(client.configuration.messages)
     client.close()

@@ -33,10 +33,20 @@ def curves(recording: Recording) -> dict[str, FloatArray]:
     shares = limit_shares(sizes, limits)[:, kinds.actuated]
     found[_EFFORT] = np.concatenate(([np.nan], _largest(shares)))
     contacts = contact_series(recording.character, recording.contacts)
-    weight = recording.character.mass * float(recording.parameters.get("gravity", 0.0))
-    if contacts is not None and weight > 0.0:
-        found[_CONTACT] = np.concatenate(([np.nan], contacts.vertical_force / weight))
+    weights = _weights(recording)
+    if contacts is not None and (weights > 0.0).any():
+        loads = np.full(len(weights), np.nan)
+        np.divide(contacts.vertical_force, weights, out=loads, where=weights > 0.0)
+        found[_CONTACT] = np.concatenate(([np.nan], loads))
     return {name: values for name, values in found.items() if np.isfinite(values).any()}
+
+
+def _weights(recording: Recording) -> FloatArray:
+    """The weight in each tick (t,), N; 0 where the simulator tells of no gravity."""
+    weights = np.zeros(len(recording.effort))
+    for row in recording.episode_rows.tolist():
+        weights[row:] = float(recording.parameters_at(row).get("gravity", 0.0))
+    return recording.character.mass * weights
 
 
 def _largest(values: FloatArray) -> FloatArray:

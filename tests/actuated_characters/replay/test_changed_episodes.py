@@ -11,9 +11,11 @@ from rclpy.context import Context
 from actuated_characters.bags.recording import Recording, read_recording, read_recordings
 from actuated_characters.cli import main
 from actuated_characters.metrics.equation_of_motion import EquationOfMotion
+from actuated_characters.metrics.recording_metrics import contact_series, measure_recording
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands, replay_states
 from actuated_characters.report.changes import live_changes
+from actuated_characters.viewer.recorded.plots import curves
 from controller_node import parameters as controller
 from controller_node.references.factory import make_motion
 from msgs_config.messages.configuration import SINCE
@@ -171,3 +173,22 @@ def test_info_and_report_tell_of_changes(run: Path, capfd: pytest.CaptureFixture
     page = run.parent / "page"
     assert main(["report", str(run), "--output", str(page)]) == 0
     assert f"gravity: 9.81 to {MOON}" in (page / "index.html").read_text()
+
+
+def test_a_cut_of_one_gravity_has_one_weight(recording: Recording) -> None:
+    whole, _ = measure_recording(recording)
+    cut, _ = measure_recording(recording.rows(slice(BEGINS[1], BEGINS[3])))
+
+    assert whole["body_weight_n"] is None
+    assert cut["body_weight_n"] == pytest.approx(recording.character.mass * MOON)
+
+
+def test_loads_are_shares_of_the_weight_of_their_episode(recording: Recording) -> None:
+    loads = curves(recording)["force / weight"][1:]
+    force = contact_series(recording.character, recording.contacts)
+    assert force is not None
+
+    for begin, end, gravity in ((0, BEGINS[1], 9.81), (BEGINS[1], BEGINS[3] - 1, MOON)):
+        shares = force.vertical_force[begin:end] / (gravity * recording.character.mass)
+        assert np.nanmax(shares) > 0.5
+        np.testing.assert_allclose(loads[begin:end], shares)
