@@ -162,6 +162,15 @@ class DynamicsModel:
         mujoco.mj_jacBodyCom(self._model, self._data, jacobian[:3], jacobian[3:], link + 1)
         return jacobian
 
+    def link_drift(self, link: int) -> FloatArray:
+        """The acceleration (6,) of a link whose joints and root do not accelerate: `J' v`.
+
+        As of `link_jacobian`: m/s^2 of its centre of mass and rad/s^2, world axes.
+        """
+        rate, point = np.empty((6, self._layout.size)), self._data.xipos[link + 1]
+        mujoco.mj_jacDot(self._model, self._data, rate[:3], rate[3:], point, link + 1)
+        return fixed_order.apply(rate, self._data.qvel)
+
     @property
     def weight(self) -> float:
         """Weight of all links together, N."""

@@ -69,3 +69,25 @@ def powers(bases: FloatArray, count: int) -> FloatArray:
     factors[..., 0] = 1.0
     products: FloatArray = np.multiply.accumulate(factors, axis=-1)
     return products
+
+
+def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """The X (k, m) of `A X = B` of a small matrix (k, k), by Gauss and Jordan's elimination.
+
+    The rows are exchanged so that the largest of a column divides: Golub and Van Loan 2013, "Matrix
+    Computations", section 3.4.
+
+    Raises:
+        ZeroDivisionError: the matrix has no inverse.
+    """
+    rows: list[list[float]] = np.column_stack((matrix, right)).tolist()
+    size = len(rows)
+    for i in range(size):
+        pivot = max(range(i, size), key=lambda row: abs(rows[row][i]))
+        rows[i], rows[pivot] = rows[pivot], rows[i]
+        first = rows[i]
+        for k in range(size):
+            if k != i:
+                factor = rows[k][i] / first[i]
+                rows[k] = [a - factor * b for a, b in zip(rows[k], first, strict=True)]
+    return np.array([[value / rows[i][i] for value in rows[i][size:]] for i in range(size)])

@@ -33,6 +33,7 @@ class RootTarget:
     pitch: float = 0.0  # rad, ahead
     climb: float = 0.0  # m/s, upwards
     thrust: float = 0.0  # N, upwards, beside what height and climb need
+    arrival: float = 0.0  # s, after which it has both; 0: by `height_gains`
     height_gains: Gains = (120.0, 22.0)
     tilt_gains: Gains = (150.0, 25.0)
     turn_gains: Gains = (60.0, 16.0)

@@ -1,6 +1,7 @@
 """From targets to efforts: by inverse dynamics on the feet that stand, or by the control law."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,7 +9,6 @@ from controller_node.behaviours.state_machine import laws
 from controller_node.behaviours.state_machine.body import Body, in_frame, in_world
 from controller_node.behaviours.state_machine.description import (
     BALANCE,
-    STANCE,
     Machine,
     RootTarget,
     State,
@@ -42,7 +42,16 @@ from msgs_config.geometry.single_rotations import (
 
 _SWIVEL = (10.0, 0.5)  # N m/rad and N m s/rad: keeps the knee of a leg that stands above its foot
 _LEVEL = (80.0, 0.8)  # likewise, keeps its sole on the ground
+_SOON = 0.015  # s, of an arrival at least: errors are not made good within a tick
 _LEFT = (0.0, 1.0, 0.0)
+
+
+class Hold(NamedTuple):
+    """How the root is to be held now."""
+
+    root: RootTarget
+    ground: float  # m, height of the soles that stand
+    time: float  # s, since the state began
 
 
 class EffortMaker:
@@ -86,7 +95,7 @@ class EffortMaker:
         pose: Pose,
         gains: GainArrays,
         contacts: Sequence[Contact],
-        ground: float,  # m, height of the soles that stand
+        hold: Hold,
     ) -> FloatArray:
         """The effort (n,) by which the body moves as wanted, its feet pressed on the ground.
 
@@ -95,23 +104,20 @@ class EffortMaker:
         """
         body = at.body
         acceleration = self._joint_accelerations(pose, body, gains)
-        for role in state.standing:
-            leg = self._legs[at.stance if role == STANCE else at.swing]
-            for entries in (leg.hip_entries, leg.knee_entry, leg.ankle_entries):
-                acceleration[entries] = 0.0
         acceleration[:6] = 0.0
         if contacts:
-            acceleration[2:6] = self._root_acceleration(state.root, at, ground)
+            acceleration[2:6] = self._root_acceleration(hold, at)
         effort = support_effort(
             self._model,
             acceleration,
             contacts,
             state.bounds,
-            (body.root, body.root_xyzw, body.centre),
+            (body.root, body.root_xyzw),
         )
         for contact in contacts:
-            leg = self._legs[contact.side]
-            effort[leg.ankle_entries] += self._ankle_effort(contact, at.body, at.course.heading)
+            effort[contact.leg.ankle_entries] += self._ankle_effort(
+                contact, at.body, at.course.heading
+            )
         return self.added(state, at, effort)
 
     def _joint_accelerations(self, pose: Pose, body: Body, gains: GainArrays) -> FloatArray:
@@ -125,15 +131,22 @@ class EffortMaker:
         slower = pose.velocity - body.velocity
         damped = gains.damping + period * gains.stiffness
         inertia = self._model.inertia_of_entries() + period * damped
-        accelerations: FloatArray = (gains.stiffness * error + damped * slower) / inertia
+        accelerations: FloatArray = (
+            pose.acceleration + (gains.stiffness * error + damped * slower) / inertia
+        )
         return accelerations
 
-    def _root_acceleration(self, root: RootTarget, at: Situation, ground: float) -> FloatArray:
+    def _root_acceleration(self, hold: Hold, at: Situation) -> FloatArray:
         """Upward acceleration, m/s^2, and angular acceleration in the base frame, rad/s^2: (4,)."""
-        body, heading = at.body, at.course.heading
-        p, d = root.height_gains
-        rise = p * (ground + root.height - body.root[2])
-        rise += d * (root.climb - float(body.velocity[2])) + root.thrust / self._model.mass
+        body, heading, root = at.body, at.course.heading, hold.root
+        above, climb = hold.ground + root.height - body.root[2], float(body.velocity[2])
+        if root.arrival > 0.0:
+            rest = max(root.arrival - hold.time, _SOON)
+            rise = laws.arrival_acceleration(above, climb, root.climb, rest)
+        else:
+            p, d = root.height_gains
+            rise = p * above + d * (root.climb - climb)
+        rise += root.thrust / self._model.mass
         lean = multiply(about_y(root.pitch), about_x(at.mirror * root.roll))
         wanted = multiply(about_z(heading), lean)
         error = in_frame(heading, log(multiply(wanted, conjugate(body.tilt))))
@@ -148,7 +161,7 @@ class EffortMaker:
 
     def _ankle_effort(self, contact: Contact, body: Body, heading: float) -> FloatArray:
         """What an ankle (3,) adds so that the sole is level and the knee above the foot, N m."""
-        leg, foot = self._legs[contact.side], body.feet[contact.side]
+        leg, foot = contact.leg, body.feet[contact.side]
         foot_xyzw = multiply(foot.turn, leg.upright[2])
         hip = add(body.root, rotate(body.root_xyzw, leg.hip_in_root))
         ankle = subtract(foot.sole, rotate(foot_xyzw, leg.sole_in_foot))

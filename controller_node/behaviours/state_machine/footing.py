@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.body import Body, Foot, in_frame, in_world
+from controller_node.behaviours.state_machine.body import Foot, in_frame, in_world
 from controller_node.behaviours.state_machine.description import (
     CENTRE,
     STANCE,
@@ -41,7 +41,7 @@ def contacts_of(state: State, at: Situation, time: float, legs: dict[str, Leg]) 
         sole = at.local(at.foot(side).sole)
         inside = [sole[axis] + within(wanted[axis] - sole[axis], limits[axis]) for axis in (0, 1)]
         place = at.world((inside[0], inside[1], sole[2]))
-        return [Contact(side, legs[side].foot_link, 1.0, place)]
+        return [Contact(side, legs[side], 1.0, place)]
     return _on_both(state, at, limits, legs)
 
 
@@ -88,8 +88,8 @@ def _on_both(
     stance = at.world((rest[0], rest[1], 0.0))
     swing = at.world((other[0] + rest[0], other[1] + rest[1], other[2]))
     return [
-        Contact(at.stance, legs[at.stance].foot_link, 1.0 - share, stance),
-        Contact(at.swing, legs[at.swing].foot_link, share, swing),
+        Contact(at.stance, legs[at.stance], 1.0 - share, stance),
+        Contact(at.swing, legs[at.swing], share, swing),
     ]
 
 
@@ -153,43 +153,61 @@ class SwingFoot:
 
 
 @dataclass(frozen=True)
-class ReachingFoot:
-    """A foot that goes to a place below its hip, from where it was and as it moved."""
+class Origin:
+    """What a foot that reaches goes ahead of: its hip, or the centre of mass at its height."""
 
-    start: Vector  # m, of the sole, from the hip, world axes
-    velocity: Vector  # m/s, of the foot from the hip
+    place: Vector  # m, world
+    velocity: Vector  # m/s
+    beside: float  # m, to the left: where the foot goes from here
+
+
+def origin_of(placement: Placement, at: Situation, hip: Vector) -> Origin:
+    """The origin of a foot whose hip is at a place in the world."""
+    body, heading = at.body, at.course.heading
+    x, y, z, *_ = body.velocity.tolist()
+    velocity = add((x, y, z), cross(body.spin, subtract(hip, body.root)))
+    if placement.origin != CENTRE:
+        return Origin(hip, velocity, 0.0)
+    _, left, _ = in_frame(heading, subtract(hip, body.centre))
+    vx, vy, _ = body.centre_velocity
+    place = (body.centre[0], body.centre[1], hip[2])
+    return Origin(place, (vx, vy, velocity[2]), math.copysign(0.5 * placement.width, left))
+
+
+@dataclass(frozen=True)
+class ReachingFoot:
+    """A foot that goes to a place below its origin, from where it was and as it moved."""
+
+    start: Vector  # m, of the sole, from the origin, world axes
+    velocity: Vector  # m/s, of the foot from the origin
     start_yaw: float  # rad, world
 
     @classmethod
-    def leaving(cls, foot: Foot, body: Body, hip: Vector) -> "ReachingFoot":
+    def leaving(cls, foot: Foot, origin: Origin) -> "ReachingFoot":
         """A foot that leaves now."""
-        x, y, z, *_ = body.velocity.tolist()
-        moving = add((x, y, z), cross(body.spin, subtract(hip, body.root)))
-        return cls(subtract(foot.sole, hip), subtract(foot.velocity, moving), yaw(foot.turn))
+        velocity = subtract(foot.velocity, origin.velocity)
+        return cls(subtract(foot.sole, origin.place), velocity, yaw(foot.turn))
 
-    def pose(self, state: State, at: Situation, time: float, hip: Vector) -> FootPose:
-        """Its pose `time` s after the state began, below a hip.
-
-        Where it goes ahead of the centre of mass, it goes half a step's width beside it.
-        """
+    def pose(
+        self, state: State, at: Situation, time: float, origin: Origin, later: float
+    ) -> FootPose:
+        """Its pose `time + later` s after the state began; the origin is that of `time`."""
         law, course = state.placement, at.course
-        share = time / state.duration
+        share = (time + later) / state.duration
         moved, carried = laws.smooth_step(share), law.carry * laws.carried_on(share)
         stance_time = law.stance_time or state.duration
         (vx, vy, _), (v, w) = at.velocity, (course.forward, course.left)
         ahead = law.ahead + laws.neutral_placement(vx, v, stance_time, law.gain)
-        side = laws.neutral_placement(vy, w, stance_time, law.gain)
-        if law.origin == CENTRE:
-            x, y, _ = in_frame(course.heading, subtract(at.body.centre, hip))
-            ahead, side = ahead + x, side + y - math.copysign(0.5 * law.width, y)
+        side = origin.beside + laws.neutral_placement(vy, w, stance_time, law.gain)
         goal = in_world(course.heading, (ahead, side, -law.length))
         place = add(scale(1.0 - moved, self.start), scale(moved, goal))
         place = add(place, scale(state.duration * carried, self.velocity))
-        back = -law.retract * state.duration * laws.led_back(share)
-        place = add(place, in_world(course.heading, (back * vx, back * vy, 0.0)))
+        back = later - law.retract * state.duration * laws.led_back(share)
+        place = add(place, scale(back, origin.velocity))
         raised = law.clearance * laws.clearance(share)
-        turn = about_z(_turned(self.start_yaw, at.course.heading, moved))
-        return FootPose(add(add(hip, place), (0.0, 0.0, raised)), turn)
+        raised -= law.descent * max(time + later - state.duration, 0.0)
+        turn = about_z(_turned(self.start_yaw, course.heading, moved))
+        return FootPose(add(add(origin.place, place), (0.0, 0.0, raised)), turn)
 
 
 def _turned(start: float, end: float, moved: float) -> float:

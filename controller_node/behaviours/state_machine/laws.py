@@ -97,6 +97,15 @@ def offset_of_width(width: float, step_time: float, rate: float) -> float:
     return width / (math.exp(rate * step_time) + 1.0)
 
 
+def arrival_acceleration(way: float, speed: float, last_speed: float, time: float) -> float:
+    """The acceleration now of the cubic that goes a way in m in a time, from a speed to another.
+
+    `6 x / t^2 - (4 v + 2 v_1) / t`: Hermite's polynomial, with the least mean square of
+    accelerations.
+    """
+    return 6.0 * way / (time * time) - (4.0 * speed + 2.0 * last_speed) / time
+
+
 def smooth_step(share: float) -> float:
     """From 0 at 0 to 1 at 1 with no speed and no acceleration at either end.
 

@@ -62,6 +62,7 @@ class Leg:
     shin_length: float  # m
     knee_sign: float  # of the knee's angle where the shin goes backwards
     upright: tuple[QuaternionXyzw, QuaternionXyzw, QuaternionXyzw]  # thigh, shin, foot, in world
+    entries: list[int]  # of all its joints
     fixed: tuple[QuaternionXyzw, QuaternionXyzw]  # of hip and ankle, child in parent, at angle 0
     sole_in_foot: Vector  # m, the middle of the sole, in the foot's link frame
     half_length: float  # m, of the sole
@@ -156,6 +157,11 @@ def make_leg(character: Character, hip: str, knee: str, ankle: str) -> Leg:
         shin_length=places[1][2] - places[2][2],
         knee_sign=math.copysign(1.0, axis[1]),
         upright=(upright[0], upright[1], upright[2]),
+        entries=[
+            entry
+            for name in (hip, knee, ankle)
+            for entry in range(*layout.joint(name).entries.indices(layout.size))
+        ],
         fixed=(fixed[0], fixed[1]),
         sole_in_foot=sole,
         half_length=half_length,

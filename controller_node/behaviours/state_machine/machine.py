@@ -14,12 +14,13 @@ from controller_node.behaviours.state_machine.description import (
     Machine,
     State,
 )
-from controller_node.behaviours.state_machine.effort_maker import EffortMaker
+from controller_node.behaviours.state_machine.effort_maker import EffortMaker, Hold
 from controller_node.behaviours.state_machine.footing import (
     ReachingFoot,
     SwingFoot,
     contacts_of,
     landing,
+    origin_of,
 )
 from controller_node.behaviours.state_machine.laws import smooth_step
 from controller_node.behaviours.state_machine.leg import Leg
@@ -58,7 +59,7 @@ class PoseTarget:
     def __init__(self, layout: JointLayout) -> None:
         self._layout = layout
         self._still = np.zeros(layout.size)
-        self.pose = Pose(self._still, self._still)  # kept up to date by its owner
+        self.pose = Pose(self._still, self._still, self._still)  # kept up to date by its owner
 
     def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
         """The targets, at whatever time."""
@@ -106,9 +107,8 @@ class StateMachine:
             effort = kit.efforts.balanced(self._state, at, pose, gains)
         else:
             ground, height = self._heights(at, time)
-            effort = kit.efforts.supported(
-                self._state, at, pose, gains, contacts, ground + height - self._state.root.height
-            )
+            hold = Hold(replace(self._state.root, height=height), ground, time)
+            effort = kit.efforts.supported(self._state, at, pose, gains, contacts, hold)
             gains = GainArrays(self._none, self._none, self._none, seen.gains.effort_limits)
         self._target.pose = pose
         return BehaviourOutput(self._phase, self._target, gains, effort)
@@ -147,7 +147,8 @@ class StateMachine:
                 self._feet[role] = SwingFoot.leaving(at.foot(side))
             elif state.feet[role] == REACH:
                 hip = self._kit.poses.hip(side, at.body)
-                self._reaching[role] = ReachingFoot.leaving(at.foot(side), at.body, hip)
+                origin = origin_of(state.placement, at, hip)
+                self._reaching[role] = ReachingFoot.leaving(at.foot(side), origin)
         facts = {"assistance": "none", "state": state.name, "stance": self._stance}
         self._phase = Phase(Mode.STATE, facts)
 
@@ -174,7 +175,7 @@ class StateMachine:
             pose.position = kit.poses.between(self._before[0], pose.position, share)
             pose.position[:6] = at.body.position[:6]
         pressure = self._pressure(at, contacts)
-        whens = (time, time + kit.period)
+        laters = (0.0, kit.period, 2.0 * kit.period)
         for role, side in ((STANCE, self._stance), (SWING, self._swing)):
             doing = state.feet[role]
             if role in state.standing:
@@ -184,12 +185,14 @@ class StateMachine:
                 if self._goal is not None and time >= state.placement.fixed * state.duration:
                     goal = (self._goal[0], goal[1])
                 self._goal = goal
-                poses = [self._feet[role].pose(state, at, when, goal) for when in whens]
-                kit.poses.set_leg(pose, side, at.body, *poses)
+                foot = self._feet[role]
+                poses = [foot.pose(state, at, time + later, goal) for later in laters]
+                kit.poses.set_leg(pose, side, at.body, poses)
             elif doing == REACH:
-                hip = kit.poses.hip(side, at.body)
-                poses = [self._reaching[role].pose(state, at, when, hip) for when in whens]
-                kit.poses.set_leg(pose, side, at.body, *poses)
+                origin = origin_of(state.placement, at, kit.poses.hip(side, at.body))
+                reaching = self._reaching[role]
+                poses = [reaching.pose(state, at, time, origin, later) for later in laters]
+                kit.poses.set_leg(pose, side, at.body, poses)
         return pose
 
     def _pressure(self, at: Situation, contacts: list[Contact]) -> Vector:

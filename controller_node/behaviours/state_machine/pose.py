@@ -1,6 +1,6 @@
 """The joints' targets of a state: positions, and velocities that lead on from them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,7 @@ from msgs_config.geometry.single_rotations import (
     multiply,
     rotate,
     scale,
+    subtract,
     yaw,
 )
 
@@ -55,6 +56,7 @@ class Pose:
 
     position: FloatArray  # (n,)
     velocity: FloatArray  # (n,)
+    acceleration: FloatArray  # (n,), of legs that go somewhere
 
 
 class PoseMaker:
@@ -75,7 +77,7 @@ class PoseMaker:
 
     def free(self, state: State, at: Situation) -> Pose:
         """The targets of a state's own joints; all others have those of the rest pose."""
-        pose = Pose(self._rest.copy(), np.zeros(self._layout.size))
+        pose = Pose(self._rest.copy(), np.zeros(self._layout.size), np.zeros(self._layout.size))
         pose.position[:6] = at.body.position[:6]
         for target in state.targets:
             joint = self._joints[self._machine.joint(target.joint, at.stance)]
@@ -112,23 +114,30 @@ class PoseMaker:
         parent = at.body.turns[joint.parent]
         return log(multiply(conjugate(multiply(parent, joint.fixed)), child))
 
-    def set_leg(self, pose: Pose, side: str, body: Body, now: FootPose, later: FootPose) -> None:
-        """Have a leg lead its foot through two poses, one period apart, while the root moves."""
+    def set_leg(self, pose: Pose, side: str, body: Body, feet: Sequence[FootPose]) -> None:
+        """Have a leg lead its foot through three poses, a period apart, while the root moves on."""
         leg, period = self._legs[side], self._period
         vx, vy, vz, wx, wy, wz = body.velocity[:6].tolist()
-        root = add(body.root, scale(period, (vx, vy, vz)))
-        root_xyzw = multiply(body.root_xyzw, exp(scale(period, (wx, wy, wz))))
-        here = leg.angles(body.root, body.root_xyzw, now, _facing(now))
-        there = leg.angles(root, root_xyzw, later, _facing(later))
+        angles = []
+        for number, foot in enumerate(feet):
+            time = number * period
+            root = add(body.root, scale(time, (vx, vy, vz)))
+            root_xyzw = multiply(body.root_xyzw, exp(scale(time, (wx, wy, wz))))
+            angles.append(leg.angles(root, root_xyzw, foot, _facing(foot)))
+        here, there, on = angles
         rate = 1.0 / period
-        for entries, start, end in (
-            (leg.hip_entries, here.hip, there.hip),
-            (leg.ankle_entries, here.ankle, there.ankle),
+        for entries, start, middle, end in (
+            (leg.hip_entries, here.hip, there.hip, on.hip),
+            (leg.ankle_entries, here.ankle, there.ankle, on.ankle),
         ):
+            first, second = _way(start, middle), _way(middle, end)
             pose.position[entries] = start
-            pose.velocity[entries] = scale(rate, log(multiply(conjugate(exp(start)), exp(end))))
+            pose.velocity[entries] = scale(rate, first)
+            pose.acceleration[entries] = scale(rate * rate, subtract(second, first))
+        bend, later = there.knee - here.knee, on.knee - there.knee
         pose.position[leg.knee_entry] = here.knee
-        pose.velocity[leg.knee_entry] = rate * (there.knee - here.knee)
+        pose.velocity[leg.knee_entry] = rate * bend
+        pose.acceleration[leg.knee_entry] = rate * rate * (later - bend)
 
     def follow_leg(self, pose: Pose, side: str, body: Body) -> None:
         """Have a leg's targets be where it is: nothing is asked of its joints."""
@@ -154,6 +163,11 @@ class PoseMaker:
             turn = exp(scale(share, _vector(way[entries])))
             mixed[entries] = log(multiply(exp((x, y, z)), turn))
         return mixed
+
+
+def _way(start: Vector, end: Vector) -> Vector:
+    """The rotation vector, in the child's axes, from one rotation vector to another."""
+    return log(multiply(conjugate(exp(start)), exp(end)))
 
 
 def _facing(foot: FootPose) -> Vector:

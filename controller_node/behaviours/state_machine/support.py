@@ -1,12 +1,13 @@
 """The effort of a character that stands on its feet: inverse dynamics with the ground's reaction.
 
-The ground can only press on the soles. So the accelerations of the root's rotation and height, and
-of the joints, may be chosen, and the centre of pressure; how the body then moves over the ground
-follows, as of an inverted pendulum.
+The ground can only press on the soles, which rest. So the accelerations of the root's rotation and
+height may be chosen, those of the joints of no leg that stands, and the centre of pressure; how the
+body then moves over the ground follows, as of an inverted pendulum.
 
-Sources: Featherstone 2008, "Rigid Body Dynamics Algorithms", section 9.5 (floating bases); Pratt et
-al. 2001, "Virtual Model Control", and Coros, Beaudoin and van de Panne 2010, "Generalized Biped
-Walking Control" (forces on the body by the Jacobian's transpose of the legs that stand).
+Sources: Featherstone 2008, "Rigid Body Dynamics Algorithms", chapter 8 (a foot that rests has no
+acceleration: `J v' + J' v = 0`) and section 9.5 (floating bases); Pratt et al. 2001, "Virtual Model
+Control", and Coros, Beaudoin and van de Panne 2010, "Generalized Biped Walking Control" (forces on
+the body by the Jacobian's transpose of the legs that stand).
 """
 
 import math
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.behaviours.state_machine.leg import Leg
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order
@@ -23,12 +25,13 @@ from msgs_config.geometry.single_rotations import (
     Vector,
     add,
     cross,
+    norm,
     rotate,
     scale,
     subtract,
 )
 
-_LEAST_HEIGHT = 0.1  # m, of the centre of mass above the soles
+_STRAIGHT = 1e-3  # damps the joints of a leg that is nearly straight, m^2
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class Contact:
     """A foot that carries a share of the load, at a centre of pressure."""
 
     side: str
-    link: int
+    leg: Leg
     share: float  # of 1
     pressure: Vector  # m, world
 
@@ -52,26 +55,50 @@ class Bounds:
     sole: float = 0.6  # of half a sole's length and width: how far out the centre of pressure is
 
 
-def ground_wrench(
-    root_wrench: tuple[Vector, Vector],  # force (N) and moment about the root (N m), world
-    root: Vector,
-    centre: Vector,  # of mass, m
-    pressure: Vector,  # centre of pressure, m
-    mass: float,
-) -> tuple[Vector, float, tuple[float, float]]:
-    """Force (N) at the centre of pressure, moment about z there (N m), horizontal acceleration.
+@dataclass(frozen=True, eq=False)
+class Resting:
+    """The accelerations of a body whose feet rest, by that of its root."""
 
-    `root_wrench` is what the accelerations wanted need, of a root without horizontal acceleration.
-    A force has no moment about horizontal axes through the centre of pressure; the acceleration
-    (m/s^2) of the whole body that is missing for it is what it gets.
+    by_root: FloatArray  # (n, 6)
+    free: FloatArray  # (n,), where the root does not accelerate
+
+    def of(self, root: FloatArray) -> FloatArray:
+        """The accelerations (n,) at an acceleration (6,) of the root."""
+        return fixed_order.apply(self.by_root, root) + self.free
+
+
+def resting(model: DynamicsModel, acceleration: FloatArray, legs: Sequence[Leg]) -> Resting:
+    """How a body moves on legs that stand; its other joints have accelerations (n,).
+
+    A leg has a joint more than its foot needs: its knee keeps the way that it faces.
     """
-    force, moment = root_wrench
-    moment = add(moment, cross(subtract(root, pressure), force))
-    arm = subtract(centre, pressure)
-    height = max(arm[2], _LEAST_HEIGHT)
-    ahead, left = -moment[1] / (mass * height), moment[0] / (mass * height)
-    spin = moment[2] + mass * (arm[0] * left - arm[1] * ahead)
-    return (force[0] + mass * ahead, force[1] + mass * left, force[2]), spin, (ahead, left)
+    by_root, free = np.zeros((len(acceleration), 6)), acceleration.copy()
+    by_root[:6] = np.eye(6)
+    free[:6] = 0.0
+    for leg in legs:
+        foot = model.link_jacobian(leg.foot_link)
+        thigh = model.link_jacobian(leg.thigh_link)[3:]
+        rows = np.vstack((foot, fixed_order.apply(thigh.T, np.array(_line(model, leg)))))
+        joints = rows[:, leg.entries]
+        drift = np.array((*model.link_drift(leg.foot_link), 0.0))
+        right = -np.column_stack((rows[:, :6], drift))
+        square = fixed_order.product(joints.T, joints) + _STRAIGHT * np.eye(len(leg.entries))
+        found = fixed_order.solve(square, fixed_order.product(joints.T, right))
+        by_root[leg.entries], free[leg.entries] = found[:, :6], found[:, 6]
+    return Resting(by_root, free)
+
+
+def _line(model: DynamicsModel, leg: Leg) -> Vector:
+    """The direction from hip to ankle, world axes."""
+    (hip, ankle), _ = model.link_frames(np.array((leg.thigh_link, leg.foot_link)))
+    x, y, z = (ankle - hip).tolist()
+    return scale(1.0 / norm((x, y, z)), (x, y, z))
+
+
+def moment_about(point: Vector, root: Vector, wrench: tuple[Vector, Vector]) -> Vector:
+    """The moment about a point, N m, of a force (N) at the root and a moment (N m) about it."""
+    force, moment = wrench
+    return add(moment, cross(subtract(root, point), force))
 
 
 def bounded(force: Vector, spin: float, bounds: Bounds, weight: float) -> tuple[Vector, float]:
@@ -85,56 +112,59 @@ def bounded(force: Vector, spin: float, bounds: Bounds, weight: float) -> tuple[
 
 def support_effort(
     model: DynamicsModel,
-    acceleration: FloatArray,  # (n,) wanted; horizontally none of the root
+    acceleration: FloatArray,  # (n,) wanted; horizontally none of the root, and none of `legs`
     contacts: Sequence[Contact],  # whose shares are 1 together
     bounds: Bounds,
-    state: tuple[Vector, QuaternionXyzw, Vector],  # root, its orientation xyzw, centre of mass
+    root: tuple[Vector, QuaternionXyzw],  # its place in m, and its orientation
 ) -> FloatArray:
-    """The effort (n,) of the joints; `model` has the present state. The root's is zero."""
-    root, root_xyzw, centre = state
-    needed = model.inverse_dynamics(acceleration)
-    fx, fy, fz, mx, my, mz = needed[:6].tolist()
-    pressure: Vector = (0.0, 0.0, 0.0)
-    for contact in contacts:
-        pressure = add(pressure, scale(contact.share, contact.pressure))
-    weight = model.weight
-    mass = model.mass
-    force, spin, across = ground_wrench(
-        ((fx, fy, fz), rotate(root_xyzw, (mx, my, mz))), root, centre, pressure, mass
-    )
-    acceleration = acceleration.copy()
-    acceleration[:2] = across
-    borne, borne_spin = bounded(force, spin, bounds, weight)
+    """The effort (n,) of the joints; `model` has the present state. The root's is zero.
+
+    Where the bounds allow it, the root turns and rises as wanted; if not, what the ground does not
+    bear the body as a whole does not get. Joints of no leg that stands move as wanted all the same.
+    """
+    move = resting(model, acceleration, [contact.leg for contact in contacts])
+    inertia = fixed_order.product(model.mass_matrix()[:6], move.by_root)
+    needed = model.inverse_dynamics(move.of(acceleration[:6]))[:6]
+    force, spin = _wrench_wanted(inertia, needed, contacts, root)
+    borne, borne_spin = bounded(force, spin, bounds, model.weight)
     pressed = np.zeros(len(acceleration))
     for contact in contacts:
-        jacobian = model.point_jacobian(contact.link, np.array(contact.pressure))
-        wrench = np.array((*scale(contact.share, borne), 0.0, 0.0, contact.share * borne_spin))
+        share, place = contact.share, np.array(contact.pressure)
+        jacobian = model.point_jacobian(contact.leg.foot_link, place)
+        wrench = np.array((*scale(share, borne), 0.0, 0.0, share * borne_spin))
         pressed += fixed_order.apply(jacobian.T, wrench)
-    effort = model.inverse_dynamics(acceleration)
-    # what the ground does not bear, the body as a whole does not get
-    inertia = model.mass_matrix()[:, :6]
-    missing = solve_symmetric(inertia[:6], pressed[:6] - effort[:6])
-    effort += fixed_order.apply(inertia, np.array(missing)) - pressed
+    falling = model.inverse_dynamics(move.free)[:6]
+    gained = fixed_order.solve(inertia, (pressed[:6] - falling)[:, np.newaxis])[:, 0]
+    effort = model.inverse_dynamics(move.of(gained)) - pressed
     effort[:6] = 0.0
     return effort
 
 
-def solve_symmetric(matrix: FloatArray, right: FloatArray) -> list[float]:
-    """The x of `A x = b` of a symmetric positive definite matrix, by Cholesky's method."""
-    rows, size = matrix.tolist(), len(right)
-    solution: list[float] = right.tolist()
-    for i in range(size):
-        for j in range(i + 1):
-            value = rows[i][j]
-            for k in range(j):
-                value -= rows[i][k] * rows[j][k]
-            rows[i][j] = math.sqrt(value) if i == j else value / rows[j][j]
-    for i in range(size):
-        for k in range(i):
-            solution[i] -= rows[i][k] * solution[k]
-        solution[i] /= rows[i][i]
-    for i in reversed(range(size)):
-        for k in range(i + 1, size):
-            solution[i] -= rows[k][i] * solution[k]
-        solution[i] /= rows[i][i]
-    return solution
+def _wrench_wanted(
+    inertia: FloatArray,  # (6, 6): the root's wrench by its acceleration
+    needed: FloatArray,  # (6,): its wrench where it does not accelerate horizontally
+    contacts: Sequence[Contact],
+    root: tuple[Vector, QuaternionXyzw],
+) -> tuple[Vector, float]:
+    """Force (N) at the centre of pressure, and moment about z there (N m).
+
+    A force has no moment about horizontal axes through the centre of pressure: the root accelerates
+    horizontally so that there is none.
+    """
+    place, root_xyzw = root
+    pressure: Vector = (0.0, 0.0, 0.0)
+    for contact in contacts:
+        pressure = add(pressure, scale(contact.share, contact.pressure))
+
+    def there(wrench: FloatArray) -> tuple[Vector, Vector]:
+        fx, fy, fz, mx, my, mz = wrench.tolist()
+        force: Vector = (fx, fy, fz)
+        return force, moment_about(pressure, place, (force, rotate(root_xyzw, (mx, my, mz))))
+
+    if not contacts:
+        return (0.0, 0.0, 0.0), 0.0
+    (_, start), (_, by_x), (_, by_y) = there(needed), there(inertia[:, 0]), there(inertia[:, 1])
+    tipping = np.array(((by_x[0], by_y[0]), (by_x[1], by_y[1])))
+    across = fixed_order.solve(tipping, np.array(((-start[0],), (-start[1],))))[:, 0]
+    force, moment = there(needed + fixed_order.apply(inertia[:, :2], across))
+    return force, moment[2]

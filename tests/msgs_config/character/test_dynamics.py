@@ -321,3 +321,27 @@ def test_a_state_that_is_taken_over_leaves_no_trace_of_the_one_before(name: str)
         *zip(used.link_poses(), fresh.link_poses(), strict=True),
     ):
         assert one.tobytes() == other.tobytes()
+
+
+@every_character
+def test_the_drift_of_a_link_is_the_rate_of_its_jacobian(name: str) -> None:
+    body = character(name)
+    layout, step = body.layout, 1e-6
+    position, velocity = random_state(body, np.random.default_rng(5))
+    turned, model = layout.rotation_entries, DynamicsModel(body)
+    link = len(body.links) - 1
+
+    def jacobian_after(time: float) -> FloatArray:
+        there = position + time * velocity
+        there[turned] = rotations.log(
+            rotations.multiply(
+                rotations.exp(position[turned]), rotations.exp(time * velocity[turned])
+            )
+        )
+        model.update(there, velocity)
+        return model.link_jacobian(link)
+
+    rate = (jacobian_after(step) - jacobian_after(-step)) / (2.0 * step)
+    model.update(position, velocity)
+
+    np.testing.assert_allclose(model.link_drift(link), rate @ velocity, atol=1e-4)

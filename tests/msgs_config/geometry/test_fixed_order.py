@@ -65,3 +65,18 @@ def test_powers_are_repeated_products(base: float, count: int) -> None:
     assert powers.shape == (2, count)
     assert powers[0] == pytest.approx([base**exponent for exponent in range(count)])
     assert powers[1].tolist() == [1.0] * count
+
+
+def test_equations_are_solved() -> None:
+    rng = np.random.default_rng(1)
+    matrix, right = rng.normal(size=(6, 6)), rng.normal(size=(6, 3))
+    matrix[0, 0] = 0.0  # so that rows must be exchanged
+
+    solved = fixed_order.solve(matrix, right)
+
+    np.testing.assert_allclose(solved, np.linalg.solve(matrix, right), rtol=1e-9, atol=1e-12)
+
+
+def test_equations_without_an_inverse_are_refused() -> None:
+    with pytest.raises(ZeroDivisionError):
+        fixed_order.solve(np.zeros((2, 2)), np.ones((2, 1)))

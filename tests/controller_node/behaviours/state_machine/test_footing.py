@@ -9,7 +9,7 @@ from controller_node.behaviours.state_machine import laws
 from controller_node.behaviours.state_machine.description import CENTRE, HIP, Placement
 from controller_node.behaviours.state_machine.factory import kit_of
 from controller_node.behaviours.state_machine.file import read_machine
-from controller_node.behaviours.state_machine.footing import ReachingFoot
+from controller_node.behaviours.state_machine.footing import ReachingFoot, origin_of
 from controller_node.behaviours.state_machine.leg import FootPose
 from controller_node.behaviours.state_machine.machine import MachineKit
 from controller_node.behaviours.state_machine.situation import Situation, situation_of
@@ -37,11 +37,14 @@ def moving(kit: MachineKit, speed: float, pitch: float = 0.0) -> Situation:
     return situation_of(body, COURSE, "right", "left", 9.81)
 
 
-def reached(kit: MachineKit, at: Situation, time: float, **placement: object) -> FootPose:
+def reached(
+    kit: MachineKit, at: Situation, time: float, later: float = 0.0, **placement: object
+) -> FootPose:
     law = replace(Placement(length=LENGTH, gain=GAIN, stance_time=STANCE_TIME), **placement)  # type: ignore[arg-type]
     state = replace(kit.machine.states["flight"], placement=law, duration=0.2)
-    foot = at.body.feet["left"]
-    return ReachingFoot.leaving(foot, at.body, hip(kit, at)).pose(state, at, time, hip(kit, at))
+    origin = origin_of(law, at, hip(kit, at))
+    foot = ReachingFoot.leaving(at.body.feet["left"], origin)
+    return foot.pose(state, at, time, origin, later)
 
 
 def hip(kit: MachineKit, at: Situation) -> Vector:
@@ -64,25 +67,37 @@ def test_it_goes_ahead_as_raibert_says_of_its_hip_or_of_the_centre_of_mass(
     assert hip(kit, at)[2] - pose.sole[2] == pytest.approx(LENGTH, abs=1e-9)
 
 
+def velocity_of(kit: MachineKit, at: Situation, time: float, **placement: object) -> list[float]:
+    """The velocity of the foot in the world, m/s, where the body moves on as it does."""
+    step = 1e-5
+    now, later = (reached(kit, at, time, ahead, **placement) for ahead in (-step, step))
+    return [(b - a) / (2.0 * step) for a, b in zip(now.sole, later.sole, strict=True)]
+
+
 def test_it_sets_out_from_where_it_is_and_carries_on_as_it_moved(kit: MachineKit) -> None:
-    at = moving(kit, 0.0, pitch=2.0)  # rad/s of the knee
-    foot, step = at.body.feet["left"], 1e-4
+    at = moving(kit, 0.5, pitch=2.0)  # m/s; rad/s of the knee
+    foot = at.body.feet["left"]
 
-    for carry in (0.0, 1.0):
-        now, later = (reached(kit, at, time, carry=carry, clearance=0.0) for time in (0.0, step))
-        speed = [(b - a) / step for a, b in zip(now.sole, later.sole, strict=True)]
-
-        assert now.sole == pytest.approx(foot.sole, abs=1e-9)
-        assert speed == pytest.approx([carry * value for value in foot.velocity], abs=1e-2)
-    assert max(abs(value) for value in foot.velocity) > 0.3
+    assert reached(kit, at, 0.0).sole == pytest.approx(foot.sole, abs=1e-9)
+    for carry, velocity in ((0.0, (0.5, 0.0, 0.0)), (1.0, foot.velocity)):
+        start = velocity_of(kit, at, 1e-5, carry=carry, clearance=0.0)
+        assert start == pytest.approx(velocity, abs=1e-2)
+    assert abs(foot.velocity[0] - 0.5) > 0.3
 
 
 def test_a_foot_that_retracts_lands_at_the_speed_of_the_ground(kit: MachineKit) -> None:
-    at, step = moving(kit, 1.0), 1e-5
-    here, later = (
-        reached(kit, at, time, retract=1.0, clearance=0.0) for time in (0.2 - step, 0.2 + step)
-    )
-    fixed = reached(kit, at, 0.2, retract=0.0)
+    at = moving(kit, 1.0)
 
+    landed = velocity_of(kit, at, 0.2, retract=1.0, clearance=0.0, descent=0.0)
+
+    assert landed == pytest.approx((0.0, 0.0, 0.0), abs=1e-2)
+    here, fixed = (reached(kit, at, 0.2, retract=share) for share in (1.0, 0.0))
     assert here.sole == pytest.approx(fixed.sole, abs=1e-4)
-    assert (later.sole[0] - here.sole[0]) / (2.0 * step) == pytest.approx(-1.0, abs=1e-2)
+
+
+def test_a_foot_that_has_not_landed_in_time_descends(kit: MachineKit) -> None:
+    at = moving(kit, 0.0)
+
+    landed, later = (reached(kit, at, time, descent=0.5) for time in (0.2, 0.3))
+
+    assert landed.sole[2] - later.sole[2] == pytest.approx(0.05)

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from controller_node.behaviours.state_machine import laws
@@ -87,6 +88,22 @@ def test_a_stance_hip_balances_torso_and_swing_hip() -> None:
     stance = laws.stance_hip_torque(torso, swing)
 
     assert -(stance + swing) == pytest.approx(torso)
+
+
+def test_an_arrival_is_by_the_cubic_through_both_ends() -> None:
+    way, speed, last, time = 0.03, -0.5, 0.4, 0.2
+    # the coefficients of x(t), lowest first, of x(0), x'(0), x(T) and x'(T)
+    ends = np.array(
+        (
+            (1.0, 0.0, 0.0, 0.0),
+            (0.0, 1.0, 0.0, 0.0),
+            (1.0, time, time**2, time**3),
+            (0.0, 1.0, 2.0 * time, 3.0 * time**2),
+        )
+    )
+    cubic = np.linalg.solve(ends, (0.0, speed, way, last))
+
+    assert laws.arrival_acceleration(way, speed, last, time) == pytest.approx(2.0 * cubic[2])
 
 
 def test_a_smooth_step_begins_and_ends_at_rest() -> None:
