@@ -57,7 +57,7 @@ class Placement:
 
     law: str = "extrapolated"  # or neutral, pendulum
     width: float = 0.2  # m, of a step
-    pace: float = 1.0  # the speed that the law is told, as a share of the commanded one
+    pace: float = 1.0  # the speed ahead that laws are told, as a share of the commanded one
     ahead: float = 0.0  # m, beside what the law says
     gain: float = 0.0  # s, of the law neutral
     fixed: float = 0.7  # share of `duration` after which the place ahead is what it is
@@ -181,7 +181,6 @@ class Machine:
     states: dict[str, State]
     acceleration: float = 1e9  # m/s^2, at which it takes over commanded velocities
     speed: float = 1e9  # m/s, ahead and sideways, the largest that it takes over
-    pace: float = 1.0  # the speed ahead that its laws are told, as a share of the commanded one
 
     def joint(self, name: str, stance: str) -> str:
         """The character's joint of a name in a target, where a side is the stance side."""

@@ -37,7 +37,7 @@ from msgs_config.mappings import MappingReader
 
 MACHINES_DIRECTORY = Path(__file__).parent / "data"
 _KEYS = [
-    *("sides", "start", "includes", "joins", "acceleration", "speed", "pace", "gains", "bounds"),
+    *("sides", "start", "includes", "joins", "acceleration", "speed", "gains", "bounds"),
     "states",
 ]
 _STATE_KEYS = [
@@ -113,8 +113,8 @@ def make_machine(path: Path, content: dict[str, Any], depth: int = _DEPTH) -> Ma
     acceleration = reader.number("acceleration", 1e9, 1e-3, 1e9)
     if not states:
         raise reader.wrong("states", content.get("states"), "a mapping of one state or more")
-    speed, pace = reader.number("speed", 1e9, 1e-3, 1e9), reader.number("pace", 1.0, 0.1, 10.0)
-    return Machine(path, sides, reader.text("start"), states, acceleration, speed, pace)
+    speed = reader.number("speed", 1e9, 1e-3, 1e9)
+    return Machine(path, sides, reader.text("start"), states, acceleration, speed)
 
 
 def _beside(path: Path, name: str) -> Path:

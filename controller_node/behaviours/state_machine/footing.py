@@ -64,7 +64,7 @@ def _pressure_on_one(state: State, at: Situation, time: float) -> tuple[float, f
     )
     there = at.extrapolated
     x = wanted.ahead + wanted.gain * (there[0] - nominal[0])
-    x += wanted.speed_gain * (at.velocity[0] - course.forward)
+    x += wanted.speed_gain * (at.velocity[0] - state.placement.pace * course.forward)
     y = -at.mirror * wanted.outward + wanted.side_gain * (there[1] - nominal[1])
     return x, y
 
@@ -196,9 +196,9 @@ class ReachingFoot:
         share = (time + later) / state.duration
         moved, carried = laws.smooth_step(share), law.carry * laws.carried_on(share)
         stance_time = law.stance_time or state.duration
-        (vx, vy, _), (v, w) = at.velocity, (course.forward, course.left)
-        ahead = law.ahead + laws.neutral_placement(vx, v, stance_time, law.gain)
-        side = origin.beside + laws.neutral_placement(vy, w, stance_time, law.gain)
+        (vx, vy, _), forward = at.velocity, law.pace * course.forward
+        ahead = law.ahead + laws.neutral_placement(vx, forward, stance_time, law.gain)
+        side = origin.beside + laws.neutral_placement(vy, course.left, stance_time, law.gain)
         goal = in_world(course.heading, (ahead, side, -law.length))
         place = add(scale(1.0 - moved, self.start), scale(moved, goal))
         place = add(place, scale(state.duration * carried, self.velocity))

@@ -117,7 +117,7 @@ class StateMachine:
         """A course whose velocity is taken over as far and as fast as the machine can."""
         machine, before = self._kit.machine, self._course
         most = machine.acceleration * self._kit.period
-        forward = machine.pace * within(course.forward, machine.speed)
+        forward = within(course.forward, machine.speed)
         left = within(course.left, machine.speed)
         return replace(
             course,
