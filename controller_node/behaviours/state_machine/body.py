@@ -75,13 +75,13 @@ class BodyReader:
         return Body(
             position=position,
             velocity=velocity,
-            root=_vector(position[:3]),
+            root=vector(position[:3]),
             root_xyzw=root_xyzw,
             tilt=multiply(root_xyzw, self._from_upright),
-            centre=_vector(self._model.centre_of_mass()),
-            centre_velocity=_vector(self._model.centre_of_mass_velocity()),
+            centre=vector(self._model.centre_of_mass()),
+            centre_velocity=vector(self._model.centre_of_mass_velocity()),
             turns=quaternions,
-            spin=rotate(root_xyzw, _vector(velocity[3:6])),
+            spin=rotate(root_xyzw, vector(velocity[3:6])),
             feet=feet,
         )
 
@@ -92,12 +92,13 @@ def _foot(
     """A foot whose link has a frame (origin, orientation) and a velocity in the world."""
     origin, turn = frame
     x, y, z, w = turn.tolist()
-    sole = add(_vector(origin), rotate((x, y, z, w), leg.sole_in_foot))
+    sole = add(vector(origin), rotate((x, y, z, w), leg.sole_in_foot))
     against = multiply((x, y, z, w), conjugate(leg.upright[2]))
-    return Foot(sole, _vector(velocity), against, float(contacts[leg.foot_link, 2]))
+    return Foot(sole, vector(velocity), against, float(contacts[leg.foot_link, 2]))
 
 
-def _vector(values: FloatArray) -> Vector:
+def vector(values: FloatArray) -> Vector:
+    """An array (3,) as single numbers."""
     x, y, z = values.tolist()
     return (x, y, z)
 

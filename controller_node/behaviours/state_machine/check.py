@@ -55,14 +55,8 @@ def _check_state(machine: Machine, state: State, kinds: dict[str, JointType]) ->
             f"'{STEP}' or '{REACH}'"
         )
     for joint, effort in state.efforts.items():
-        if effort == BALANCE and joint != f"{STANCE}.hip":
-            raise ConfigurationError(
-                f"{place}.efforts.{joint} is '{BALANCE}', which is for '{STANCE}.hip' alone"
-            )
-        if effort == BALANCE and not state.tracks:
-            raise ConfigurationError(
-                f"{place}.efforts.{joint} is '{BALANCE}', which goes with 'tracks: true'"
-            )
+        kind = kinds[machine.joint(joint, next(iter(machine.sides)))]
+        _check_effort(state, f"{place}.efforts.{joint}", joint, effort, kind)
     if REACH in state.feet.values() and state.placement.length <= 0.0:
         raise ConfigurationError(
             f"{place}: a foot that reaches needs 'placement.length', m, from hip to sole"
@@ -92,6 +86,22 @@ def _check_target(
             f"{key}: roll, pitch and yaw are for a ball joint; it is {kind.value}, and must have "
             "one number"
         )
+
+
+def _check_effort(
+    state: State, key: str, joint: str, effort: str | tuple[float, ...], kind: JointType
+) -> None:
+    """A ball joint's effort has three numbers, a hinge's one; a stance hip's may be balanced."""
+    if not isinstance(effort, str):
+        size = 3 if kind is JointType.SPHERICAL else 1
+        if len(effort) != size:
+            numbers = "three numbers" if size == 3 else "one number"
+            raise ConfigurationError(f"{key}: it is {kind.value}, and must have {numbers}, N m")
+        return
+    if joint != f"{STANCE}.hip":
+        raise ConfigurationError(f"{key} is '{BALANCE}', which is for '{STANCE}.hip' alone")
+    if not state.tracks:
+        raise ConfigurationError(f"{key} is '{BALANCE}', which goes with 'tracks: true'")
 
 
 def _check_reached(machine: Machine) -> None:

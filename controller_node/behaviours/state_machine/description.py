@@ -160,7 +160,7 @@ class State:
     placement: Placement
     targets: tuple[JointTarget, ...]
     gains: dict[str, Gains]  # by joint as in `targets`
-    efforts: dict[str, str | Vector]  # by joint likewise: `BALANCE`, or N m
+    efforts: dict[str, str | tuple[float, ...]]  # by joint likewise: `BALANCE`, or N m
     bounds: Bounds
     ends: tuple[End, ...]
     tracks: bool = False  # by the control law and its gains, not by inverse dynamics

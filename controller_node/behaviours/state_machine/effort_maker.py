@@ -147,9 +147,7 @@ class EffortMaker:
             p, d = root.height_gains
             rise = p * above + d * (root.climb - climb)
         rise += root.thrust / self._model.mass
-        lean = multiply(about_y(root.pitch), about_x(at.mirror * root.roll))
-        wanted = multiply(about_z(heading), lean)
-        error = in_frame(heading, log(multiply(wanted, conjugate(body.tilt))))
+        error = in_frame(heading, _tilt_error(root, at))
         spin = in_frame(heading, body.spin)
         tilt, turn = root.tilt_gains, root.turn_gains
         angular = (
@@ -163,7 +161,7 @@ class EffortMaker:
         """What an ankle (3,) adds so that the sole is level and the knee above the foot, N m."""
         leg, foot = contact.leg, body.feet[contact.side]
         foot_xyzw = multiply(foot.turn, leg.upright[2])
-        hip = add(body.root, rotate(body.root_xyzw, leg.hip_in_root))
+        hip = leg.hip(body.root, body.root_xyzw)
         ankle = subtract(foot.sole, rotate(foot_xyzw, leg.sole_in_foot))
         along = subtract(ankle, hip)
         along = scale(1.0 / max(norm(along), 1e-9), along)
@@ -190,7 +188,7 @@ class EffortMaker:
         for name, value in state.efforts.items():
             if not isinstance(value, str):
                 entries = self._layout.joint(self._machine.joint(name, at.stance)).entries
-                effort[entries] += np.array(value)[: entries.stop - entries.start]
+                effort[entries] += np.array(value)
         return effort
 
     def balanced(self, state: State, at: Situation, pose: Pose, gains: GainArrays) -> FloatArray:
@@ -214,11 +212,8 @@ class EffortMaker:
 
     def _torso_torque(self, root: RootTarget, at: Situation) -> Vector:
         """The torque on the torso that holds it as wanted, N m, world axes."""
-        body, heading = at.body, at.course.heading
-        lean = multiply(about_y(root.pitch), about_x(at.mirror * root.roll))
-        error = log(multiply(multiply(about_z(heading), lean), conjugate(body.tilt)))
+        error, (x, y, z) = _tilt_error(root, at), at.body.spin
         (p, d), (q, e) = root.tilt_gains, root.turn_gains
-        x, y, z = body.spin
         return (p * error[0] - d * x, p * error[1] - d * y, q * error[2] - e * z)
 
     def _pd_torque(self, leg: Leg, pose: Pose, body: Body, gains: GainArrays) -> Vector:
@@ -228,3 +223,9 @@ class EffortMaker:
         slower = pose.velocity[entries] - body.velocity[entries]
         x, y, z = (gains.stiffness[entries] * error + gains.damping[entries] * slower).tolist()
         return rotate(body.turns[leg.thigh_link], (x, y, z))
+
+
+def _tilt_error(root: RootTarget, at: Situation) -> Vector:
+    """The rotation vector from how the root is turned to how it is to be, world axes, rad."""
+    lean = multiply(about_y(root.pitch), about_x(at.mirror * root.roll))
+    return log(multiply(multiply(about_z(at.course.heading), lean), conjugate(at.body.tilt)))

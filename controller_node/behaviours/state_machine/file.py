@@ -32,7 +32,6 @@ from controller_node.behaviours.state_machine.laws import PLACEMENT_LAWS
 from controller_node.behaviours.state_machine.support import Bounds
 from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
-from msgs_config.geometry.single_rotations import Vector
 from msgs_config.mappings import MappingReader
 
 MACHINES_DIRECTORY = Path(__file__).parent / "data"
@@ -236,18 +235,17 @@ def _likeness(joint: str, part: MappingReader) -> JointTarget:
     return JointTarget(joint, (a, b, c), likeness=Likeness(role, (x, y, z)))
 
 
-def _efforts(reader: MappingReader) -> dict[str, str | Vector]:
-    efforts: dict[str, str | Vector] = {}
+def _efforts(reader: MappingReader) -> dict[str, str | tuple[float, ...]]:
+    efforts: dict[str, str | tuple[float, ...]] = {}
     for joint, value in reader.content.items():
         if value == BALANCE:
             efforts[joint] = BALANCE
         elif isinstance(value, list):
-            x, y, z = reader.numbers(joint, 3, (-1e6, 1e6))
-            efforts[joint] = (x, y, z)
+            efforts[joint] = reader.numbers(joint, 3, (-1e6, 1e6))
         elif isinstance(value, str):
             raise reader.wrong(joint, value, f"'{BALANCE}', a number or three, N m")
         else:
-            efforts[joint] = (reader.number(joint, None, -1e6, 1e6), 0.0, 0.0)
+            efforts[joint] = (reader.number(joint, None, -1e6, 1e6),)
     return efforts
 
 

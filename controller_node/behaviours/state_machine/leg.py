@@ -68,6 +68,10 @@ class Leg:
     half_length: float  # m, of the sole
     half_width: float  # m
 
+    def hip(self, root: Vector, root_xyzw: QuaternionXyzw) -> Vector:
+        """Where the hip is, m, world."""
+        return add(root, rotate(root_xyzw, self.hip_in_root))
+
     def angles(
         self, root: Vector, root_xyzw: QuaternionXyzw, foot: FootPose, facing: Vector
     ) -> LegAngles:
@@ -76,7 +80,7 @@ class Leg:
         The knee bends in the plane of the leg that `facing`, a horizontal direction to the left,
         is normal to.
         """
-        hip = add(root, rotate(root_xyzw, self.hip_in_root))
+        hip = self.hip(root, root_xyzw)
         foot_xyzw = multiply(foot.turn, self.upright[2])
         ankle = subtract(foot.sole, rotate(foot_xyzw, self.sole_in_foot))
         reach = subtract(ankle, hip)

@@ -86,8 +86,7 @@ class StateMachine:
         self._reaching: dict[str, ReachingFoot] = {}  # likewise
         self._goal: tuple[float, float] | None = None  # of a foot that steps
         self._target = PoseTarget(kit.layout)
-        self._before: tuple[FloatArray, float] | None = None  # targets, height, at the last change
-        self._last: tuple[FloatArray, float] | None = None  # those of the last tick
+        self._last: tuple[FloatArray, float] | None = None  # targets and height of the last tick
         self._none = np.zeros(kit.layout.size)
 
     def advance(self, seen: Observation) -> BehaviourOutput:
@@ -103,14 +102,14 @@ class StateMachine:
         contacts = contacts_of(self._state, at, time, kit.legs)
         pose = self._pose(at, time, contacts)
         gains = kit.efforts.gains(self._state, self._stance, seen.gains)
+        height = self._height(at, time)
         if self._state.tracks:
             effort = kit.efforts.balanced(self._state, at, pose, gains)
         else:
-            ground, height = self._heights(at, time)
-            hold = Hold(replace(self._state.root, height=height), ground, time)
+            hold = Hold(replace(self._state.root, height=height), self._ground(at), time)
             effort = kit.efforts.supported(self._state, at, pose, gains, contacts, hold)
             gains = GainArrays(self._none, self._none, self._none, seen.gains.effort_limits)
-        self._target.pose = pose
+        self._target.pose, self._last = pose, (pose.position, height)
         return BehaviourOutput(self._phase, self._target, gains, effort)
 
     def _followed(self, course: Course) -> Course:
@@ -139,38 +138,40 @@ class StateMachine:
 
     def _enter(self, state: State, now: float, at: Situation) -> None:
         self._state, self._since, self._entered = state, now, True
-        self._before = self._last
+        # what a blend comes over from
+        self._before = self._last or (at.body.position, at.body.root[2] - self._ground(at))
         sides = {STANCE: self._stance, SWING: self._swing}
         self._feet, self._goal = {}, None
         for role, side in sides.items():
             if state.feet[role] == STEP:
                 self._feet[role] = SwingFoot.leaving(at.foot(side))
             elif state.feet[role] == REACH:
-                hip = self._kit.poses.hip(side, at.body)
+                hip = self._kit.legs[side].hip(at.body.root, at.body.root_xyzw)
                 origin = origin_of(state.placement, at, hip)
                 self._reaching[role] = ReachingFoot.leaving(at.foot(side), origin)
         facts = {"assistance": "none", "state": state.name, "stance": self._stance}
         self._phase = Phase(Mode.STATE, facts)
 
-    def _heights(self, at: Situation, time: float) -> tuple[float, float]:
-        """Height of the soles that stand, and of the root above them, wanted, in m."""
-        state = self._state
-        sides = [self._stance if role == STANCE else self._swing for role in state.standing]
+    def _ground(self, at: Situation) -> float:
+        """Height of the soles that stand, or of both where none does, m."""
+        sides = [self._stance if role == STANCE else self._swing for role in self._state.standing]
         soles = [at.foot(side).sole[2] for side in sides or at.body.feet]
-        ground, height = 0.5 * (soles[0] + soles[-1]), state.root.height
-        start = at.body.root[2] - ground if self._before is None else self._before[1]
-        if time < state.blend:
-            if self._before is None:
-                self._before = (at.body.position, start)
-            height = start + smooth_step(time / state.blend) * (height - start)
-        self._last = (self._target.pose.position, height)
-        return ground, height
+        return 0.5 * (soles[0] + soles[-1])
+
+    def _height(self, at: Situation, time: float) -> float:
+        """Height of the root above the ground, m: as wanted, or as it is in a state that tracks."""
+        state = self._state
+        if state.tracks:
+            return at.body.root[2] - self._ground(at)
+        share = smooth_step(time / state.blend) if time < state.blend else 1.0
+        start = self._before[1]
+        return start + share * (state.root.height - start)
 
     def _pose(self, at: Situation, time: float, contacts: list[Contact]) -> Pose:
         """The targets of all joints."""
         kit, state = self._kit, self._state
         pose = kit.poses.free(state, at)
-        if time < state.blend and self._before is not None:
+        if time < state.blend:
             share = smooth_step(time / state.blend)
             pose.position = kit.poses.between(self._before[0], pose.position, share)
             pose.position[:6] = at.body.position[:6]
@@ -189,7 +190,8 @@ class StateMachine:
                 poses = [foot.pose(state, at, time + later, goal) for later in laters]
                 kit.poses.set_leg(pose, side, at.body, poses)
             elif doing == REACH:
-                origin = origin_of(state.placement, at, kit.poses.hip(side, at.body))
+                hip = kit.legs[side].hip(at.body.root, at.body.root_xyzw)
+                origin = origin_of(state.placement, at, hip)
                 reaching = self._reaching[role]
                 poses = [reaching.pose(state, at, time, origin, later) for later in laters]
                 kit.poses.set_leg(pose, side, at.body, poses)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.body import Body
+from controller_node.behaviours.state_machine.body import Body, vector
 from controller_node.behaviours.state_machine.description import STANCE, JointTarget, Machine, State
 from controller_node.behaviours.state_machine.leg import FootPose, Leg
 from controller_node.behaviours.state_machine.situation import Situation
@@ -148,10 +148,6 @@ class PoseMaker:
         pose.position[leg.knee_entry] = body.position[leg.knee_entry]
         pose.velocity[leg.knee_entry] = body.velocity[leg.knee_entry]
 
-    def hip(self, side: str, body: Body) -> Vector:
-        """Where the hip of a side is, m, world."""
-        return add(body.root, rotate(body.root_xyzw, self._legs[side].hip_in_root))
-
     def between(self, start: FloatArray, end: FloatArray, share: float) -> FloatArray:
         """Positions (n,) a share of the way from one to another, rotations the shorter way."""
         layout = self._layout
@@ -160,7 +156,7 @@ class PoseMaker:
         mixed: FloatArray = start + share * way
         for entries in layout.rotation_entries:
             x, y, z = start[entries].tolist()
-            turn = exp(scale(share, _vector(way[entries])))
+            turn = exp(scale(share, vector(way[entries])))
             mixed[entries] = log(multiply(exp((x, y, z)), turn))
         return mixed
 
@@ -172,11 +168,6 @@ def _way(start: Vector, end: Vector) -> Vector:
 
 def _facing(foot: FootPose) -> Vector:
     return rotate(about_z(yaw(foot.turn)), _LEFT)
-
-
-def _vector(values: FloatArray) -> Vector:
-    x, y, z = values.tolist()
-    return (x, y, z)
 
 
 def _joints(character: Character, upright: list[QuaternionXyzw]) -> dict[str, _Joint]:

@@ -138,6 +138,14 @@ def test_each_shipped_machine_can_be_planned(name: str) -> None:
             {"states__one__efforts": {"stance.hip": "balance"}},
             "efforts.stance.hip is 'balance', which goes with 'tracks: true'",
         ),
+        (
+            {"states__one__efforts": {"stance.hip": 3.0}},
+            "efforts.stance.hip: it is spherical, and must have three numbers, N m",
+        ),
+        (
+            {"states__one__efforts": {"swing.knee": [1.0, 2.0, 3.0]}},
+            "efforts.swing.knee: it is revolute, and must have one number, N m",
+        ),
         ({"states__one__tracks": True}, "a state that tracks has no foot that stands"),
         ({"states": {}}, "states is a dict; it must be a mapping of one state or more"),
         ({"includes": {"walk": "wlak"}}, "unknown machine 'wlak'; did you mean 'walk'?"),

@@ -48,7 +48,7 @@ def reached(
 
 
 def hip(kit: MachineKit, at: Situation) -> Vector:
-    return kit.poses.hip("left", at.body)
+    return kit.legs["left"].hip(at.body.root, at.body.root_xyzw)
 
 
 @pytest.mark.parametrize("origin", [HIP, CENTRE])

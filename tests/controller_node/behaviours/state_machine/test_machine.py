@@ -175,9 +175,7 @@ def _ahead(plan: RunPlan) -> float:
     return float(model.centre_of_mass_at(rest)[0]) - 0.045
 
 
-@pytest.mark.parametrize(
-    ("limits", "goes"), [("speed: 0.2", False), ("speed: 0.4", True)]
-)
+@pytest.mark.parametrize(("limits", "goes"), [("speed: 0.2", False), ("speed: 0.4", True)])
 def test_a_machine_takes_over_a_command_up_to_its_speed(
     tmp_path: Path, limits: str, goes: bool
 ) -> None:
@@ -202,6 +200,43 @@ states:
     _, _, states = run(planned(0.7, "0.5,0,0@0.05", machine=str(file)))
 
     assert states == ["one right", "two right"][: 1 + goes]
+
+
+def test_a_blend_after_a_state_that_tracks_comes_over_from_where_the_body_is(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "sinks.yaml"
+    file.write_text(
+        SIDES
+        + """
+start: high
+gains: {stance.knee: [0, 5], swing.knee: [0, 5], stance.hip: [100, 10], swing.hip: [100, 10]}
+states:
+  high:
+    feet: {stance: stand, swing: stand}
+    root: {height: 0.84}
+    ends: [{when: {time: "> 0.5"}, then: sinks}]
+  sinks:
+    feet: {stance: free, swing: free}
+    tracks: true
+    ends: [{when: {height: "< 0.78"}, then: held}]
+  held:
+    feet: {stance: stand, swing: stand}
+    root: {height: 0.8}
+    blend: 1.0
+    ends: never
+"""
+    )
+
+    positions, _, states = run(planned(1.2, machine=str(file)))
+
+    assert states[-1].startswith("held")
+    height = positions[:, 2]
+    rates = np.diff(height, 2) * 240.0**2
+    held = int(np.argmax(height < 0.78))
+    # held where it is, so that it brakes, and no sooner thrown up to where it was
+    assert rates[held + 2 : held + 40].max() < 15.0
+    assert height[-1] == pytest.approx(0.8, abs=0.03)
 
 
 def test_law_and_balance_that_would_add_to_a_machine_are_refused_and_so_is_a_trajectory() -> None:
