@@ -33,7 +33,7 @@ class RootTarget:
     pitch: float = 0.0  # rad, ahead
     climb: float = 0.0  # m/s, upwards
     thrust: float = 0.0  # N, upwards, beside what height and climb need
-    arrival: float = 0.0  # s, after which it has both; 0: by `height_gains`
+    arrival: float = 0.0  # share of `duration` after which it has both; 0: by `height_gains`
     height_gains: Gains = (120.0, 22.0)
     tilt_gains: Gains = (150.0, 25.0)
     turn_gains: Gains = (60.0, 16.0)
@@ -118,6 +118,7 @@ class Condition:
 
 QUANTITIES = {
     "time": "s in the state",
+    "progress": "time in the state over its duration",
     "stance_load": "N on the stance foot",
     "swing_load": "N on the swing foot",
     "load": "N on both feet",
@@ -144,7 +145,8 @@ class End:
     @property
     def takes_time(self) -> bool:
         """Whether it needs the state to have lasted for a time."""
-        return any(c.quantity == "time" and c.above and c.value > 0.0 for c in self.conditions)
+        timed = [c for c in self.conditions if c.quantity in ("time", "progress")]
+        return any(c.above and c.value > 0.0 for c in timed)
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ class Hold(NamedTuple):
 
     root: RootTarget
     ground: float  # m, height of the soles that stand
-    time: float  # s, since the state began
+    rest: float  # s, until it is to have its height and climb, where it arrives
 
 
 class EffortMaker:
@@ -141,7 +141,7 @@ class EffortMaker:
         body, heading, root = at.body, at.course.heading, hold.root
         above, climb = hold.ground + root.height - body.root[2], float(body.velocity[2])
         if root.arrival > 0.0:
-            rest = max(root.arrival - hold.time, _SOON)
+            rest = max(hold.rest, _SOON)
             rise = laws.arrival_acceleration(above, climb, root.climb, rest)
         else:
             p, d = root.height_gains

@@ -106,7 +106,8 @@ class StateMachine:
         if self._state.tracks:
             effort = kit.efforts.balanced(self._state, at, pose, gains)
         else:
-            hold = Hold(replace(self._state.root, height=height), self._ground(at), time)
+            root = replace(self._state.root, height=height)
+            hold = Hold(root, self._ground(at), root.arrival * self._state.duration - time)
             effort = kit.efforts.supported(self._state, at, pose, gains, contacts, hold)
             gains = GainArrays(self._none, self._none, self._none, seen.gains.effort_limits)
         self._target.pose, self._last = pose, (pose.position, height)
@@ -127,8 +128,10 @@ class StateMachine:
     def _go_on(self, now: float, at: Situation) -> Situation:
         """Go over to the next state if the present one ends: once a tick at most."""
         kit, time = self._kit, now - self._since
+        progress = time / self._state.duration
         for end in self._state.ends:
-            if all(c.holds(quantity(c.quantity, at, time, kit.legs)) for c in end.conditions):
+            values = (quantity(c.quantity, at, time, progress, kit.legs) for c in end.conditions)
+            if all(c.holds(value) for c, value in zip(end.conditions, values, strict=True)):
                 if end.swap:
                     self._stance, self._swing = self._swing, self._stance
                     at = situation_of(at.body, at.course, self._stance, self._swing, kit.gravity)

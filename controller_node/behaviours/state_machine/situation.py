@@ -89,12 +89,14 @@ def situation_of(body: Body, course: Course, stance: str, swing: str, gravity: f
     )
 
 
-def quantity(name: str, at: Situation, time: float, legs: dict[str, Leg]) -> float:
+def quantity(name: str, at: Situation, time: float, progress: float, legs: dict[str, Leg]) -> float:
     """A quantity of `QUANTITIES` in a situation, `time` s after its state began."""
     stance, swing = at.foot(at.stance), at.foot(at.swing)
     course = at.course
     if name == "time":
         return time
+    if name == "progress":
+        return progress
     if name == "stance_load":
         return stance.load
     if name == "swing_load":
