@@ -1,17 +1,16 @@
-"""Runs of the machine in `run.yaml` here, nudged: `python -m benchmarks.athletics.runs`.
+"""Runs of the machine `run`, nudged: `python -m benchmarks.athletics.runs`.
 
-It is an attempt: it runs, but slowly, and so it is none of the shipped machines. Each run begins
-standing, gets faster up to a speed, and is measured for 20 s from then on, while a nudge of 10 to
-30 N acts on its root for 0.2 s every 4 s, from a random side at a random moment. A run counts that
-does not fall, is as fast as it is to be in the mean, and has both feet in the air at least a tenth
-of the time.
+Each run begins standing, gets faster up to a speed, and is measured for 20 s from then on, while a
+nudge of 10 to 30 N acts on its root for 0.2 s every 4 s, from a random side at a random moment. A
+run counts that does not fall, covers 2 m/s in the mean, and has both feet in the air at least a
+tenth of the time.
 """
 
 import argparse
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from msgs_config.runtime.process import limit_threads
 
@@ -28,8 +27,27 @@ from controller_node.behaviours.state_machine.file import read_machine  # noqa: 
 from msgs_config.errors import ActuatedCharactersError  # noqa: E402
 
 SPEED, AIRBORNE = 2.0, 0.1  # m/s and share of the time, at least
+COMMANDED = 2.1  # m/s
 MEASURED = 20.0  # s
-ATTEMPT = Path(__file__).with_name("run.yaml")
+SEARCHED = (
+    "states.contact.duration=0.01",
+    "states.contact.root.height=0.005",
+    "states.contact.root.climb=0.03",
+    "states.contact.root.pitch=0.02",
+    "states.contact.pressure.ahead=0.005",
+    "states.contact.placement.length=0.015",
+    "states.contact.placement.ahead=0.02",
+    "states.flight.duration=0.005",
+    "states.flight.placement.length=0.005",
+    "states.flight.placement.gain=0.01",
+    "states.flight.placement.ahead=0.01",
+    "states.flight.placement.width=0.01",
+    "states.flight.placement.retract=0.05",
+    "states.flight.placement.pace=0.05",
+    "states.flight.targets.stance.knee=0.1",
+)
+"""Where numbers are in the file, and how far a search first moves them."""
+_SEARCHED_FOR = 8.0  # s, measured in a search
 _BEGINS = 1.0  # s
 _EVERY, _LEAST, _MOST, _LASTS = 4.0, 10.0, 30.0, 0.2  # s, N, N, s
 
@@ -44,9 +62,10 @@ class Run:
     airborne: float  # share of the time
     flight: float  # s, mean of a flight
 
-    def succeeded(self, speed: float) -> bool:
-        """Whether it ran at a speed in m/s, and did not fall."""
-        return self.lasted > MEASURED - 0.01 and self.speed >= speed and self.airborne >= AIRBORNE
+    @property
+    def succeeded(self) -> bool:
+        """Whether it ran, and did not fall."""
+        return self.lasted > MEASURED - 0.01 and self.speed >= SPEED and self.airborne >= AIRBORNE
 
 
 def nudges(seed: int, since: float, seconds: float) -> list[str]:
@@ -94,13 +113,29 @@ def run(machine: Machine, seed: int, speed: float, seconds: float = MEASURED) ->
     )
 
 
+def draw_seeds(rng: np.random.Generator, count: int, rate: int) -> list[int]:
+    """Seeds of nudges that a search draws, whatever the rate."""
+    return rng.integers(1, 1 << 30, count).tolist()
+
+
+def search_cost(machine: Machine, seeds: Sequence[int]) -> float:
+    """The mean cost of a machine: a fall, the error of its speed, and what it lacks of flights."""
+    costs = []
+    for seed in seeds:
+        seen = run(machine, seed, COMMANDED, _SEARCHED_FOR)
+        fell = 1.0 - min(seen.lasted / _SEARCHED_FOR, 1.0)
+        short = max(0.0, 1.5 * AIRBORNE - seen.airborne)
+        costs.append(20.0 * fell + 8.0 * abs(seen.speed - COMMANDED) + 8.0 * short)
+    return sum(costs) / len(costs)
+
+
 def main() -> int:
     """Run, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--machine", default="run", help="a shipped one, or a file (%(default)s)")
     parser.add_argument(
-        "--machine", default=str(ATTEMPT), help="a shipped one, or a file (run.yaml)"
+        "--speed", type=float, default=COMMANDED, help="m/s, commanded (%(default)s)"
     )
-    parser.add_argument("--speed", type=float, default=SPEED, help="m/s, commanded (%(default)s)")
     parser.add_argument("--runs", type=int, default=5, help="(%(default)s)")
     parser.add_argument("--first-seed", type=int, default=1, help="of the nudges (%(default)s)")
     options = parser.parse_args()
@@ -116,11 +151,11 @@ def main() -> int:
     table = Table("seed", "lasted, s", "speed, m/s", "in the air", "a flight, s", "succeeded")
     for each in runs:
         numbers = (each.lasted, each.speed, each.airborne, each.flight)
-        verdict = "yes" if each.succeeded(0.95 * options.speed) else "no"
+        verdict = "yes" if each.succeeded else "no"
         table.add_row(str(each.seed), *(f"{value:.3f}" for value in numbers), verdict)
     console.print(table)
-    count = sum(each.succeeded(0.95 * options.speed) for each in runs)
-    console.print(f"{count} of {len(runs)} runs at {options.speed:g} m/s, within a twentieth")
+    count = sum(each.succeeded for each in runs)
+    console.print(f"{count} of {len(runs)} runs of {SPEED:g} m/s or more")
     return 0
 
 

@@ -2,9 +2,9 @@
 
 Each candidate walks some short trials in the simulator, at speeds and turns and under pushes that
 change from generation to generation. Its cost is what it fell short of them, the error of its
-speed, its drift aside, the error of its heading, and its effort. With `--task jump` it jumps,
-nudged. The best machine so far is written after every generation; Ctrl-C ends the search and keeps
-it.
+speed, its drift aside, the error of its heading, and its effort. With `--task jump` it jumps, with
+`--task run` it runs, nudged. The best machine so far is written after every generation; Ctrl-C ends
+the search and keeps it.
 
 Source: Hansen and Ostermeier 2001, "Completely Derandomized Self-Adaptation in Evolution
 Strategies"; the extra `search` brings the package `cma`.
@@ -25,7 +25,7 @@ limit_threads()
 import numpy as np  # noqa: E402 - after the limit on threads
 import yaml  # noqa: E402
 
-from benchmarks.athletics import jumps  # noqa: E402
+from benchmarks.athletics import jumps, runs  # noqa: E402
 from benchmarks.athletics.trial import Trial, Walk, walked  # noqa: E402
 from controller_node.behaviours.state_machine.description import Machine  # noqa: E402
 from controller_node.behaviours.state_machine.file import (  # noqa: E402
@@ -133,6 +133,7 @@ class Task:
 TASKS = {
     "walk": Task(SEARCHED, trials, cost),
     "jump": Task(jumps.SEARCHED, jumps.draw_nudges, jumps.search_cost),
+    "run": Task(runs.SEARCHED, runs.draw_seeds, runs.search_cost),
 }
 
 
@@ -201,10 +202,16 @@ def main() -> int:
     parser.add_argument("--rate", type=int, default=240, help="Hz (240)")
     parser.add_argument("--seed", type=int, default=1, help="(1)")
     options = parser.parse_args()
+    if not options.output.absolute().parent.is_dir():
+        parser.error(f"--output {options.output}: there is no such folder")
+    if min(options.generations, options.population - 1, options.trials, options.rate) < 1:
+        parser.error("--generations, --trials and --rate must be 1 or more, --population 2")
     try:
         search(options)
     except KeyboardInterrupt:
-        print(f"interrupted; the best so far is in {options.output}", file=sys.stderr)
+        found = options.output if options.output.exists() else "none; no generation is over"
+        print(f"\ninterrupted; the best so far: {found}", file=sys.stderr)
+        return 130
     except (ActuatedCharactersError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

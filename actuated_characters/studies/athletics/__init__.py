@@ -7,7 +7,12 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.report.reactions import mode_spans
-from actuated_characters.studies.athletics.drawing import draw_jump, draw_pushes, draw_walks
+from actuated_characters.studies.athletics.drawing import (
+    draw_courses,
+    draw_jump,
+    draw_poses,
+    draw_pushes,
+)
 from actuated_characters.studies.athletics.measures import (
     Course,
     commanded,
@@ -20,11 +25,13 @@ from actuated_characters.studies.framework.result import StudyResult
 from actuated_characters.studies.framework.study import RunSpec, StudyRunner
 
 TITLE = "athletes by state machine, by joint torques alone; walk beside the planner"
-RUNS = 19
+RUNS = 20
 
 _COMMANDS = "0.5,0,0@0.5 0.9,0,0@3 0.9,0,0.4@5 0,0,0@8"
 _LENGTH = 11.0  # s
 _JUMP_LENGTH = 4.5
+_RUN_COMMANDS, _RUN_LENGTH = "1,0,0@0.5 2,0,0@3 2,0,0.3@8 0,0,0@11", 16.0
+_RUN_POSES = tuple(7.5 + 0.06 * number for number in range(12))  # s
 _SETTLED = 2.0  # s, from which on speeds are compared
 _PLANNER = "planner"
 _WALKS: Mapping[str, Mapping[str, object]] = {
@@ -36,18 +43,18 @@ _USUAL, _FINE = (4, 4), (12, 6)  # directions, runs for each
 
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
-    """Steer walks by a machine and by the planner, jump, and push the walking machine."""
+    """Steer walks by a machine and by the planner, run, jump, and push the walking machine."""
     plans = find_spec("numba") is not None
     walks = {name: _steered(name) for name in _WALKS if plans or name != _PLANNER}
     runs = {name: runner.run(case).recording for name, case in walks.items()}
     wanted = commanded(walks["walk"])
-    jump = runner.run(
-        _case("jump", _JUMP_LENGTH, {"behaviour": "state_machine", "machine": "jump"})
-    )
+    jump = runner.run(_case("jump", _JUMP_LENGTH, _machine("jump")))
     for name, recording in runs.items():
         result.rows.append(_row(name, recording, wanted))
+    _run(runner, result)
     result.rows.append(_row("jump", jump.recording, None))
-    draw_walks(result, runs, wanted)
+    title = "the same commands: the machine `walk`, and the planner that follows warped clips"
+    draw_courses(result, result.name, title, runs, wanted)
     draw_jump(result, jump.recording)
     directions, halvings = _FINE if runner.fine else _USUAL
     names = list(walks) if runner.fine else ["walk"]
@@ -58,6 +65,20 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     result.remarks.append(
         "pushes: 0.2 s at the root, while it walks at 0.6 m/s; finer, and the planner's, by --fine"
     )
+
+
+def _machine(name: str) -> dict[str, object]:
+    return {"behaviour": "state_machine", "machine": name}
+
+
+def _run(runner: StudyRunner, result: StudyResult) -> None:
+    """From standing over a walk to a run, around a bend, and to a stand."""
+    case = _case("run", _RUN_LENGTH, _machine("run"), _RUN_COMMANDS)
+    recording, wanted = runner.run(case).recording, commanded(case)
+    result.rows.append(_row("run", recording, wanted))
+    title = "the machine `run`: it walks up to 1.2 m/s, and runs from there on"
+    draw_courses(result, f"{result.name}_run", title, {"run": recording}, wanted)
+    draw_poses(result, "run", recording, _RUN_POSES)
 
 
 def _case(

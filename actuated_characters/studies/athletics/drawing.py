@@ -1,6 +1,6 @@
 """The figures of the study `athletics`."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,14 +25,15 @@ if TYPE_CHECKING:  # it takes a second to import
 _JUMP_POSES = (0.9, 1.55, 1.7, 1.85, 2.0, 2.1, 2.5, 3.5)  # s
 
 
-def draw_walks(result: StudyResult, runs: Mapping[str, Recording], wanted: Course) -> None:
-    """A column a walk: which foot stands, speed, heading."""
-    title = "the same commands: the machine `walk`, and the planner that follows warped clips"
-    panels = result.add_panels(result.name, 3, len(runs), (12.0, 7.0), title=title, same_x=True)
-    for column, (name, recording) in enumerate(runs.items()):
+def draw_courses(
+    result: StudyResult, name: str, title: str, runs: Mapping[str, Recording], wanted: Course
+) -> None:
+    """A column a run of the same commands: which foot stands, speed, heading."""
+    panels = result.add_panels(name, 3, len(runs), (12.0, 7.0), title=title, same_x=True)
+    for column, (athlete, recording) in enumerate(runs.items()):
         feet, speed, heading = panels[column :: len(runs)]
         _draw_feet(feet, recording)
-        feet.set_title(name, fontsize="medium")
+        feet.set_title(athlete, fontsize="medium")
         course, times = taken(recording), recording.times
         for panel, got, told, unit in (
             (speed, course.speed, wanted.speed, "speed ahead (m/s)"),
@@ -42,7 +43,7 @@ def draw_walks(result: StudyResult, runs: Mapping[str, Recording], wanted: Cours
             panel.plot(times, told[: len(times)], "k--", linewidth=1.0, label="commanded")
             label(panel, "time (s)", unit)
         result.add_curves(
-            f"{result.name}_{name}",
+            f"{result.name}_{athlete}",
             {"time_s": times, "speed_m_s": course.speed, "heading_rad": course.heading},
         )
 
@@ -78,8 +79,15 @@ def draw_jump(result: StudyResult, recording: Recording) -> None:
     label(height, "time (s)", "height (m)")
     for panel in (feet, height):
         panel.set_xlim(0.5, float(recording.times[-1]))
-    poses = {"jump": strip(recording, _JUMP_POSES)}
-    result.add_pictures(f"{result.name}_jump_poses", poses, title_height=0.4)
+    draw_poses(result, "jump", recording, _JUMP_POSES)
+
+
+def draw_poses(
+    result: StudyResult, name: str, recording: Recording, times: Sequence[float]
+) -> None:
+    """A strip of poses at some times, s."""
+    poses = {name: strip(recording, times)}
+    result.add_pictures(f"{result.name}_{name}_poses", poses, title_height=0.4)
 
 
 def draw_pushes(result: StudyResult, maps: Mapping[str, PushMap]) -> None:
