@@ -11,6 +11,7 @@ from actuated_characters.studies.athletics import _case
 from actuated_characters.studies.athletics.measures import (
     commanded,
     has_fallen,
+    loaded,
     longest_flight,
     taken,
 )
@@ -86,3 +87,15 @@ def test_a_jump_has_one_flight_and_goes_nowhere(runner: InProcessRunner) -> None
     assert not has_fallen(run)
     assert np.abs(taken(run).heading).max() < 0.1
     assert np.abs(taken(run).speed[run.times > 2.9]).max() < 0.1
+
+
+@pytest.mark.slow
+def test_a_run_has_a_flight_in_each_step(runner: InProcessRunner) -> None:
+    case = _case("run", 8.0, {"behaviour": "state_machine", "machine": "run"}, "2,0,0@0.2")
+    run = runner.run(case).recording
+
+    flies = loaded(run)[6 * 240 :].sum(axis=1) == 0
+
+    assert 0.1 < flies.mean() < 0.4
+    assert np.count_nonzero(np.diff(flies.astype(int)) == 1) > 4  # flights in two seconds
+    assert taken(run).speed[7 * 240] > 1.7

@@ -166,6 +166,23 @@ states:
     assert swing[2] > 5.0  # softened by the implicit law
 
 
+@pytest.mark.slow
+def test_a_run_is_reached_over_a_walk_and_left_for_a_stand() -> None:
+    positions, efforts, states = run(planned(13.0, "2,0,0@0.2 0,0,0@6", machine="run"))
+
+    names = [state.split()[0] for state in states]
+    assert list(dict.fromkeys(names))[:3] == ["walk.stand", "walk.shift", "walk.step"]
+    begins = names.index("contact")
+    ends = len(names) - 1 - names[::-1].index("contact")
+    ran = names[begins : ends + 1]
+    assert ran[:4] == ["contact", "flight", "contact", "flight"] and set(ran) == set(ran[:2])
+    assert names[-1] == "walk.stand"
+    speed = (positions[int(6.0 * 240), 0] - positions[int(5.0 * 240), 0]) / 1.0
+    assert speed > 1.6
+    assert np.abs(positions[-1, :2] - positions[-120, :2]).max() < 0.03  # it stands
+    assert not efforts[:, :6].any()
+
+
 def _ahead(plan: RunPlan) -> float:
     """How far the centre of mass is ahead of the sole at rest, m."""
     from msgs_config.character.dynamics import DynamicsModel
