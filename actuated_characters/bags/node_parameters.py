@@ -34,14 +34,14 @@ def between(
     settings: Sequence[NodeParameters], first_ns: int, last_ns: int
 ) -> tuple[NodeParameters, ...]:
     """Those that are in force in some of the states of these stamps."""
-    kept: list[NodeParameters] = []
+    found: list[NodeParameters] = []
     for each in settings:
         since_ns = -1 if each.after_stamp_ns is None else each.after_stamp_ns
         if since_ns < first_ns:
-            kept = []  # the one before has ended
+            found = []  # the one before has ended
         if since_ns < last_ns:
-            kept.append(each)
-    return tuple(kept)
+            found.append(each)
+    return tuple(found)
 
 
 class SimulatorConfigurations:

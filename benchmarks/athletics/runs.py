@@ -115,7 +115,7 @@ def run(machine: Machine, seed: int, speed: float, seconds: float = MEASURED) ->
 
 def draw_seeds(rng: np.random.Generator, count: int, rate: int) -> list[int]:
     """Seeds of nudges that a search draws, whatever the rate."""
-    return rng.integers(1, 1 << 30, count).tolist()
+    return [int(seed) for seed in rng.integers(1, 1 << 30, count)]
 
 
 def search_cost(machine: Machine, seeds: Sequence[int]) -> float:

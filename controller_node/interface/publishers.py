@@ -76,7 +76,7 @@ class Publishers:
     def publish_initial_state(self, state: StampedState) -> None:
         """Publish in which state the reference begins; a simulator has it when this returns.
 
-        It may be reset next, by whoever has changed the reference.
+        A reset may come next, as the reference has changed.
         """
         self._initial_states.publish(
             self._reference_encoder.encode(state.stamp_ns, state.position, state.velocity)

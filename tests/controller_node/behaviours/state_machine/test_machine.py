@@ -249,8 +249,8 @@ states:
 
     assert states[-1].startswith("held")
     height = positions[:, 2]
-    held = int(np.argmax(height < 0.78))
-    assert height[held:].max() < 0.8  # it rises to there, and not to where it was before
+    lowered = int(np.argmax(height < 0.78))
+    assert height[lowered:].max() < 0.8  # it rises to there, and not to where it was before
     assert height[-1] == pytest.approx(0.8, abs=0.03)
 
 
