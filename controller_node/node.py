@@ -255,6 +255,9 @@ class ControllerNode(ComposableNode):
         from the latched topic, once.
         """
         if state.effort is None:
+            self._simulators.look(time.monotonic())  # a changed configuration came before it
+            if self._simulators.bound is None:
+                return None  # it was not the one that this controller was made for
             self._begin_episode(state.stamp_ns)
         elif self._episode_ns is None:
             found_ns = self._simulators.episode_before(state.stamp_ns)
