@@ -21,6 +21,7 @@ from actuated_characters.commands.motion.files import (
     make_folder_of,
     plan_conversions,
 )
+from actuated_characters.motion.bvh.axes_and_units import AXES, UNITS
 from msgs_config.errors import ClipError, RecordingError
 
 if TYPE_CHECKING:  # it takes a while to import
@@ -28,8 +29,6 @@ if TYPE_CHECKING:  # it takes a while to import
     from actuated_characters.motion.retargeting.retargeting import RetargetingSettings
     from actuated_characters.motion.retargeting.target_body import TargetBody
 
-_UNITS = ("m", "dm", "cm", "mm", "inches", "feet")
-_AXES = ("x", "y", "z", "-x", "-y", "-z")
 _SUFFIX, _BVH = ".json", (".bvh",)
 
 
@@ -60,8 +59,8 @@ def add_motion_import(commands: "Commands[argparse.ArgumentParser]") -> None:
         metavar="YAML",
         help="joints by role, such as 'left_knee: LeftLeg', where names do not tell",
     )
-    command.add_argument("--up", choices=_AXES, metavar="AXIS", help="x, y, z, -x, -y or -z")
-    command.add_argument("--units", choices=_UNITS, help="the unit of length")
+    command.add_argument("--up", choices=AXES, metavar="AXIS", help="x, y, z, -x, -y or -z")
+    command.add_argument("--units", choices=[*UNITS], help="the unit of length")
     command.add_argument(
         "--from", dest="start", type=float, default=0.0, metavar="S", help="start, s (0)"
     )

@@ -9,14 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuated_characters.motion.bvh.axes_and_units import AXES, UNITS
 from actuated_characters.motion.retargeting.captured_body import CapturedBody
 from actuated_characters.motion.retargeting.skeleton_map import SIDES
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
-
-AXES = ("x", "y", "z", "-x", "-y", "-z")
-UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inches": 0.0254, "feet": 0.3048}
-"""Length in m of the units that a file may be in."""
 
 _LEG = 0.82  # m from the hip to the ankle of an adult
 _USUAL_UNITS = ("m", "cm", "mm", "inches", "feet")

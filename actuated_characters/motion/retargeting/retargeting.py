@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from actuated_characters.motion.bvh.axes_and_units import UNITS
 from actuated_characters.motion.bvh.skeleton import POSITIONS, BvhMotion, Skeleton
 from actuated_characters.motion.retargeting.captured_body import CapturedBody, captured_body
 from actuated_characters.motion.retargeting.contacts import (
@@ -15,7 +16,6 @@ from actuated_characters.motion.retargeting.contacts import (
     smoothed,
 )
 from actuated_characters.motion.retargeting.conventions import (
-    UNITS,
     Conventions,
     feet_point_backwards,
     find_unit,

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuated_characters.motion.bvh.axes_and_units import AXES
 from actuated_characters.motion.bvh.reading import read_bvh
 from actuated_characters.motion.retargeting.conventions import (
-    AXES,
     axis_vector,
     find_unit,
     quaternion,
