@@ -18,13 +18,19 @@ class Conversion:
 def find_files(folder: Path, suffixes: Sequence[str]) -> list[Path]:
     """The files of a folder and of those in it that end in one of some suffixes, in order.
 
+    Notes beside clips, such as a licence in a .txt file, are left out.
+
     Raises:
         ConfigurationError: there is none.
     """
-    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in suffixes and p.is_file())
-    if not found:
-        raise ConfigurationError(f"{folder}: there is no {' or '.join(suffixes)} file in it")
-    return found
+    from controller_node.references.files.clip import is_note
+
+    found = (p for p in folder.rglob("*") if p.suffix.lower() in suffixes and p.is_file())
+    files = sorted(p for p in found if not is_note(p))
+    if not files:
+        wanted = " or ".join(suffixes)
+        raise ConfigurationError(f"{folder}: there is no {wanted} file of motion in it")
+    return files
 
 
 def plan_conversions(

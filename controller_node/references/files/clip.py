@@ -23,6 +23,7 @@ from msgs_config.geometry import fixed_order, rotations
 
 _SUFFIXES = (".txt", ".json")
 _OF_BEFORE = "Corrections"
+_BEGINNING = 256  # bytes, in which an object begins
 _ROOT_COLUMNS = 8  # duration, position, quaternion
 _SHORTEST_QUATERNION = 0.1
 _LARGEST_NUMBER = 1e6  # m or s
@@ -124,9 +125,10 @@ def expand_clips(character: Character, names: Sequence[str]) -> list[str]:
     for name in names:
         folder = Path(name)
         if folder.is_dir() and name not in available_clips(character):
-            files = sorted(str(p) for p in folder.rglob("*") if p.suffix in _SUFFIXES)
+            found = (p for p in folder.rglob("*") if p.suffix in _SUFFIXES and not is_note(p))
+            files = sorted(map(str, found))
             if not files:
-                raise ClipError(f"{folder}: there is no .json or .txt file in it")
+                raise ClipError(f"{folder}: there is no .json or .txt file of motion in it")
             clips += files
         else:
             path = clip_path(character, name)
@@ -134,6 +136,17 @@ def expand_clips(character: Character, names: Sequence[str]) -> list[str]:
                 raise ClipError(f"{path}: No such file or directory")
             clips.append(name)
     return list(dict.fromkeys(clips))
+
+
+def is_note(path: Path) -> bool:
+    """Whether a file among clips is a .txt file that has no JSON object: a licence, say."""
+    if path.suffix.lower() != ".txt":
+        return False
+    try:
+        with path.open("rb") as file:
+            return not file.read(_BEGINNING).lstrip().startswith(b"{")
+    except OSError:
+        return False  # reading it as a clip tells why
 
 
 def _check_frames(path: Path, frames: FloatArray) -> None:

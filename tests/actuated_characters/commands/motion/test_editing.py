@@ -42,10 +42,22 @@ def test_a_folder_of_clips_becomes_another_one(tmp_path: Path) -> None:
     for name in ("walk", "run"):
         output = clips / f"{name}.json"
         assert main(["motion", "speed", name, "--factor", "1.5", "--output", str(output)]) == 0
+    (clips / "LICENCE.txt").write_text("Everybody may use these clips.\n")
 
     assert main(["motion", "mirror", str(clips), "--output", str(images)]) == 0
 
     assert sorted(path.name for path in images.iterdir()) == ["run.json", "walk.json"]
+
+
+def test_a_folder_of_notes_alone_has_no_clips(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "LICENCE.txt").write_text("Everybody may use these clips.\n")
+
+    assert main(["motion", "mirror", str(tmp_path)]) == 1
+
+    error = capsys.readouterr().err
+    assert "there is no .json or .txt file of motion in it" in error and error.count("\n") == 1
 
 
 def test_what_cannot_be_is_one_clear_line(

@@ -130,7 +130,7 @@ def test_what_cannot_be_imported_is_one_clear_line(
     assert "No such file" in imported(tmp_path / "none.bvh", "--output", nowhere)
     assert "exists already; --overwrite" in imported(bvh, "--output", clip)
     assert "it must end in .json" in imported(bvh, "--output", tmp_path / "a.bvh")
-    assert "there is no .bvh file in it" in imported(other)
+    assert "there is no .bvh file of motion in it" in imported(other)
     assert "no part of two frames" in imported(bvh, "--output", nowhere, "--from", 9)
     assert "no joint found for left_knee" in imported(odd, "--output", nowhere)
     assert "character 'laikago'" in imported(bvh, "--output", nowhere, "--character", "laikago")

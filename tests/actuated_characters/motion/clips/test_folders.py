@@ -44,6 +44,7 @@ def steered(*clips: object) -> SteeredReference:
 
 
 def test_names_files_and_folders_are_clips(cycles: Path) -> None:
+    (cycles / "LICENCE.txt").write_text("Everybody may use these clips.\n")
     files = [str(cycles / "run.json"), str(cycles / "walk.json")]
 
     assert expand_clips(HUMANOID, ["kick", str(cycles), files[1]]) == ["kick", *files]
@@ -74,7 +75,7 @@ def test_what_is_no_clip_to_steer_by_is_rejected(clips: list[str]) -> None:
 
 def test_what_is_no_library_is_rejected(tmp_path: Path) -> None:
     for clips, message in (
-        ([str(tmp_path)], "there is no .json or .txt file in it"),
+        ([str(tmp_path)], "there is no .json or .txt file of motion in it"),
         (["missing.json"], "unknown clip in parameter 'library': 'missing.json'"),
     ):
         with pytest.raises(ActuatedCharactersError, match=message) as caught:
