@@ -16,12 +16,14 @@ WALK = read_content(machine_path("walk"))
 
 def test_a_number_is_moved_and_nothing_else() -> None:
     places = ["states.step.duration", "states.step.placement.width"]
+    before = WALK["states"]["step"]
 
     moved = search.changed(WALK, places, [0.5, 0.2])
 
     step = make_machine(machine_path("walk"), moved).states["step"]
     assert (step.duration, step.placement.width) == (0.5, 0.2)
-    assert search.changed(moved, places, [0.4, 0.14]) == WALK
+    numbers = [before["duration"], before["placement"]["width"]]
+    assert search.changed(moved, places, numbers) == WALK
 
 
 def test_a_key_with_a_dot_is_found() -> None:
