@@ -41,10 +41,11 @@ class Trial:
     rate: int = 240
     simulator: dict[str, object] = field(default_factory=dict)
 
-    def plan(self) -> RunPlan:
-        """The run of the trial."""
+    def plan(self, machine: Machine) -> RunPlan:
+        """The run of the trial with a machine."""
         settings = {"rate": self.rate, **self.simulator}
-        plan = make_plan("humanoid", self.seconds, {}, settings, {"behaviour": "state_machine"})
+        controller = {"behaviour": "state_machine", "machine": str(machine.file)}
+        plan = make_plan("humanoid", self.seconds, {}, settings, controller)
         return plan_velocities(plan, self.commands)[0]
 
 
@@ -63,7 +64,7 @@ class Moment:
 
 def moments(trial: Trial, machine: Machine, plan: RunPlan | None = None) -> Iterator[Moment]:
     """The ticks of a trial until it ends or the character falls."""
-    plan = plan or trial.plan()
+    plan = plan or trial.plan(machine)
     reference = plan.reference
     assert isinstance(reference, SteeredReference)
     character, rate = plan.character, trial.rate
