@@ -11,8 +11,9 @@ Strategies"; the extra `search` brings the package `cma`.
 """
 
 import argparse
+import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,21 +138,38 @@ TASKS = {
 }
 
 
-def search(options: argparse.Namespace) -> None:
-    """Search until the generations are over, or Ctrl-C."""
+def parse_move(text: str) -> tuple[str, float]:
+    """Where a number is in the file, and how far it is first moved.
+
+    Raises:
+        ConfigurationError: the text is not PLACE=STEP, with a step of more than 0.
+    """
+    place, _, step = text.partition("=")
+    try:
+        if not 0.0 < float(step) < math.inf:
+            raise ValueError
+    except ValueError:
+        raise ConfigurationError(
+            f"--move {text}: it must be PLACE=STEP, a step of more than 0, as {SEARCHED[0]}"
+        ) from None
+    return place, float(step)
+
+
+def search(options: argparse.Namespace) -> Iterator[int]:
+    """Search; yields the number of each generation when its best machine is written."""
     import cma
 
     task = TASKS[options.task]
     path = machine_path(options.machine or options.task)
     content = read_content(path)
-    places, steps = zip(*(text.split("=") for text in options.move or task.searched), strict=True)
-    spans = np.array([float(step) for step in steps])
+    moves = dict(parse_move(text) for text in options.move or task.searched)
+    places = list(moves)
     start = [holder[key] for holder, key in (place_of(content, place) for place in places)]
     settings = {
         "seed": options.seed,
         "popsize": options.population,
         "verbose": -9,
-        "CMA_stds": spans,
+        "CMA_stds": np.array(list(moves.values())),
     }
     evolution = cma.CMAEvolutionStrategy(start, 0.3, settings)
     rng = np.random.default_rng(options.seed)
@@ -169,6 +187,7 @@ def search(options: argparse.Namespace) -> None:
         numbers = ", ".join(f"{p}={v:.4g}" for p, v in zip(places, mean, strict=True))
         print(f"generation {generation}: best {min(costs):.3f}, median {np.median(costs):.3f}")
         print(f"  {numbers}", flush=True)
+        yield generation
 
 
 def _cost_or_worst(task: Task, path: Path, content: dict[str, Any], given: Sequence[Any]) -> float:
@@ -206,13 +225,15 @@ def main() -> int:
         parser.error(f"--output {options.output}: there is no such folder")
     if min(options.generations, options.population - 1, options.trials, options.rate) < 1:
         parser.error("--generations, --trials and --rate must be 1 or more, --population 2")
+    done = 0
     try:
-        search(options)
+        for generation in search(options):
+            done = generation
     except KeyboardInterrupt:
-        found = options.output if options.output.exists() else "none; no generation is over"
+        found = options.output if done else "none; no generation is over"
         print(f"\ninterrupted; the best so far: {found}", file=sys.stderr)
         return 130
-    except (ActuatedCharactersError, ValueError) as error:
+    except (ActuatedCharactersError, OSError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except ModuleNotFoundError as error:

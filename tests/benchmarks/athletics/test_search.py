@@ -47,6 +47,36 @@ def test_a_fall_costs_more_than_any_walk_and_an_early_one_more_than_a_late_one()
     assert good < slow < late < early
 
 
+@pytest.mark.parametrize("move", ["states.step.duration", "states.step.duration=much", "a=0"])
+def test_a_wrong_move_is_one_clear_line(
+    move: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["search", "--move", move])
+
+    assert search.main() == 1
+
+    error = capsys.readouterr().err
+    assert f"--move {move}: it must be PLACE=STEP" in error and error.count("\n") == 1
+
+
+def test_an_interruption_of_the_first_generation_does_not_pass_off_an_older_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = tmp_path / "found.yaml"
+    found.write_text("sides: {}\n")
+
+    def interrupt(*given: object) -> float:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(search, "_cost_or_worst", interrupt)
+    monkeypatch.setattr(sys, "argv", ["search", "--output", str(found)])
+
+    assert search.main() == 130
+
+    assert "the best so far: none" in capsys.readouterr().err
+    assert found.read_text() == "sides: {}\n"
+
+
 @pytest.mark.slow
 def test_a_generation_leaves_a_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "SECONDS", 5.0)
