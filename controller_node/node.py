@@ -12,7 +12,8 @@ from controller_node.controller_setups import ControllerSetups
 from controller_node.interface.answer_report import AnswerReport
 from controller_node.interface.awaited_messages import AwaitedMessages
 from controller_node.interface.publishers import Publishers, Reply
-from controller_node.interface.simulators import Simulators, check_simulator
+from controller_node.interface.simulator_check import check_simulator
+from controller_node.interface.simulators import Simulators
 from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.interface.state_decoder import StateDecoder
 from controller_node.parameters import PARAMETERS, character_parameters, check_world

@@ -6,16 +6,7 @@ from dataclasses import dataclass
 from rclpy.node import Node
 from std_msgs.msg import Header, String
 
-from controller_node.controller import Controller
-from controller_node.parameters import check_world
-from msgs_config.character.model import Character
-from msgs_config.errors import (
-    ActuatedCharactersError,
-    CharacterError,
-    ClockError,
-    ConfigurationError,
-    MessageError,
-)
+from msgs_config.errors import ActuatedCharactersError, ClockError, MessageError
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.cdr import decode, read_frame_id
 from msgs_config.messages.clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
@@ -27,7 +18,6 @@ from msgs_config.messages.session import (
     named,
     read_session,
 )
-from msgs_config.parameters import Values
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
@@ -285,25 +275,3 @@ class Simulators:
                 del self._known[next(others)]
             self._known[session] = _KnownSimulator()
         return self._known[session]
-
-
-def check_simulator(
-    controller: Controller, character: Character, values: Values, simulator: RunConfiguration
-) -> None:
-    """Raise an error if a simulator simulates something else than a controller was made for."""
-    if simulator.probe is None:
-        return
-    if simulator.layout.dof_names != character.layout.dof_names:
-        raise CharacterError(
-            f"the simulator's character '{simulator.character}' has other degrees of freedom "
-            f"than '{character.name}'; set 'character' to the simulator's"
-        )
-    controller.check_agreement(simulator.probe)
-    check_world(values, simulator.parameters)
-    for name in ("rate", "placement"):
-        its, own = simulator.parameters.get(name), values[name]
-        if its != own:
-            raise ConfigurationError(
-                f"the simulator's parameter '{name}' is {its}, the controller's is {own}; "
-                "they must be the same"
-            )
