@@ -60,14 +60,7 @@ def plan_conversions(
     if path.is_dir():
         whole = path.resolve()
         folder = output or whole.with_name(whole.name + (beside or "-clips"))
-        if folder.exists() and not folder.is_dir():
-            raise ConfigurationError(f"--output {folder}: it must be a folder, as {source} is one")
-        conversions = [
-            Conversion(str(each), folder / each.relative_to(path).with_suffix(suffix))
-            for each in find_files(path, suffixes)
-        ]
-        if len({each.output for each in conversions}) < len(conversions):
-            raise ConfigurationError(f"{source}: two files differ in their suffix alone")
+        conversions = _conversions_of(path, folder, suffixes, suffix)
     else:
         file = output or Path(path.stem + beside + suffix)
         if file.suffix != suffix:
@@ -78,6 +71,21 @@ def plan_conversions(
             raise RecordingError(f"cannot write {each.output}: it is a directory")
         if each.output.exists() and not overwrite:
             raise RecordingError(f"{each.output} exists already; --overwrite replaces it")
+    return conversions
+
+
+def _conversions_of(
+    source: Path, output: Path, suffixes: Sequence[str], suffix: str
+) -> list[Conversion]:
+    """Those of a folder's files, into another folder. Raises ConfigurationError."""
+    if output.exists() and not output.is_dir():
+        raise ConfigurationError(f"--output {output}: it must be a folder, as {source} is one")
+    conversions = [
+        Conversion(str(each), output / each.relative_to(source).with_suffix(suffix))
+        for each in find_files(source, suffixes)
+    ]
+    if len({each.output for each in conversions}) < len(conversions):
+        raise ConfigurationError(f"{source}: two files differ in their suffix alone")
     return conversions
 
 

@@ -120,26 +120,15 @@ def make_leg(character: Character, hip: str, knee: str, ankle: str) -> Leg:
         ConfigurationError: they are not a ball joint, a hinge about the sideways axis and a ball
             joint one below the other, straight at angle 0, with a box as the sole.
     """
-    links = {link.joint.name: row for row, link in enumerate(character.links)}
-    wanted = {hip: JointType.SPHERICAL, knee: JointType.REVOLUTE, ankle: JointType.SPHERICAL}
-    for name, kind in wanted.items():
-        joint = character.links[links[name]].joint
-        if joint.type is not kind:
-            raise ConfigurationError(
-                f"joint '{name}' is {joint.type.value}; in a leg it must be {kind.value}"
-            )
+    thigh, shin, foot = _leg_links(character, hip, knee, ankle)
     layout = character.layout
     origins, turns = standing_frames(character)
-    thigh, shin, foot = (links[name] for name in (hip, knee, ankle))
     places = [origins[row] for row in (thigh, shin, foot)]
     upright = [turns[row] for row in (thigh, shin, foot)]
-    for place, other in ((places[0], places[1]), (places[0], places[2])):
-        x, y, _ = subtract(place, other)
-        across = math.sqrt(x * x + y * y)
-        if across > _STRAIGHT or other[2] >= place[2]:
-            raise ConfigurationError(
-                f"the leg of '{hip}', '{knee}' and '{ankle}' must hang straight down at angle 0"
-            )
+    if not _hangs(places):
+        raise ConfigurationError(
+            f"the leg of '{hip}', '{knee}' and '{ankle}' must hang straight down at angle 0"
+        )
     axis = rotate(upright[1], character.links[shin].joint.axis_in_child)
     if abs(axis[1]) < 0.999:
         raise ConfigurationError(f"joint '{knee}' of a leg must turn about the sideways axis")
@@ -171,6 +160,29 @@ def make_leg(character: Character, hip: str, knee: str, ankle: str) -> Leg:
         half_length=half_length,
         half_width=half_width,
     )
+
+
+def _leg_links(character: Character, hip: str, knee: str, ankle: str) -> list[int]:
+    """The links below three joints. Raises ConfigurationError if they are of other types."""
+    links = {link.joint.name: row for row, link in enumerate(character.links)}
+    wanted = {hip: JointType.SPHERICAL, knee: JointType.REVOLUTE, ankle: JointType.SPHERICAL}
+    for name, kind in wanted.items():
+        joint = character.links[links[name]].joint
+        if joint.type is not kind:
+            raise ConfigurationError(
+                f"joint '{name}' is {joint.type.value}; in a leg it must be {kind.value}"
+            )
+    return [links[name] for name in wanted]
+
+
+def _hangs(places: list[Vector]) -> bool:
+    """Whether knee and ankle are straight below the hip; m, where the character stands."""
+    hip, *others = places
+    for other in others:
+        x, y, _ = subtract(hip, other)
+        if math.sqrt(x * x + y * y) > _STRAIGHT or other[2] >= hip[2]:
+            return False
+    return True
 
 
 def standing_frames(character: Character) -> tuple[list[Vector], list[QuaternionXyzw]]:
