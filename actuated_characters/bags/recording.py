@@ -1,17 +1,16 @@
 """Reads the recordings of characters from a bag, as arrays."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from actuated_characters.bags.collecting import collect, naming
 from actuated_characters.bags.format.storage import SUFFIXES
 from actuated_characters.bags.node_parameters import NodeParameters, between, in_force
 from actuated_characters.bags.plans import PlanArrays
-from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rebuilding import RecordedWorld
 from actuated_characters.bags.tracks import (
     CONFIGURATION,
@@ -25,7 +24,7 @@ from actuated_characters.runs.run_directory import BAG
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.character.model import Character
-from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
+from msgs_config.errors import RecordingError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.projectiles import BallStates
@@ -174,7 +173,7 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
         ActuatedCharactersError: a message has not its topic's type and meaning.
     """
     bag = find_bag(path)
-    characters, worlds = _collect(bag)
+    characters, worlds = collect(bag)
     known = [timeline for timeline in characters if timeline.rebuilt is not None]
     if not known:
         raise RecordingError(
@@ -182,7 +181,7 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
         )
     recordings = []
     for timeline in known:
-        with _naming(bag, timeline):
+        with naming(bag, timeline):
             recordings.append(_make_recording(timeline, worlds))
     return tuple(sorted(recordings, key=_place))
 
@@ -207,53 +206,6 @@ def _place(recording: Recording) -> tuple[str, int, str]:
     world = recording.world
     place = world.characters.index(world.name) if world.name in world.characters else 0
     return world.namespace, place, recording.name
-
-
-@contextmanager
-def _naming(bag: Path, timeline: CharacterTimeline | WorldTimeline) -> Iterator[None]:
-    """Let errors begin with the bag and the namespace."""
-    try:
-        yield
-    except ActuatedCharactersError as error:
-        where = f"{bag}, '{timeline.namespace}'" if timeline.namespace else f"{bag}"
-        raise type(error)(f"recording {where}: {error}") from error
-
-
-def _collect(bag: Path) -> tuple[list[CharacterTimeline], dict[str, WorldTimeline]]:
-    """Collect the messages of each namespace, on topics that have the contract's names."""
-    characters: dict[str, CharacterTimeline] = {}
-    worlds: dict[str, WorldTimeline] = {}
-    # by topic, its namespace's timeline and its name there
-    places: dict[str, tuple[CharacterTimeline | WorldTimeline, str] | None] = {}
-    for message in read_messages(bag):
-        topic = message.topic
-        if topic not in places:
-            places[topic] = _timeline(topic, WorldTimeline, worlds) or _timeline(
-                topic, CharacterTimeline, characters
-            )
-        if (place := places[topic]) is not None:
-            timeline, name = place
-            try:
-                timeline.has_wall_times &= message.published_ns is not None
-                timeline.take(name, message.raw, message.sent_ns)
-            except ActuatedCharactersError:
-                with _naming(bag, timeline):
-                    raise
-    return list(characters.values()), worlds
-
-
-_Timeline = TypeVar("_Timeline", CharacterTimeline, WorldTimeline)
-
-
-def _timeline(
-    topic: str, kind: type[_Timeline], timelines: dict[str, _Timeline]
-) -> tuple[_Timeline, str] | None:
-    """The timeline that takes a topic's messages, and its name there; None if none of a kind."""
-    for name in kind.TOPICS:
-        if f"/{topic}".endswith(f"/{name}"):
-            namespace = topic.removesuffix(name).strip("/")
-            return timelines.setdefault(namespace, kind(namespace)), name
-    return None
 
 
 def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimeline]) -> Recording:
