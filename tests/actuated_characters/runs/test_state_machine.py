@@ -79,11 +79,12 @@ def test_a_trial_has_the_states_of_a_run() -> None:
     from actuated_characters.runs.in_process import ticks_in_process
 
     trial = Trial(1.6, "0.5,0,0@0.1", ("root:60,0,0@1.1",))
-    plan = trial.plan()
+    machine = read_machine("walk")
+    plan = trial.plan(machine)
     pushes = [parse_push(text, plan) for text in trial.pushes]
 
     ticks = [tick.state for tick in ticks_in_process(plan, pushes)]
-    seen = list(moments(trial, read_machine("walk"), plan))
+    seen = list(moments(trial, machine, plan))
 
     assert len(seen) == len(ticks) == 384
     for moment, state in zip(seen, ticks, strict=True):
