@@ -31,8 +31,6 @@ from msgs_config.runtime.process import StopSignal
 from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, collides, placed
 
-_FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge the last messages
-
 
 class ControllerNode(ComposableNode):
     """Subscribes to `joint_states`; publishes `joint_torques` and `~/reference`."""
@@ -129,7 +127,7 @@ class ControllerNode(ComposableNode):
                 yield self._spin_once(executor)
         finally:
             self._report.publish(self._other_counts, at_once=True)
-            self._outputs.flush(_FLUSH_TIME)
+            self._outputs.flush()
 
     def _spin_once(self, executor: PollingExecutor) -> float:
         """Answer a state if there is one; the turn's result."""

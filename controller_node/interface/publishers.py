@@ -29,7 +29,7 @@ from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.topics import Outgoing
 from msgs_config.runtime.throttle import Throttle
 
-_FLUSH_TIME = 0.5  # s, at the most
+_FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge messages
 
 
 class Reply(NamedTuple):
@@ -134,9 +134,9 @@ class Publishers:
             arrays = reference.position, reference.velocity
             yield publisher, self._reference_encoder.encode(reference.stamp_ns, *arrays)
 
-    def flush(self, seconds: float) -> None:
-        """Wait until every subscriber has what was published, at the most `seconds`."""
-        topics.flush((self._torques, self._references, self._wrenches), seconds)
+    def flush(self) -> None:
+        """Wait a while until every subscriber has what was published in answer to states."""
+        topics.flush((self._torques, self._references, self._wrenches), _FLUSH_TIME)
 
     def publish_configuration(self, text: str) -> None:
         """Publish what the controller is and has in force, as JSON."""

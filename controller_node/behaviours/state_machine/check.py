@@ -55,8 +55,8 @@ def _check_state(machine: Machine, state: State, kinds: dict[str, JointType]) ->
             f"'{STEP}' or '{REACH}'"
         )
     for joint, effort in state.efforts.items():
-        kind = kinds[machine.joint(joint, next(iter(machine.sides)))]
-        _check_effort(state, f"{place}.efforts.{joint}", joint, effort, kind)
+        key = f"{place}.efforts.{joint}"
+        _check_effort(state, key, joint, effort, _kind(machine, joint, kinds))
     if REACH in state.feet.values() and state.placement.length <= 0.0:
         raise ConfigurationError(
             f"{place}: a foot that reaches needs 'placement.length', m, from hip to sole"
@@ -71,11 +71,16 @@ def _check_joint(machine: Machine, place: str, name: str, kinds: dict[str, Joint
         raise ConfigurationError(f"{place}: {one_of('joint', name, known)}")
 
 
+def _kind(machine: Machine, name: str, kinds: dict[str, JointType]) -> JointType:
+    """The type of a joint, which both sides share."""
+    return kinds[machine.joint(name, next(iter(machine.sides)))]
+
+
 def _check_target(
     machine: Machine, place: str, target: JointTarget, kinds: dict[str, JointType]
 ) -> None:
     """A ball joint's target has three numbers, a hinge's one."""
-    kind = kinds[machine.joint(target.joint, next(iter(machine.sides)))]
+    kind = _kind(machine, target.joint, kinds)
     key = f"{place}.targets.{target.joint}"
     if target.likeness is not None and kind is not JointType.SPHERICAL:
         raise ConfigurationError(f"{key}: what goes with a leg must be a ball joint")

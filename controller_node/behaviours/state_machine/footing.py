@@ -161,9 +161,10 @@ class Origin:
     beside: float  # m, to the left: where the foot goes from here
 
 
-def origin_of(placement: Placement, at: Situation, hip: Vector) -> Origin:
-    """The origin of a foot whose hip is at a place in the world."""
+def origin_of(placement: Placement, at: Situation, leg: Leg) -> Origin:
+    """The origin of the foot of a leg."""
     body, heading = at.body, at.course.heading
+    hip = leg.hip(body.root, body.root_xyzw)
     x, y, z, *_ = body.velocity.tolist()
     velocity = add((x, y, z), cross(body.spin, subtract(hip, body.root)))
     if placement.origin != CENTRE:

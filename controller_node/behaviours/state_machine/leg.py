@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -62,11 +63,20 @@ class Leg:
     shin_length: float  # m
     knee_sign: float  # of the knee's angle where the shin goes backwards
     upright: tuple[QuaternionXyzw, QuaternionXyzw, QuaternionXyzw]  # thigh, shin, foot, in world
-    entries: list[int]  # of all its joints
     fixed: tuple[QuaternionXyzw, QuaternionXyzw]  # of hip and ankle, child in parent, at angle 0
     sole_in_foot: Vector  # m, the middle of the sole, in the foot's link frame
     half_length: float  # m, of the sole
     half_width: float  # m
+
+    @cached_property
+    def entries(self) -> list[int]:
+        """Those of all its joints."""
+        hip, ankle = self.hip_entries, self.ankle_entries
+        return [
+            *range(hip.start, hip.stop),
+            self.knee_entry,
+            *range(ankle.start, ankle.stop),
+        ]
 
     def hip(self, root: Vector, root_xyzw: QuaternionXyzw) -> Vector:
         """Where the hip is, m, world."""
@@ -150,11 +160,6 @@ def make_leg(character: Character, hip: str, knee: str, ankle: str) -> Leg:
         shin_length=places[1][2] - places[2][2],
         knee_sign=math.copysign(1.0, axis[1]),
         upright=(upright[0], upright[1], upright[2]),
-        entries=[
-            entry
-            for name in (hip, knee, ankle)
-            for entry in range(*layout.joint(name).entries.indices(layout.size))
-        ],
         fixed=(fixed[0], fixed[1]),
         sole_in_foot=sole,
         half_length=half_length,

@@ -11,6 +11,7 @@ from controller_node.behaviours.state_machine.description import (
     STANCE,
     STEP,
     SWING,
+    Condition,
     Machine,
     State,
 )
@@ -129,9 +130,12 @@ class StateMachine:
         """Go over to the next state if the present one ends: once a tick at most."""
         kit, time = self._kit, now - self._since
         progress = time / self._state.duration
+
+        def holds(condition: Condition) -> bool:
+            return condition.holds(quantity(condition.quantity, at, time, progress, kit.legs))
+
         for end in self._state.ends:
-            values = (quantity(c.quantity, at, time, progress, kit.legs) for c in end.conditions)
-            if all(c.holds(value) for c, value in zip(end.conditions, values, strict=True)):
+            if all(map(holds, end.conditions)):
                 if end.swap:
                     self._stance, self._swing = self._swing, self._stance
                     at = situation_of(at.body, at.course, self._stance, self._swing, kit.gravity)
@@ -149,8 +153,8 @@ class StateMachine:
             if state.feet[role] == STEP:
                 self._feet[role] = SwingFoot.leaving(at.foot(side))
             elif state.feet[role] == REACH:
-                hip = self._kit.legs[side].hip(at.body.root, at.body.root_xyzw)
-                origin = origin_of(state.placement, at, hip)
+                leg = self._kit.legs[side]
+                origin = origin_of(state.placement, at, leg)
                 self._reaching[role] = ReachingFoot.leaving(at.foot(side), origin)
         facts = {"assistance": "none", "state": state.name, "stance": self._stance}
         self._phase = Phase(Mode.STATE, facts)
@@ -193,8 +197,7 @@ class StateMachine:
                 poses = [foot.pose(state, at, time + later, goal) for later in laters]
                 kit.poses.set_leg(pose, side, at.body, poses)
             elif doing == REACH:
-                hip = kit.legs[side].hip(at.body.root, at.body.root_xyzw)
-                origin = origin_of(state.placement, at, hip)
+                origin = origin_of(state.placement, at, kit.legs[side])
                 reaching = self._reaching[role]
                 poses = [reaching.pose(state, at, time, origin, later) for later in laters]
                 kit.poses.set_leg(pose, side, at.body, poses)

@@ -95,12 +95,6 @@ def _line(model: DynamicsModel, leg: Leg) -> Vector:
     return scale(1.0 / norm((x, y, z)), (x, y, z))
 
 
-def moment_about(point: Vector, root: Vector, wrench: tuple[Vector, Vector]) -> Vector:
-    """The moment about a point, N m, of a force (N) at the root and a moment (N m) about it."""
-    force, moment = wrench
-    return add(moment, cross(subtract(root, point), force))
-
-
 def bounded(force: Vector, spin: float, bounds: Bounds, weight: float) -> tuple[Vector, float]:
     """The nearest force and moment about z that the ground can bear: friction gives way first."""
     up = min(max(force[2], bounds.least * weight), bounds.most * weight)
@@ -112,7 +106,7 @@ def bounded(force: Vector, spin: float, bounds: Bounds, weight: float) -> tuple[
 
 def support_effort(
     model: DynamicsModel,
-    acceleration: FloatArray,  # (n,) wanted; horizontally none of the root, and none of `legs`
+    acceleration: FloatArray,  # (n,) wanted; of the root none horizontally
     contacts: Sequence[Contact],  # whose shares are 1 together
     bounds: Bounds,
     root: tuple[Vector, QuaternionXyzw],  # its place in m, and its orientation
@@ -151,6 +145,8 @@ def _wrench_wanted(
     A force has no moment about horizontal axes through the centre of pressure: the root accelerates
     horizontally so that there is none.
     """
+    if not contacts:
+        return (0.0, 0.0, 0.0), 0.0
     place, root_xyzw = root
     pressure: Vector = (0.0, 0.0, 0.0)
     for contact in contacts:
@@ -159,10 +155,9 @@ def _wrench_wanted(
     def there(wrench: FloatArray) -> tuple[Vector, Vector]:
         fx, fy, fz, mx, my, mz = wrench.tolist()
         force: Vector = (fx, fy, fz)
-        return force, moment_about(pressure, place, (force, rotate(root_xyzw, (mx, my, mz))))
+        moment = rotate(root_xyzw, (mx, my, mz))
+        return force, add(moment, cross(subtract(place, pressure), force))
 
-    if not contacts:
-        return (0.0, 0.0, 0.0), 0.0
     (_, start), (_, by_x), (_, by_y) = there(needed), there(inertia[:, 0]), there(inertia[:, 1])
     tipping = np.array(((by_x[0], by_y[0]), (by_x[1], by_y[1])))
     across = fixed_order.solve(tipping, np.array(((-start[0],), (-start[1],))))[:, 0]

@@ -42,7 +42,7 @@ def reached(
 ) -> FootPose:
     law = replace(Placement(length=LENGTH, gain=GAIN, stance_time=STANCE_TIME), **placement)  # type: ignore[arg-type]
     state = replace(kit.machine.states["flight"], placement=law, duration=0.2)
-    origin = origin_of(law, at, hip(kit, at))
+    origin = origin_of(law, at, kit.legs["left"])
     foot = ReachingFoot.leaving(at.body.feet["left"], origin)
     return foot.pose(state, at, time, origin, later)
 
