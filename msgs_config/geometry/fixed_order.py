@@ -80,14 +80,16 @@ def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
     Raises:
         ZeroDivisionError: the matrix has no inverse.
     """
-    rows: list[list[float]] = np.column_stack((matrix, right)).tolist()
-    size = len(rows)
+    table = np.column_stack((matrix, right))
+    size = len(table)
     for i in range(size):
-        pivot = max(range(i, size), key=lambda row: abs(rows[row][i]))
-        rows[i], rows[pivot] = rows[pivot], rows[i]
-        first = rows[i]
-        for k in range(size):
-            if k != i:
-                factor = rows[k][i] / first[i]
-                rows[k] = [a - factor * b for a, b in zip(rows[k], first, strict=True)]
-    return np.array([[value / rows[i][i] for value in rows[i][size:]] for i in range(size)])
+        pivot = i + int(np.abs(table[i:, i]).argmax())
+        if pivot != i:
+            table[[i, pivot]] = table[[pivot, i]]
+        if table[i, i] == 0.0:
+            raise ZeroDivisionError("the matrix has no inverse")
+        factors = table[:, i] / table[i, i]
+        factors[i] = 0.0
+        table -= factors[:, np.newaxis] * table[i]
+    solution: FloatArray = table[:, size:] / table.diagonal()[:, np.newaxis]
+    return solution
