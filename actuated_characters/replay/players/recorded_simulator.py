@@ -11,7 +11,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from actuated_characters.bags.recording import CommandArrays, read_recording
+from actuated_characters.bags.recording import CommandArrays, Recording, read_recording
 from actuated_characters.replay.command_comparison import merge_commands, recorded_commands
 from actuated_characters.replay.players.controller_parameters import late_topics, parameter_changes
 from actuated_characters.replay.players.processes import ANSWER_TIMEOUT, PlayerReport
@@ -24,6 +24,7 @@ from actuated_characters.replay.players.simulator_outputs import (
     read_ticks,
     tick_topics,
 )
+from msgs_config.arrays import BoolArray
 from msgs_config.errors import MessageError, RecordingError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import encode_clock
@@ -86,6 +87,7 @@ class RecordedSimulator(Node):
         if not self._expected.any():
             raise RecordingError(f"recording {path} has no commands to compare others with")
         self._received = np.full(self._expected.shape, np.nan)
+        self._awaited = self._expected | _needed_commands(self._recording)
         self._repeats = values.flag("repeat_requests")
         fixed = values.texts("fixed")
         self._changes = parameter_changes(self._recording, fixed) if self._repeats else {}
@@ -166,7 +168,7 @@ class RecordedSimulator(Node):
 
     def _play(self, row: int, messages: list[tuple[Topic, bytes]]) -> None:
         """Publish the messages of a tick, its state at the end, and wait for the answer."""
-        is_answered = bool(self._expected[row].any())
+        is_answered = bool(self._awaited[row].any())
         begins = row in self._rare.episodes
         if self._is_realtime and not is_answered and not begins:
             return  # the controller never saw it: it took the newest one
@@ -181,13 +183,13 @@ class RecordedSimulator(Node):
         sent = [(topic.name, self._publish(topic, raw)) for topic, raw in messages]
         if self._opponent:
             sent.append((self._opponent, self._publish_opponent()))
-        if is_answered:  # else it was not answered then either, or the answer not recorded
+        if is_answered:  # else it may not have been then
             self._wait_for_answer(row, stamp_ns, sent)
             for change in self._changes.get(row, ()):
                 self._set(change)
 
     def _wait_for_answer(self, row: int, stamp_ns: int, sent: list[tuple[str, bytes]]) -> None:
-        """Take commands until they cover what was commanded; `sent` is sent again meanwhile.
+        """Take commands until they cover those awaited; `sent` is sent again meanwhile.
 
         A controller that was started for this answers at once with all that it has.
         """
@@ -195,7 +197,7 @@ class RecordedSimulator(Node):
         received, layout = self._received[row], self._recording.layout
 
         def missing() -> list[str]:
-            lacks = np.flatnonzero(self._expected[row] & np.isnan(received))
+            lacks = np.flatnonzero(self._awaited[row] & np.isnan(received))
             return [layout.dof_names[entry] for entry in lacks]
 
         def is_answered() -> bool:
@@ -257,6 +259,20 @@ class RecordedSimulator(Node):
         while not self._stop and not condition():
             self._executor.rest()
             self._report.tell_wait(what, timeout)
+
+
+def _needed_commands(recording: Recording) -> BoolArray:
+    """Which commands (t + 1, n) the simulator went on with, whether they are in the bag or not.
+
+    A recorder may find a controller after its first answers. Only a simulator in lockstep without
+    a timeout is known to have had all commands in each tick, but for a reset.
+    """
+    parameters = recording.parameters
+    needed = np.zeros((len(recording.stamps_ns), recording.layout.size), dtype=np.bool_)
+    if parameters.get("mode") != "realtime" and not parameters.get("lockstep_timeout"):
+        needed[:-1] = recording.layout.mask(parameters["commanded_joints"])
+        needed[recording.episode_rows[1:] - 1] = False
+    return needed
 
 
 def _some(names: list[str]) -> str:

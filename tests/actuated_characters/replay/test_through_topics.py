@@ -17,7 +17,7 @@ from rclpy.serialization import serialize_message
 from trajectory_msgs.msg import JointTrajectory
 
 from actuated_characters.bags.reader import RecordedMessage
-from actuated_characters.bags.recording import read_recording
+from actuated_characters.bags.recording import find_bag, read_recording
 from actuated_characters.cli import main
 from actuated_characters.replay.command_comparison import CommandComparison, recorded_commands
 from actuated_characters.replay.players.controller_parameters import (
@@ -388,22 +388,43 @@ def test_somebodys_own_controller_is_waited_for_and_compared(
     assert "identical: the commands that answer" in process.stdout
 
 
-def test_a_controller_that_needs_sensors_is_played_their_readings(
-    folder: Path, processes: Processes
-) -> None:
+@pytest.fixture(scope="module")
+def balance(folder: Path) -> Path:
+    """A run of a controller that has a memory, and listens to sensors."""
     sensors = [sensor.topic for sensor in character("humanoid").sensors]
     with recorded(folder / "balance", sensors=sensors) as together:
         simulator = together.simulator("humanoid", rate=1000, max_ticks=300, wait_for_subscribers=2)
-        balance = together.python(str(EXAMPLE.with_name("balance.py")))
+        controller = together.python(str(EXAMPLE.with_name("balance.py")))
         assert simulator.wait(120.0) == 0
-        balance.end()
+        controller.end()
+    return folder / "balance" / "run"
 
+
+@pytest.mark.parametrize("unheard", [0, 40])
+def test_a_controller_that_needs_sensors_is_played_their_readings(
+    processes: Processes, balance: Path, tmp_path: Path, *, unheard: int
+) -> None:
+    """All of them, also those of the ticks whose commands the recorder came too late for."""
+    bag = without_first_commands(find_bag(balance), tmp_path / "bag", unheard)
     options = ["--through-topics", "simulator", "--no-start"]
-    process = processes.command("replay", str(folder / "balance" / "run"), *options)
+    process = processes.command("replay", str(bag), *options)
     processes.python(str(EXAMPLE.with_name("balance.py")))
 
     assert process.wait(120.0) == 0, process.stderr
     assert "identical: the commands that answer" in process.stdout
+
+
+def without_first_commands(bag: Path, target: Path, ticks: int) -> Path:
+    """A copy of a bag without the commands that answer its first states."""
+    end_ns, decoder = int(read_recording(bag).stamps_ns[ticks]), JointStateDecoder()
+
+    def change(message: RecordedMessage) -> bytes | None:
+        is_early = (
+            message.topic == "/joint_torques" and decoder.decode(message.raw).stamp_ns < end_ns
+        )
+        return None if is_early else message.raw
+
+    return rewrite(bag, target, change)
 
 
 def with_a_request(bag: Path, target: Path) -> Path:
