@@ -10,7 +10,7 @@ from std_msgs.msg import String
 from msgs_config.messages import topics
 from tests.support.physics import character
 from tests.support.recorded_nodes import recorded
-from tests.support.ros import SimulatorClient, stamp_ns
+from tests.support.ros import SimulatorClient, stamp_ns, tick_of
 
 BEGINS = (0, 31, 72, 113, 150)
 """The rows of the first states of the episodes."""
@@ -60,6 +60,7 @@ def record_changed_episodes(folder: Path, context: Context) -> ChangedEpisodes:
         client.listen(topics.JOINT_STATES)  # is the fourth, without whom nothing begins
         client.spin_until(lambda: client.states.messages, "the first state")
         step(BEGINS[1] - 1)
+        answers = client.listen(topics.JOINT_TORQUES)
         change(SIMULATOR, gravity=MOON, friction=0.4)
         change(CONTROLLER, gravity=MOON, clip="run")
         assert client.reset().success
@@ -76,7 +77,9 @@ def record_changed_episodes(folder: Path, context: Context) -> ChangedEpisodes:
         steer(0.8)  # counts from the first state of the episode on
         assert client.reset().success
         step(3)
-        steer(1.0)
+        answered = BEGINS[4] + 3 + 1  # row 0 is the state of tick 1
+        client.spin_until(lambda: answers and tick_of(answers.last) == answered, "its answer")
+        steer(1.0)  # from the next state on
         assert client.pause(False).success
         assert simulator.wait() == 0
     client.spin_until(lambda: len(active.messages) >= 2, "both active velocities")
