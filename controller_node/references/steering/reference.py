@@ -10,6 +10,7 @@ import numpy as np
 from controller_node.references.base import ReferenceState
 from controller_node.references.steering.gait import Gait
 from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
+from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
 from msgs_config.errors import MotionError
@@ -17,6 +18,9 @@ from msgs_config.geometry import rotations
 
 _WINDOW = 1024  # ticks that are remembered: many more than a planner's horizon
 _MOST_WAITING = 1000  # commands
+_LEANS_IN = 0.15  # s, time constant
+_LEANS_AHEAD = 0.5  # of what it should: the foot in front and the one behind are not on the ground
+_GRAVITY = 9.81  # m/s^2
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,8 @@ class Course:
     left: float = 0.0  # m/s
     turn: float = 0.0  # rad/s
     phase: float = 0.0  # of the gait's cycle, from 0 to 1
+    acceleration_ahead: float = 0.0  # m/s^2, smoothed; in the character's own frame
+    acceleration_left: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,9 @@ class SteeredReference:
     """A gait at commanded velocities. It is immutable but for what it remembers of its course.
 
     Speed and turn rate follow the commands at the accelerations of the limits. The course is
-    integrated tick by tick, from `start` on; before it the character is where it is then.
+    integrated tick by tick, from `start` on; before it the character is where it is then. It leans
+    into bends, so that the ground's force on the feet goes through the root, and half as far as
+    that would take ahead as it speeds up, and back as it slows down.
     """
 
     def __init__(
@@ -139,6 +147,9 @@ class SteeredReference:
         turn = course.turn + within(wanted.turn - course.turn, limits.turn_acceleration * period)
         heading = math.remainder(course.heading + turn * period, math.tau)
         cosine, sine = math.cos(heading), math.sin(heading)
+        ahead = (forward - course.forward) / period - turn * left
+        leftward = (left - course.left) / period + turn * forward
+        share = min(period / _LEANS_IN, 1.0)
         return Course(
             course.x + period * (cosine * forward - sine * left),
             course.y + period * (sine * forward + cosine * left),
@@ -147,6 +158,8 @@ class SteeredReference:
             left,
             turn,
             (course.phase + self._gait.frequency(forward) * period) % 1.0,
+            course.acceleration_ahead + share * (ahead - course.acceleration_ahead),
+            course.acceleration_left + share * (leftward - course.acceleration_left),
         )
 
     def _wanted(self, tick: int) -> VelocityCommand:
@@ -168,12 +181,23 @@ class SteeredReference:
         return self._poses[tick]
 
     def _placed(self, course: Course) -> GeneralizedPosition:
-        """The gait's pose where a course is."""
+        """The gait's pose where a course is, leaning about the root: the feet give way."""
         pose = self._gait.pose(course.forward, course.phase)
         position, turns = pose.position.copy(), pose.orientations_xyzw.copy()
         about_z = rotations.about_z(course.heading)
+        lean, upright = _lean(course)
         position[:3] = rotations.rotate(about_z, position[:3])
-        position[:2] += (course.x, course.y)
-        turns[0] = rotations.multiply(about_z, turns[0])
+        position[:3] = (position[0] + course.x, position[1] + course.y, upright * position[2])
+        turns[0] = rotations.multiply(rotations.multiply(about_z, lean), turns[0])
         position[self._character.layout.rotation_entries] = rotations.log(turns)
         return GeneralizedPosition(position, turns)
+
+
+def _lean(course: Course) -> tuple[FloatArray, float]:
+    """The turn xyzw (4,) of the root as it leans, and the cosine of its angle."""
+    ahead = _LEANS_AHEAD * course.acceleration_ahead / _GRAVITY
+    left = course.acceleration_left / _GRAVITY
+    upright = 1.0 / math.sqrt(1.0 + ahead * ahead + left * left)
+    size = math.sqrt(2.0 * (1.0 + upright))
+    turn = np.array((-upright * left, upright * ahead, 0.0, 1.0 + upright))
+    return turn / size, upright

@@ -10,6 +10,7 @@ from controller_node.references.factory import make_motion
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import VelocityCommand
 from msgs_config.errors import ActuatedCharactersError, MotionError
+from msgs_config.geometry import rotations
 from msgs_config.parameters import resolve
 from tests.support.physics import character
 
@@ -74,6 +75,53 @@ def test_the_root_is_where_the_course_is() -> None:
         course = reference.course(round(time * RATE))
         root = reference.sample(time).configuration.position[:2]
         assert root == pytest.approx((course.x, course.y), abs=0.08)  # it sways
+
+
+def lean_of(reference: SteeredReference, start: float) -> tuple[float, float]:
+    """How far the character leans ahead and to the left, rad: a second's mean from `start` s on."""
+    leans = []
+    for tick in range(round(start * RATE), round((start + 1.0) * RATE)):
+        course = reference.course(tick)
+        turn = reference.sample(tick / RATE).configuration.orientations_xyzw[0]
+        upright = reference._gait.pose(course.forward, course.phase).orientations_xyzw[0]
+        lean = rotations.multiply(turn, rotations.conjugate(upright))
+        x, y, z = rotations.rotate(lean, np.array((0.0, 0.0, 1.0))).tolist()
+        cosine, sine = math.cos(course.heading), math.sin(course.heading)
+        leans.append((math.atan2(cosine * x + sine * y, z), math.atan2(cosine * y - sine * x, z)))
+    ahead, left = np.mean(leans, axis=0)
+    return float(ahead), float(left)
+
+
+def test_it_leans_into_a_bend_as_a_bicycle_does() -> None:
+    straight = steer(make(**LASTING), VelocityCommand(0, 2.0))
+    bend = steer(make(**LASTING), VelocityCommand(0, 2.0, 0.0, -0.6))
+
+    assert lean_of(straight, 5.0) == pytest.approx((0.0, 0.0), abs=1e-6)
+    ahead, left = lean_of(bend, 5.0)
+    assert left == pytest.approx(-math.atan(2.0 * 0.6 / 9.81), abs=1e-3)  # v omega / g
+    assert ahead == pytest.approx(0.0, abs=1e-3)
+
+
+def test_it_leans_ahead_to_speed_up_and_back_to_slow_down() -> None:
+    reference = make(**{**LASTING, "steering.braking": 1.5})
+    reference = steer(reference, VelocityCommand(0, 2.1), VelocityCommand(5 * RATE, 0.0))
+
+    assert lean_of(reference, 1.5) == pytest.approx((math.atan(0.35 / 9.81), 0.0), abs=2e-3)
+    assert lean_of(reference, 5.4)[0] < -0.06  # of atan(0.75 / 9.81) = 0.076
+    assert lean_of(reference, 8.0) == pytest.approx((0.0, 0.0), abs=1e-4)
+
+
+def test_leaning_the_root_stays_above_the_course_and_comes_lower() -> None:
+    bend = steer(make(**LASTING), VelocityCommand(0, 2.0, 0.0, 0.9))
+    course = bend.course(6 * RATE)
+
+    position = bend.sample(6.0).configuration.position
+    upright = bend._gait.pose(course.forward, course.phase).position
+    assert math.dist(position[:2], (course.x, course.y)) == pytest.approx(
+        float(np.linalg.norm(upright[:2]))
+    )
+    lean = math.atan(2.0 * 0.9 / 9.81)
+    assert position[2] == pytest.approx(math.cos(lean) * upright[2], abs=1e-3)
 
 
 def test_its_velocity_leads_from_each_tick_to_the_next() -> None:
