@@ -83,11 +83,11 @@ class RecordedSimulator(Node):
         self._recording = read_recording(path, values.text("character") or None)
         self._rare = read_rare_messages(path, self._recording)
         self._ticks = read_ticks(path, self._recording)
-        self._expected = ~np.isnan(recorded_commands(self._recording))  # (t + 1, n)
-        if not self._expected.any():
+        recorded = ~np.isnan(recorded_commands(self._recording))  # (t + 1, n)
+        if not recorded.any():
             raise RecordingError(f"recording {path} has no commands to compare others with")
-        self._received = np.full(self._expected.shape, np.nan)
-        self._awaited = self._expected | _needed_commands(self._recording)
+        self._received = np.full(recorded.shape, np.nan)
+        self._awaited = recorded | _needed_commands(self._recording)
         self._repeats = values.flag("repeat_requests")
         fixed = values.texts("fixed")
         self._changes = parameter_changes(self._recording, fixed) if self._repeats else {}
@@ -183,7 +183,7 @@ class RecordedSimulator(Node):
         sent = [(topic.name, self._publish(topic, raw)) for topic, raw in messages]
         if self._opponent:
             sent.append((self._opponent, self._publish_opponent()))
-        if is_answered:  # else it may not have been then
+        if is_answered:  # else the simulator may have gone on without
             self._wait_for_answer(row, stamp_ns, sent)
             for change in self._changes.get(row, ()):
                 self._set(change)

@@ -1,4 +1,4 @@
-"""The command `fork` in a process beside the viewer: its end is waited for by nobody."""
+"""The command `fork` in a process beside the viewer, which does not wait for its end."""
 
 import signal
 import subprocess

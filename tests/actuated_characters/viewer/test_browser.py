@@ -187,7 +187,9 @@ def test_a_click_with_shift_throws_a_ball_that_hits(
 
     def struck() -> bool:
         """Asked after each message: they come too fast for all of them to be read each time."""
-        return stamp_ns(contacts.last) > released and bool(set(contacts.last.joint_names) - feet)
+        if not contacts or stamp_ns(contacts.last) <= released:
+            return False
+        return bool(set(contacts.last.joint_names) - feet)
 
     client.spin_sending(click, struck, "a ball hits")
     assert standing.exit_code is None
