@@ -2,7 +2,6 @@
 
 import re
 import struct
-import time
 from collections.abc import Iterator
 
 from actuated_characters.bags.format.definitions import find_message_type
@@ -33,13 +32,18 @@ class SimulatedLogTime:
         self._places: dict[str, int | None] = {}  # of the stamp, by topic
         self._unsettled: list[Heard] = []
 
-    def settle(self, batch: list[Heard], *, everything: bool) -> list[Heard]:
+    def settle(self, batch: list[Heard], begun_ns: int | None) -> list[Heard]:
         """Keep the newest messages back until the next call; return the rest, and those before.
 
-        Where log times are equal the order of writing counts, and topics are read one by one.
+        Where log times are equal the order of writing counts, and topics are read one by one: of
+        what was published meanwhile, those that were read first lack the messages.
+
+        Args:
+            batch: Has been read from all topics.
+            begun_ns: Wall time at which that began; None: keep nothing back.
         """
-        before, latest_ns = self._unsettled, time.time_ns() - _SETTLED_NS
-        late = [not everything and each.published_ns > latest_ns for each in batch]
+        before, latest_ns = self._unsettled, (begun_ns or 0) - _SETTLED_NS
+        late = [begun_ns is not None and each.published_ns > latest_ns for each in batch]
         self._unsettled = [each for each, is_late in zip(batch, late, strict=True) if is_late]
         ready = [each for each, is_late in zip(batch, late, strict=True) if not is_late]
         return sorted([*before, *ready], key=lambda message: message.published_ns)

@@ -180,6 +180,7 @@ class RecorderNode(Node):
         While the loop runs the nodes in it go first; at the end the recorder does not give way,
         or a flood from others would hold it up.
         """
+        begun_ns = time.time_ns()
         batch = [
             Heard(reader.recorded, raw, published_ns)
             for reader in self._readers
@@ -187,7 +188,7 @@ class RecorderNode(Node):
         ]
         batch.sort(key=lambda message: message.published_ns)
         if self._log_time is not None:
-            batch = self._log_time.settle(batch, everything=not gives_way)
+            batch = self._log_time.settle(batch, begun_ns if gives_way else None)
         for message in batch:
             if passed := self._filter.take(message):
                 for each in passed:

@@ -138,6 +138,18 @@ def test_without_any_state_all_is_kept_at_the_end_and_once() -> None:
     assert not list(log_time.finish())
 
 
+def test_what_was_published_while_the_topics_were_read_waits_for_the_topics_read_first() -> None:
+    """A recorder that had to pause between two topics."""
+    log_time = SimulatedLogTime()
+    of_second_topic = [state(number, 5 * S + number) for number in (2, 4, 6)]
+    of_first_topic = [state(number, 5 * S + number) for number in (1, 3, 5)]
+
+    assert log_time.settle(of_second_topic, 5 * S) == []
+    found = log_time.settle(of_first_topic, 6 * S)
+
+    assert [message.published_ns - 5 * S for message in found] == [1, 2, 3, 4, 5, 6]
+
+
 @settings(deadline=None)
 @given(st.lists(st.lists(st.integers(0, 30), max_size=6), max_size=6))
 def test_messages_settle_in_the_order_of_publishing_and_none_is_lost(
@@ -148,12 +160,12 @@ def test_messages_settle_in_the_order_of_publishing_and_none_is_lost(
     known, found = 0, list[Heard]()
     for offsets in rounds:
         batch = [state(1, (far if offset % 2 else 0) + offset) for offset in offsets]
-        ready = log_time.settle(sorted(batch, key=lambda m: m.published_ns), everything=False)
+        ready = log_time.settle(sorted(batch, key=lambda m: m.published_ns), 5 * S)
         assert [m.published_ns for m in ready] == sorted(m.published_ns for m in ready)
         found += ready
         assert len(found) >= known  # all of the round before
         known += len(offsets)
-    found += log_time.settle([], everything=True)
+    found += log_time.settle([], None)
 
     sent = [(far if offset % 2 else 0) + offset for offsets in rounds for offset in offsets]
     assert sorted(m.published_ns for m in found) == sorted(sent)
