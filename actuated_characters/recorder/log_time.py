@@ -2,6 +2,7 @@
 
 import re
 import struct
+import time
 from collections.abc import Iterator
 
 from actuated_characters.bags.format.definitions import find_message_type
@@ -13,7 +14,7 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 _STAMP_AT, _FIRST_STAMP_AT = 4, 8  # bytes of CDR before the first field, and behind a length
 _STAMPED = {"builtin_interfaces/Time", "std_msgs/Header"}
 _SEQUENCE = re.compile(r"sequence<(\w+)/(\w+)>")
-_SETTLED_NS = 10_000_000  # within which the messages of one moment have come on all topics
+_SETTLED_NS = 100_000_000  # in which all of one moment come, also on a busy machine
 _MOST_PENDING = 1000  # messages before the first state; few topics have any then
 
 
@@ -33,20 +34,23 @@ class SimulatedLogTime:
         self._unsettled: list[Heard] = []
 
     def settle(self, batch: list[Heard], begun_ns: int | None) -> list[Heard]:
-        """Keep the newest messages back until the next call; return the rest, and those before.
+        """Keep the newest messages back for later calls; return the rest in order of publishing.
 
         Where log times are equal the order of writing counts, and topics are read one by one: of
-        what was published meanwhile, those that were read first lack the messages.
+        what was published or on its way meanwhile, those that were read first lack the messages.
 
         Args:
             batch: Has been read from all topics.
             begun_ns: Wall time at which that began; None: keep nothing back.
         """
-        before, latest_ns = self._unsettled, (begun_ns or 0) - _SETTLED_NS
-        late = [begun_ns is not None and each.published_ns > latest_ns for each in batch]
-        self._unsettled = [each for each, is_late in zip(batch, late, strict=True) if is_late]
-        ready = [each for each, is_late in zip(batch, late, strict=True) if not is_late]
-        return sorted([*before, *ready], key=lambda message: message.published_ns)
+        messages = sorted([*self._unsettled, *batch], key=lambda message: message.published_ns)
+        if begun_ns is None:
+            self._unsettled = []
+            return messages
+        latest_ns, now_ns = begun_ns - _SETTLED_NS, time.time_ns()
+        late = [latest_ns < each.published_ns <= now_ns for each in messages]
+        self._unsettled = [each for each, is_late in zip(messages, late, strict=True) if is_late]
+        return [each for each, is_late in zip(messages, late, strict=True) if not is_late]
 
     def take(self, message: Heard) -> Iterator[tuple[Heard, int]]:
         """Yield the messages whose log times (ns) are known now, with these, in their order."""

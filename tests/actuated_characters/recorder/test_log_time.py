@@ -1,5 +1,6 @@
 """Log times in simulated time: that of the stamp, or of the last state."""
 
+import time
 from array import array
 from typing import Any
 
@@ -150,22 +151,28 @@ def test_what_was_published_while_the_topics_were_read_waits_for_the_topics_read
     assert [message.published_ns - 5 * S for message in found] == [1, 2, 3, 4, 5, 6]
 
 
+def test_what_the_wall_clock_says_is_yet_to_come_does_not_wait() -> None:
+    """The clock was set back: times of publishing stay as far ahead for long."""
+    ahead = state(1, time.time_ns() + 3600 * S)
+
+    assert SimulatedLogTime().settle([ahead], time.time_ns()) == [ahead]
+
+
 @settings(deadline=None)
 @given(st.lists(st.lists(st.integers(0, 30), max_size=6), max_size=6))
 def test_messages_settle_in_the_order_of_publishing_and_none_is_lost(
     rounds: list[list[int]],
 ) -> None:
-    """Whatever times they have: even from a clock that goes ahead, they wait for one round."""
-    log_time, far = SimulatedLogTime(), 2**62
-    known, found = 0, list[Heard]()
-    for offsets in rounds:
-        batch = [state(1, (far if offset % 2 else 0) + offset) for offset in offsets]
-        ready = log_time.settle(sorted(batch, key=lambda m: m.published_ns), 5 * S)
+    """Rounds of reading are 20 ms apart, offsets are in units of 10 ms."""
+    log_time, found = SimulatedLogTime(), list[Heard]()
+    for number, offsets in enumerate(rounds):
+        begun_ns = 5 * S + number * S // 50
+        batch = [state(1, 5 * S + offset * S // 100) for offset in offsets]
+        ready = log_time.settle(batch, begun_ns)
         assert [m.published_ns for m in ready] == sorted(m.published_ns for m in ready)
+        assert all(m.published_ns <= begun_ns - S // 10 for m in ready)
         found += ready
-        assert len(found) >= known  # all of the round before
-        known += len(offsets)
     found += log_time.settle([], None)
 
-    sent = [(far if offset % 2 else 0) + offset for offsets in rounds for offset in offsets]
+    sent = [5 * S + offset * S // 100 for offsets in rounds for offset in offsets]
     assert sorted(m.published_ns for m in found) == sorted(sent)
