@@ -1,8 +1,9 @@
-"""Where the reference stands: its place and heading give way to what it cannot absorb, and return.
+"""Where the reference's world is: it gives way to what the character cannot undo, and returns.
 
 A push that moves the character by a step cannot be undone at once by its feet. So while it is
 perturbed the reference's world is moved and turned after the character, and slowly back all the
-while: a point p of it is at `R p + t` in the world, with R the turn about z by `yaw`.
+while: a point p of it is at `R p + t` in the world, with R the turn about z by `yaw`. A reference
+that stands has no steps for a way back: its world follows, and stays where the character stands.
 """
 
 import math
@@ -19,6 +20,7 @@ _HELD = 1.0  # s after which that is over
 _FOLLOWS_IN = 0.3  # s, time constant with which the place gives way
 _TURNS_IN = 1.0  # s, the heading
 _RETURNS_IN = 3.0  # s, both on the way back
+_STANDS = 0.02  # m/s of the reference's centre of mass: slower than this it does not travel
 _SLOWLY = 0.15  # m/s, at most, of the place on the way back
 
 
@@ -78,15 +80,19 @@ class Anchor:
         error = state.centre - wanted.centre
         far = _length(error) > _FAR or _length(state.velocity - wanted.velocity) > _FAST
         calm_from = time + _HELD if far else self.calm_from
-        if time < calm_from:
-            yaw = self.yaw + min(elapsed / _TURNS_IN, 1.0) * _heading(state.root, wanted.root)
-            before = _turn(self.yaw) * state.centre + self.place
-            share = min(elapsed / _FOLLOWS_IN, 1.0)
-            place = before - _turn(yaw) * (state.centre - share * error)
-            followed = Anchor(place, yaw, calm_from)
-        else:
-            followed = replace(self, calm_from=calm_from)
-        return followed._returned(wanted.centre, elapsed)
+        anchor = replace(self, calm_from=calm_from)
+        stands = _length(wanted.velocity) < _STANDS
+        if stands or time < calm_from:
+            anchor = anchor._followed(state, wanted, elapsed)
+        return anchor if stands else anchor._returned(wanted.centre, elapsed)
+
+    def _followed(self, state: PlanarState, wanted: PlanarState, elapsed: float) -> "Anchor":
+        """A part of the way to the character."""
+        yaw = self.yaw + min(elapsed / _TURNS_IN, 1.0) * _heading(state.root, wanted.root)
+        before = _turn(self.yaw) * state.centre + self.place
+        share = min(elapsed / _FOLLOWS_IN, 1.0)
+        place = before - _turn(yaw) * (state.centre - share * (state.centre - wanted.centre))
+        return replace(self, place=place, yaw=yaw)
 
     def _returned(self, centre: complex, elapsed: float) -> "Anchor":
         """A part of the way back, as seen where the reference's centre of mass is."""

@@ -1,6 +1,7 @@
 """The reference's place: it gives way to a character that was pushed, and comes back."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,12 +15,20 @@ from tests.support.physics import character
 PERIOD = 0.05
 HUMANOID = character("humanoid")
 MODEL = ContactModel(HUMANOID, period_s=1 / 240, gravity=9.81, friction=0.45)
-STILL = PlanarState(0j, 0j, rotations.about_z(0.0))
+FORWARDS = rotations.about_z(0.0)
+STANDING = PlanarState(0j, 0j, FORWARDS)
+WALKING = PlanarState(0j, 1.2 + 0j, FORWARDS)
 
 
 def pushed(error: complex, *, heading: float = 0.0, velocity: complex = 0j) -> PlanarState:
-    """A character away from a reference that stands at the origin."""
-    return PlanarState(error, velocity, rotations.about_z(heading))
+    """A character away from a reference that walks through the origin."""
+    return PlanarState(error, WALKING.velocity + velocity, rotations.about_z(heading))
+
+
+def seen_from(anchor: Anchor, where: complex, heading: float) -> PlanarState:
+    """A character that stands somewhere in the world, as it is in the reference's."""
+    inside = (where - anchor.place) * complex(math.cos(anchor.yaw), -math.sin(anchor.yaw))
+    return PlanarState(inside, 0j, rotations.about_z(heading - anchor.yaw))
 
 
 def random_state(seed: int) -> tuple[FloatArray, FloatArray]:
@@ -32,7 +41,8 @@ def random_state(seed: int) -> tuple[FloatArray, FloatArray]:
 def test_undisturbed_it_stays_where_it_is_to_the_last_bit() -> None:
     anchor = Anchor()
     for tick in range(200):
-        anchor = anchor.advanced(pushed(0.2 + 0.1j, velocity=0.4j), STILL, tick * PERIOD, PERIOD)
+        state = pushed(0.2 + 0.1j, velocity=0.4j)
+        anchor = anchor.advanced(state, WALKING, tick * PERIOD, PERIOD)
     position, velocity = random_state(0)
 
     seen, moving = anchor.to_reference_world(position, velocity)
@@ -66,14 +76,11 @@ def test_pushed_away_it_follows_and_turns() -> None:
     where, heading = 0.6 + 0.5j, 0.8
     anchor = Anchor()
 
-    def look(time: float) -> Anchor:
-        inside = (where - anchor.place) * complex(math.cos(anchor.yaw), -math.sin(anchor.yaw))
-        return anchor.advanced(pushed(inside, heading=heading - anchor.yaw), STILL, time, PERIOD)
-
     # Act
     places, yaws = [0j], [0.0]
     for tick in range(200):
-        anchor = look(tick * PERIOD)
+        state = replace(seen_from(anchor, where, heading), velocity=WALKING.velocity)
+        anchor = anchor.advanced(state, WALKING, tick * PERIOD, PERIOD)
         places.append(anchor.place)
         yaws.append(anchor.yaw)
 
@@ -84,12 +91,35 @@ def test_pushed_away_it_follows_and_turns() -> None:
     assert 0.3 < max(yaws) < heading
 
 
+def test_where_the_reference_stands_it_comes_to_the_character_and_stays() -> None:
+    # Arrange: too near for a push
+    where, heading = 0.2 + 0.1j, 0.3
+    anchor = Anchor()
+    for tick in range(200):
+        # Act
+        state = seen_from(anchor, where, heading)
+        anchor = anchor.advanced(state, STANDING, tick * PERIOD, PERIOD)
+
+        # Assert
+        assert abs(where - anchor.place) == pytest.approx(
+            abs(where) * (1 - PERIOD / 0.3) ** (tick + 1), abs=1e-9
+        )
+        assert not anchor.gives_way(tick * PERIOD)
+    assert anchor.yaw == pytest.approx(heading, abs=1e-3)
+
+    # and it returns as soon as the reference walks
+    for tick in range(200, 600):
+        anchor = anchor.advanced(WALKING, WALKING, tick * PERIOD, PERIOD)
+    assert abs(anchor.place) < 0.01
+    assert abs(anchor.yaw) < 0.01
+
+
 def test_the_way_back_leads_to_the_clips_own_place_and_heading() -> None:
     anchor = Anchor(0.5 - 0.3j, 0.7)
     walking, away = 0j, list[complex]()
     for tick in range(400):
         walking += 1.2 * PERIOD
-        at_ease = PlanarState(walking, 1.2, STILL.root)
+        at_ease = replace(WALKING, centre=walking)
         turn = complex(math.cos(anchor.yaw), math.sin(anchor.yaw))
         before = turn * walking + anchor.place
         anchor = anchor.advanced(at_ease, at_ease, tick * PERIOD, PERIOD)
@@ -122,7 +152,7 @@ def test_what_flips_over_turns_the_reference_by_how_far_it_is_off_about_z(lean: 
     state = PlanarState(0.4 + 0j, 0j, rotations.multiply(off, wanted))
 
     # Act
-    anchor = Anchor().advanced(state, PlanarState(0j, 0j, wanted), 0.0, PERIOD)
+    anchor = Anchor().advanced(state, replace(WALKING, root=wanted), 0.0, PERIOD)
 
     # Assert
     assert anchor.yaw == pytest.approx(0.2 * PERIOD / 1.0, rel=0.02)
@@ -131,9 +161,9 @@ def test_what_flips_over_turns_the_reference_by_how_far_it_is_off_about_z(lean: 
 def test_it_returns_while_it_gives_way_too() -> None:
     """What is never calm, as a flip after the other, may not drift for good."""
     anchor = Anchor(0.5 + 0j, 0.4)
-    fast = PlanarState(0j, 0.9 + 0j, STILL.root)  # where the reference is, but faster
+    fast = pushed(0j, velocity=0.9 + 0j)  # where the reference is, but faster
     for tick in range(100):
-        anchor = anchor.advanced(fast, STILL, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(fast, WALKING, tick * PERIOD, PERIOD)
 
     assert anchor.gives_way(100 * PERIOD)
     assert abs(anchor.place) < 0.15
