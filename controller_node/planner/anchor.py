@@ -3,7 +3,8 @@
 A push that moves the character by a step cannot be undone at once by its feet. So while it is
 perturbed the reference's world is moved and turned after the character, and slowly back all the
 while: a point p of it is at `R p + t` in the world, with R the turn about z by `yaw`. A reference
-that stands has no steps for a way back: its world follows, and stays where the character stands.
+that stands has no steps for a way back: its world follows the character as it comes to stand, too,
+and stays there until the reference goes on.
 """
 
 import math
@@ -16,11 +17,12 @@ from msgs_config.geometry import rotations
 
 _FAR = 0.28  # m of the centre of mass from the reference's: it is perturbed
 _FAST = 0.8  # m/s likewise; a walk that is not pushed reaches 0.63
-_HELD = 1.0  # s after which that is over
+_HELD = 1.0  # s after which that is over; also after the reference has come to stand
 _FOLLOWS_IN = 0.3  # s, time constant with which the place gives way
 _TURNS_IN = 1.0  # s, the heading
 _RETURNS_IN = 3.0  # s, both on the way back
-_STANDS = 0.02  # m/s of the reference's centre of mass: slower than this it does not travel
+_TRAVELS = 0.02  # m/s of the reference's centre of mass from which on it goes somewhere
+_TURNS = 0.02  # rad/s of its root about z likewise
 _SLOWLY = 0.15  # m/s, at most, of the place on the way back
 
 
@@ -31,6 +33,7 @@ class PlanarState:
     centre: complex  # m, of the centre of mass, x + i y
     velocity: complex  # m/s
     root: FloatArray  # (4,) orientation xyzw
+    turn: float = 0.0  # rad/s of the root about z
 
 
 @dataclass(frozen=True)
@@ -39,10 +42,11 @@ class Anchor:
 
     place: complex = 0j  # t, m, x + i y
     yaw: float = 0.0  # rad
-    calm_from: float = 0.0  # s since the episode began, until when it gives way
+    calm_from: float = 0.0  # s since the episode began; until then the character is perturbed
+    settled_from: float = 0.0  # s likewise; until then the reference has not stood for long
 
-    def gives_way(self, time: float) -> bool:
-        """Whether the reference goes where the character is, at a time in s."""
+    def is_perturbed(self, time: float) -> bool:
+        """Whether the character is at a time in s: the feet go where they catch it."""
         return time < self.calm_from
 
     def to_reference_world(
@@ -79,12 +83,13 @@ class Anchor:
         """
         error = state.centre - wanted.centre
         far = _length(error) > _FAR or _length(state.velocity - wanted.velocity) > _FAST
+        travels = _length(wanted.velocity) > _TRAVELS or abs(wanted.turn) > _TURNS
         calm_from = time + _HELD if far else self.calm_from
-        anchor = replace(self, calm_from=calm_from)
-        stands = _length(wanted.velocity) < _STANDS
-        if stands or time < calm_from:
+        settled_from = time + _HELD if travels else self.settled_from
+        anchor = replace(self, calm_from=calm_from, settled_from=settled_from)
+        if anchor.is_perturbed(time) or (not travels and time < settled_from):
             anchor = anchor._followed(state, wanted, elapsed)
-        return anchor if stands else anchor._returned(wanted.centre, elapsed)
+        return anchor._returned(wanted.centre, elapsed) if travels else anchor
 
     def _followed(self, state: PlanarState, wanted: PlanarState, elapsed: float) -> "Anchor":
         """A part of the way to the character."""
@@ -105,16 +110,20 @@ class Anchor:
         return replace(self, place=place, yaw=yaw)
 
 
-def planar_state(position: FloatArray, velocity: FloatArray, centre: FloatArray) -> PlanarState:
+def planar_state(
+    position: FloatArray, velocity: FloatArray, centre: FloatArray, centre_velocity: FloatArray
+) -> PlanarState:
     """How a state moves over the ground.
 
     Args:
         position: MuJoCo's (q,).
-        velocity: Of the centre of mass (3,), m/s.
+        velocity: MuJoCo's (n,), with the root's angular velocity in its own frame.
         centre: Of mass (3,), m.
+        centre_velocity: (3,) m/s.
     """
     root = rotations.xyzw_from_wxyz(position[3:7])
-    return PlanarState(complex(*centre[:2]), complex(*velocity[:2]), root)
+    turn = float(rotations.rotate(root, velocity[3:6])[2])
+    return PlanarState(complex(*centre[:2]), complex(*centre_velocity[:2]), root, turn)
 
 
 def _heading(root: FloatArray, wanted: FloatArray) -> float:

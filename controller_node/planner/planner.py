@@ -180,7 +180,7 @@ class PredictivePlanner:
         body, position = self._model.body(gains), self._model.position_of(state.position)
         desired = self._reference.ahead(tick, desired_at, body)
         velocity = state.velocity.copy()
-        start = Start(tick, position, velocity, desired, body, Anchor(), gives_way=False)
+        start = Start(tick, position, velocity, desired, body, Anchor(), perturbed=False)
         return self._search.cost_ahead(start, self._plan)
 
     def _compile(self, character: Character) -> None:
@@ -193,7 +193,7 @@ class PredictivePlanner:
         desired = self._reference.ahead(0, lambda _: still, body)
         position = self._model.position_of(rest)
         self._search.rehearse(
-            Start(0, position, nothing, desired, body, self._anchor, gives_way=False)
+            Start(0, position, nothing, desired, body, self._anchor, perturbed=False)
         )
         self._reference.clear()
 
@@ -243,8 +243,8 @@ class PredictivePlanner:
                 position, velocity, offsets, between, body
             )
         desired = self._reference.ahead(acts, desired_at, body)
-        gives_way = self._anchor.gives_way(tick / self._rate_hz)
-        start = Start(tick, position, velocity, desired, body, self._anchor, gives_way)
+        perturbed = self._anchor.is_perturbed(tick / self._rate_hz)
+        start = Start(tick, position, velocity, desired, body, self._anchor, perturbed)
         seed = (self._seed, self._episode)
         return PendingPlan(
             tick, acts, self._thread.submit(self._search.find, start, self._plan, seed)
@@ -262,13 +262,14 @@ class PredictivePlanner:
         features = self._rollouts.features_of(*seen, body)
         since_plan = tick - (tick if self._plan is None else self._plan.seen)
         self._anchor = self._anchor.advanced(
-            self._balance(seen[0], features),
-            self._balance(target.position, target.features),
+            self._planar(*seen, features),
+            self._planar(target.position, target.velocity, target.features),
             tick / self._rate_hz,
             since_plan / self._rate_hz,
         )
         return self._anchor.to_reference_world(position, velocity)
 
-    def _balance(self, position: FloatArray, features: FloatArray) -> PlanarState:
-        centre, velocity = self._residual_model.balance(features)
-        return planar_state(position, velocity, centre)
+    def _planar(
+        self, position: FloatArray, velocity: FloatArray, features: FloatArray
+    ) -> PlanarState:
+        return planar_state(position, velocity, *self._residual_model.balance(features))

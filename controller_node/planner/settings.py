@@ -63,8 +63,8 @@ PLANNER_PARAMETERS = [
     Parameter(
         "plan.gives_way",
         True,
-        "the reference's place and heading follow a character that is pushed out of reach, and "
-        "return; without, it is always held to its own place",
+        "the reference's place and heading follow a character that is pushed out of reach or "
+        "stops beside them, and return; without, it is always held to its own place",
     ),
     Parameter("plan.seed", 0, "of the samples", maximum=2**53),
     Parameter("plan.friction", 0.38, "of contacts as foreseen; a margin against slips", maximum=10),

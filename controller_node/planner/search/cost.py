@@ -56,9 +56,9 @@ class ResidualModel:
         first = self._centre
         return features[..., first : first + 3], features[..., first + 3 : first + 6]
 
-    def residuals(self, deviations: FloatArray, *, gives_way: bool) -> FloatArray:
+    def residuals(self, deviations: FloatArray, *, perturbed: bool) -> FloatArray:
         """The residuals of deviations, both (..., f)."""
-        if not gives_way:
+        if not perturbed:
             residuals: FloatArray = deviations * self._weights
             return residuals
         loose = deviations.copy()

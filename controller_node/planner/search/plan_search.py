@@ -37,7 +37,7 @@ class Start:
     desired: Foreseen
     body: RolloutModel
     anchor: Anchor
-    gives_way: bool  # to what the reference cannot absorb
+    perturbed: bool  # the feet go where they catch it
 
 
 class PlanSearch:
@@ -89,7 +89,7 @@ class PlanSearch:
 
     def cost(self, features: FloatArray, wanted: FloatArray) -> float:
         """What features (f,) cost where others are wanted, without giving way."""
-        residuals = self._residual_model.residuals(features - wanted, gives_way=False)
+        residuals = self._residual_model.residuals(features - wanted, perturbed=False)
         return self._settings.checks * float(fixed_order.dot(residuals, residuals))
 
     def cost_ahead(self, start: Start, plan: Plan | None) -> float:
@@ -129,7 +129,7 @@ class PlanSearch:
 
         def residuals(rows: FloatArray) -> FloatArray:
             by_check = rows.reshape(*rows.shape[:-1], checks, -1)
-            weighted = self._residual_model.residuals(by_check, gives_way=start.gives_way)
+            weighted = self._residual_model.residuals(by_check, perturbed=start.perturbed)
             return weighted.reshape(rows.shape)
 
         penalty = _PENALTY * settings.noise

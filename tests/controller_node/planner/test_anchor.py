@@ -1,4 +1,4 @@
-"""The reference's place: it gives way to a character that was pushed, and comes back."""
+"""The reference's place: it gives way to what was pushed or has stopped, and comes back."""
 
 import math
 from dataclasses import replace
@@ -31,6 +31,11 @@ def seen_from(anchor: Anchor, where: complex, heading: float) -> PlanarState:
     return PlanarState(inside, 0j, rotations.about_z(heading - anchor.yaw))
 
 
+def in_world(anchor: Anchor, point: complex) -> complex:
+    """A point of the ground of the reference's world."""
+    return complex(*anchor.to_world(np.array((point.real, point.imag, 0.0)))[:2])
+
+
 def random_state(seed: int) -> tuple[FloatArray, FloatArray]:
     """MuJoCo's position (q,) and velocity (n,)."""
     draw = np.random.default_rng(seed)
@@ -47,7 +52,7 @@ def test_undisturbed_it_stays_where_it_is_to_the_last_bit() -> None:
 
     seen, moving = anchor.to_reference_world(position, velocity)
 
-    assert anchor == Anchor()
+    assert (anchor.place, anchor.yaw) == (0j, 0.0)
     assert seen is position
     assert moving is velocity
 
@@ -91,27 +96,61 @@ def test_pushed_away_it_follows_and_turns() -> None:
     assert 0.3 < max(yaws) < heading
 
 
-def test_where_the_reference_stands_it_comes_to_the_character_and_stays() -> None:
+def test_as_the_reference_comes_to_stand_its_world_follows_for_a_second_and_stays() -> None:
     # Arrange: too near for a push
-    where, heading = 0.2 + 0.1j, 0.3
-    anchor = Anchor()
-    for tick in range(200):
+    where, heading, wanted = 2.2 + 1.1j, 0.3, replace(STANDING, centre=2 + 1j)
+    anchor = Anchor().advanced(WALKING, WALKING, 0.0, PERIOD)
+    before, settled = abs(where - wanted.centre), None
+    for tick in range(1, 100):
         # Act
         state = seen_from(anchor, where, heading)
-        anchor = anchor.advanced(state, STANDING, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(state, wanted, tick * PERIOD, PERIOD)
 
         # Assert
-        assert abs(where - anchor.place) == pytest.approx(
-            abs(where) * (1 - PERIOD / 0.3) ** (tick + 1), abs=1e-9
-        )
-        assert not anchor.gives_way(tick * PERIOD)
-    assert anchor.yaw == pytest.approx(heading, abs=1e-3)
+        assert not anchor.is_perturbed(tick * PERIOD)
+        if tick * PERIOD < 1.0:
+            off = abs(where - in_world(anchor, wanted.centre))
+            assert off == pytest.approx((1.0 - PERIOD / 0.3) * before, abs=1e-9)
+            before, settled = off, anchor
+        assert anchor == settled
+    assert before < 0.01
+    assert anchor.yaw == pytest.approx(heading * (1.0 - (1.0 - PERIOD) ** 19), abs=1e-9)
 
-    # and it returns as soon as the reference walks
-    for tick in range(200, 600):
+    # and it returns once the reference goes on
+    for tick in range(100, 500):
         anchor = anchor.advanced(WALKING, WALKING, tick * PERIOD, PERIOD)
     assert abs(anchor.place) < 0.01
     assert abs(anchor.yaw) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("wanted", "follows"),
+    [
+        (STANDING, True),
+        (replace(STANDING, velocity=0.01j, turn=-0.01), True),
+        (replace(STANDING, velocity=0.03j), False),
+        (replace(STANDING, turn=-0.03), False),  # as one that turns in place
+    ],
+)
+def test_what_moves_is_not_at_rest_whatever_the_character_does(
+    wanted: PlanarState, follows: bool
+) -> None:
+    anchor = Anchor().advanced(WALKING, WALKING, 0.0, PERIOD)
+
+    anchor = anchor.advanced(replace(WALKING, centre=0.1 + 0j, velocity=0.5), wanted, 0.5, PERIOD)
+
+    assert not anchor.is_perturbed(0.5)
+    assert abs(anchor.place) == pytest.approx(0.1 * PERIOD / 0.3 if follows else 0.0)
+
+
+def test_pushed_while_the_reference_stands_it_follows_and_does_not_return() -> None:
+    anchor, where = Anchor(), 0.6j
+    for tick in range(200):
+        state = seen_from(anchor, where, 0.0)
+        anchor = anchor.advanced(state, STANDING, tick * PERIOD, PERIOD)
+
+    assert abs(where - anchor.place) < 0.02
+    assert not anchor.is_perturbed(200 * PERIOD)
 
 
 def test_the_way_back_leads_to_the_clips_own_place_and_heading() -> None:
@@ -135,11 +174,14 @@ def test_a_balance_is_read_off_a_state() -> None:
     position, _ = random_state(5)
     root = rotations.multiply(rotations.about_z(0.4), rotations.ABOUT_X_QUARTER_TURN_XYZW)
     position[3:7] = rotations.wxyz_from_xyzw(root)
+    velocity = np.zeros(HUMANOID.layout.size)
+    velocity[3:6] = 0.1, 0.7, 0.2  # in the root's frame, whose y points upwards
 
-    found = planar_state(position, np.array((3.0, 4.0, 5.0)), np.array((1.0, 2.0, 0.9)))
+    found = planar_state(position, velocity, np.array((1.0, 2.0, 0.9)), np.array((3.0, 4.0, 5.0)))
 
     assert found.centre == 1.0 + 2.0j
     assert found.velocity == 3.0 + 4.0j
+    assert found.turn == pytest.approx(0.7)
     np.testing.assert_array_equal(found.root, root)
 
 
@@ -165,6 +207,6 @@ def test_it_returns_while_it_gives_way_too() -> None:
     for tick in range(100):
         anchor = anchor.advanced(fast, WALKING, tick * PERIOD, PERIOD)
 
-    assert anchor.gives_way(100 * PERIOD)
+    assert anchor.is_perturbed(100 * PERIOD)
     assert abs(anchor.place) < 0.15
     assert abs(anchor.yaw) < 0.1
