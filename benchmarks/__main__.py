@@ -4,7 +4,7 @@ import argparse
 import os
 import sys
 
-from msgs_config.runtime.process import limit_threads
+from msgs_config.runtime.process import limit_threads, middleware_settings
 
 limit_threads()
 
@@ -45,6 +45,7 @@ def main() -> int:
     parser.add_argument("--store", action="store_true", help="store the ratios as those to keep")
     options = parser.parse_args()
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ.update(middleware_settings(os.environ))  # as its nodes: else it may not hear them
     console, ratios = Console(width=_WIDTH), []
     stored = read_ratios()  # before all that takes minutes: it may be malformed
     with own_domain() as domain:
