@@ -186,8 +186,9 @@ class RecorderNode(Node):
             for reader in self._readers
             for published_ns, raw in reader.take(_AT_ONCE)
         ]
-        batch.sort(key=lambda message: message.published_ns)
-        if self._log_time is not None:
+        if self._log_time is None:
+            batch.sort(key=lambda message: message.published_ns)
+        else:
             batch = self._log_time.settle(batch, begun_ns if gives_way else None)
         for message in batch:
             if passed := self._filter.take(message):
