@@ -1,11 +1,16 @@
 """Measures a run from its serialised messages."""
 
+import json
+from contextlib import suppress
+
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 
+from actuated_characters.bags.rebuilding import rebuild
+from actuated_characters.metrics.falls import PostureReader, reader_for
 from actuated_characters.metrics.run_metrics import Measurement, Series
 from actuated_characters.metrics.tick_assembler import TickAssembler
-from msgs_config.errors import RecordingError
+from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
@@ -15,6 +20,7 @@ from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference
 
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
+MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
 REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
 COUNTS = {  # the simulator's in its diagnostics, and the figures' names of them
     "rejected": "rejected_commands",
@@ -23,7 +29,7 @@ COUNTS = {  # the simulator's in its diagnostics, and the figures' names of them
     "rejected_throws": "rejected_throws",
 }
 HEARD = frozenset(
-    {CONFIGURATION, REFERENCE}
+    {CONFIGURATION, MODE, REFERENCE}
     | {topic.name for topic in (topics.JOINT_STATES, topics.JOINT_TORQUES, topics.DIAGNOSTICS)}
 )
 """The topics that the figures are measured from."""
@@ -78,6 +84,8 @@ class MetricsCollector:
             self._early.append((topic, raw, published_ns))
         elif topic == topics.JOINT_TORQUES.name:
             self._first_command_ns = self._first_command_ns or published_ns
+        elif topic == MODE:
+            self._take_mode(decode(raw, String).data)
         elif topic == topics.DIAGNOSTICS.name:
             self._take_counts(decode(raw, DiagnosticArray))
         elif topic in (topics.JOINT_STATES.name, REFERENCE):
@@ -123,11 +131,17 @@ class MetricsCollector:
             self._measurement.change(found.parameters)  # a reset has changed them
             return
         self._configuration = found
-        self._measurement = Measurement(found)
+        self._measurement = Measurement(found, _postures(text))
         self._assembler = TickAssembler(self._measurement, int(found.parameters["rate"]))
         early, self._early = self._early, []
         for message in early:
             self.take(*message)
+
+    def _take_mode(self, text: str) -> None:
+        """Take the mode of a controller; what another maker's means there says nothing here."""
+        with suppress(ValueError, KeyError, TypeError, RecursionError):
+            content = json.loads(text)
+            self._measurement.add_mode(int(content["stamp_ns"]), str(content["mode"]))
 
     def _take_counts(self, message: DiagnosticArray) -> None:
         """Take the simulator's counts; a status that names no session may be of any simulator."""
@@ -138,3 +152,12 @@ class MetricsCollector:
             if status.name == self._simulator and own:
                 known = COUNTS.keys() & values.keys()
                 self._counts |= {COUNTS[name]: int(values[name]) for name in known}
+
+
+def _postures(text: str) -> PostureReader | None:
+    """The reader of the postures of a configuration's character, as far as it can be built."""
+    try:
+        rebuilt = rebuild(text, "")
+        return reader_for(rebuilt.character, rebuilt.world.terrain)
+    except ActuatedCharactersError:  # of another maker's simulator: whether it fell is not known
+        return None

@@ -1,4 +1,4 @@
-"""Error measures of states against their reference, of efforts against limits, and of falls.
+"""Error measures of states against their reference, and of efforts against limits.
 
 Positions are those of a layout, (r, n) of r states and n degrees of freedom; a vector is one of its
 b physical vectors: a hinge, slider or ball joint, the root's translation or its rotation.
@@ -17,8 +17,7 @@ from msgs_config.geometry import fixed_order
 AT_LIMIT = 1.0 - 1e-9
 """Share of its limit from which on an effort is at the limit: it was clipped in its direction."""
 
-_FALL_FRACTION = 0.5  # of the reference's root height
-_LYING_HEIGHT = 0.5  # m; a reference below lies by intention
+_EXACT = 1e-12  # m or rad: more than what conversions of rotations round
 _FARTHEST = 0.6  # m, of the centre of mass from the reference's
 _LOWEST = 0.5  # of the height of the reference's centre of mass
 _BLOCK = 8192  # rows that are worked on together, so that long recordings need no more memory
@@ -92,18 +91,27 @@ def limit_shares(sizes: FloatArray, limits: FloatArray) -> FloatArray:
     return shares
 
 
-def has_fallen(height: FloatArray, desired: FloatArray) -> BoolArray:
-    """Where (t,) a root is below half of its desired height (t,), m; NaN: nothing was desired.
+def follows_state(errors: FloatArray, moved: FloatArray, before: BoolArray) -> BoolArray:
+    """Where (r, b) a reference is made of the state that it should judge.
 
-    A desired height of 0.5 m or less is that of a motion on the ground, where there is no fall.
+    It is the state, though that has moved: nothing that is controlled is exact as it moves. Where
+    the state rests, it is as it was before or is afterwards.
+
+    Args:
+        errors: Distance of each vector from its reference, rad or m; NaN without a reference.
+        moved: Distance of each vector from where it was a tick before, rad or m.
+        before: Whether each vector (b,) followed in the tick before the first.
     """
-    return (desired > _LYING_HEIGHT) & (height < _FALL_FRACTION * desired)
-
-
-def fall_time(times: FloatArray, height: FloatArray, desired: FloatArray) -> float | None:
-    """The first of times (t,) in s at which a root `has_fallen`; None if it never has."""
-    fallen = has_fallen(height, desired)
-    return float(times[int(fallen.argmax())]) if fallen.any() else None
+    exact = errors <= _EXACT
+    follows: BoolArray = exact & (moved > _EXACT)
+    resting = exact & ~follows
+    if resting.any() and (before.any() or follows.any()):
+        rows = range(len(follows))
+        for row in rows:
+            follows[row] |= resting[row] & (follows[row - 1] if row else before)
+        for row in reversed(rows[:-1]):
+            follows[row] |= resting[row] & follows[row + 1]
+    return follows
 
 
 def centre_path(character: Character, positions: FloatArray) -> FloatArray:

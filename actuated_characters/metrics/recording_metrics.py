@@ -7,6 +7,7 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording, Wrenches
 from actuated_characters.metrics.error_measures import AT_LIMIT, distances
+from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.run_metrics import Measurement, Series, Tick
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character
@@ -109,10 +110,13 @@ def measure_recording(recording: Recording) -> tuple[dict[str, object], Series]:
             effort_limits=character.effort_limits(),
             mass=character.mass,
             parameters=dict(recording.parameters),
-        )
+        ),
+        reader_for(character, recording.world.terrain),
     )
     for later in recording.simulator:
         measurement.change(later.parameters)
+    for change in recording.modes:
+        measurement.add_mode(change.stamp_ns, change.mode)
     before: StampedState | None = None
     for row, state in enumerate(_states(recording)):
         measurement.add_state(state)
@@ -122,6 +126,18 @@ def measure_recording(recording: Recording) -> tuple[dict[str, object], Series]:
     wall_ns = int(recording.published_ns[-1] - recording.published_ns[0])
     wall_time = wall_ns / NANOSECONDS_PER_SECOND if recording.has_wall_times else None
     return measurement.summary(wall_time), measurement.series()
+
+
+def fall_time(recording: Recording) -> float | None:
+    """When the character of a recording fell, s since its first state; None if it did not."""
+    time = measure_recording(recording)[0]["fell_at_s"]
+    assert time is None or isinstance(time, float)
+    return time
+
+
+def has_fallen(recording: Recording) -> bool:
+    """Whether the character of a recording fell."""
+    return fall_time(recording) is not None
 
 
 def _states(recording: Recording) -> Iterator[StampedState]:

@@ -11,11 +11,12 @@ from actuated_characters.metrics.error_measures import (
     AT_LIMIT,
     distances,
     effort_sizes,
-    has_fallen,
+    follows_state,
     limit_shares,
     vector_kinds,
 )
-from msgs_config.arrays import FloatArray
+from actuated_characters.metrics.falls import PostureReader, fall_row, is_down, tilts
+from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
@@ -33,6 +34,9 @@ COLUMNS = (
     "reference_root_height_m",
     "assist_force_n",
     "effort_of_limit_max",
+    "centre_height_m",
+    "tilt_rad",
+    "is_down",
 )
 """Of every character's series; those of sliders follow, see `slider_columns`."""
 
@@ -73,8 +77,14 @@ class StateHash:
 class Measurement:
     """Measures a run tick by tick; gives its figures and its series at the end."""
 
-    def __init__(self, configuration: RunConfiguration) -> None:
+    def __init__(
+        self, configuration: RunConfiguration, postures: PostureReader | None = None
+    ) -> None:
+        """Without a reader of postures whether the character fell is not known."""
         self._configuration = configuration
+        self._postures = postures
+        self._modes: list[tuple[int, str]] = []  # since which stamp, ns
+        self._before: FloatArray | None = None  # position in the tick before
         self._has_one_weight = True
         self._layout = layout = configuration.layout
         self._hash = StateHash()
@@ -86,6 +96,7 @@ class Measurement:
         self._ticks = 0
         self._kinds = vector_kinds(layout)
         self._sliders = [joint for joint in layout.joints if joint.type is JointType.PRISMATIC]
+        self._followed = np.zeros(len(self._kinds.units), dtype=np.bool_)  # in the tick before
         self._columns = [*COLUMNS]
         for joint in self._sliders:
             self._columns += slider_columns(joint.name)
@@ -94,6 +105,10 @@ class Measurement:
         """Go on with other parameters of the simulator; two gravities have no one weight."""
         if parameters.get("gravity") != self._configuration.parameters.get("gravity"):
             self._has_one_weight = False
+
+    def add_mode(self, stamp_ns: int, mode: str) -> None:
+        """Add the mode in which the controller is from a stamp on."""
+        self._modes.append((stamp_ns, mode))
 
     def add_state(self, state: StampedState) -> None:
         """Add a state to the hash; each once, in order."""
@@ -142,8 +157,6 @@ class Measurement:
         parameters = self._configuration.parameters
         commanded = layout.mask(parameters.get("commanded_joints", ()))
         of_root = commanded[layout.joints[0].entries] if layout.has_floating_base else np.zeros(0)
-        height, desired = series["root_height_m"], series["reference_root_height_m"]
-        is_known = not np.isnan(desired).all()
         return {
             "ticks": self._ticks,
             "sim_time_s": sim_time,
@@ -152,7 +165,7 @@ class Measurement:
             "actuators": int(commanded.sum()),
             "root_actuators": int(of_root.sum()),
             "degrees_of_freedom": layout.size,
-            "fell": bool(has_fallen(height, desired).any()) if is_known else None,
+            **self._describe_fall(series),
             "joint_error_mean_rad": _of_known(np.mean, series["joint_error_mean_rad"]),
             "slider_error_mean_m": _of_known(np.mean, self._slider_errors(series)),
             "slider_error_max_m": _of_known(np.max, self._slider_errors(series)),
@@ -164,11 +177,46 @@ class Measurement:
             "state_hash": self.state_hash,
         }
 
+    def _describe_fall(self, series: Series) -> dict[str, object]:
+        """Whether and when the character fell, and in which mode of the controller."""
+        fell: dict[str, object] = dict.fromkeys(("fell", "fell_at_s", "fell_in_mode"))
+        if self._postures is None or not self._configuration.parameters.get("gravity", 1.0):
+            return fell
+        rate = float(self._configuration.parameters["rate"])
+        row = fall_row(series["is_down"] == 1.0, np.rint(series["time_s"] * rate), rate)
+        fell["fell"] = row is not None
+        if row is not None:
+            time = float(series["time_s"][row])
+            before = (self._first_stamp or 0) + (time - 1.0 / rate) * NANOSECONDS_PER_SECOND
+            modes = [mode for stamp, mode in self._modes if stamp <= before + 1.0]
+            fell |= {"fell_at_s": time, "fell_in_mode": modes[-1] if modes else None}
+        return fell
+
     def _slider_errors(self, series: Series) -> FloatArray:
         """Distance of each slider from its reference in each tick, m."""
         names = [slider_columns(joint.name) for joint in self._sliders]
         pairs = [series[position] - series[reference] for position, reference, _ in names]
         return np.abs(np.array(pairs))
+
+    def _follows(self, position: FloatArray, errors: FloatArray) -> BoolArray:
+        """Where (r, b) the reference of the next r ticks follows the state."""
+        before = np.vstack([position[:1] if self._before is None else self._before, position[:-1]])
+        self._before = position[-1:]
+        moved = distances(self._layout, before, position)
+        follows = follows_state(errors, moved, self._followed)
+        self._followed = follows[-1]
+        return follows
+
+    def _measure_posture(
+        self, position: FloatArray, desired: FloatArray, columns: Mapping[str, FloatArray]
+    ) -> None:
+        """Measure how high and upright positions (r, n) are, against desired ones or NaN."""
+        if self._postures is None:
+            return
+        body, wanted = self._postures.read(position), self._postures.read(desired)
+        columns["centre_height_m"][:] = body.height
+        columns["tilt_rad"][:] = tilts(body.up, wanted.up)
+        columns["is_down"][:] = is_down(body, wanted, self._postures.standing_height)
 
     def _evaluate(self) -> None:
         """Evaluate the ticks that were collected."""
@@ -186,15 +234,18 @@ class Measurement:
         columns = dict(zip(self._columns, rows.T, strict=True))
         columns["time_s"][:] = stamps / NANOSECONDS_PER_SECOND
         errors = distances(self._layout, position, desired)
+        follows = self._follows(position, errors)
+        errors[follows] = np.nan  # of a reference that is the state, no error is known
         if self._kinds.rotating.any():
-            columns["joint_error_mean_rad"][:] = errors[:, self._kinds.rotating].mean(axis=1)
-            columns["joint_error_max_rad"][:] = errors[:, self._kinds.rotating].max(axis=1)
+            columns["joint_error_mean_rad"][:] = _rows(np.mean, errors[:, self._kinds.rotating])
+            columns["joint_error_max_rad"][:] = _rows(np.max, errors[:, self._kinds.rotating])
         sizes = effort_sizes(self._layout, applied)
         if self._layout.has_floating_base:
             columns["root_error_m"][:] = errors[:, 0]
             columns["root_height_m"][:] = position[:, 2]
             columns["reference_root_height_m"][:] = desired[:, 2]
             columns["assist_force_n"][:] = sizes[:, 0]
+            self._measure_posture(position, np.where(follows[:, :1], np.nan, desired), columns)
         for joint in self._sliders:
             given = (position, desired, applied)
             for name, values in zip(slider_columns(joint.name), given, strict=True):
@@ -204,6 +255,15 @@ class Measurement:
         columns["effort_of_limit_max"][:] = shares.max(axis=1, initial=0.0)
         self._saturated += int((shares >= AT_LIMIT).sum())
         self._rows.append(rows)
+
+
+def _rows(measure: Callable[..., Any], values: FloatArray) -> FloatArray:
+    """Mean or maximum of each row (r, b), NaN left out; NaN of a row without a number."""
+    measured: FloatArray = measure(values, axis=1)
+    for row in np.flatnonzero(np.isnan(measured)).tolist():
+        known = values[row][~np.isnan(values[row])]
+        measured[row] = measure(known) if len(known) else np.nan
+    return measured
 
 
 def _of_known(measure: Callable[[FloatArray], float], values: FloatArray) -> float | None:

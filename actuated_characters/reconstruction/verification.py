@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from actuated_characters.metrics.error_measures import centre_path, joint_errors
+from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.reconstruction.tree import Node
@@ -15,6 +16,7 @@ from msgs_config.errors import SimulationError
 from msgs_config.messages import configuration
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
+from sim_node.simulation_factory import make_settings
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ def verified(problem: Problem, file: Path, best: Node) -> ReconstructionMetrics:
     clock = TickClock(plan.simulator.integer("rate"))
     ends = {node.tick: node for node in best.path}
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
-    measurement = Measurement(known)
+    terrain = make_settings(plan.simulator).world.terrain
+    measurement = Measurement(known, reader_for(plan.character, terrain))
     positions: list[FloatArray] = []
     motions: list[FloatArray] = []
     for count, tick in enumerate(ticks_in_process(plan, problem.planned_pushes(plan)), start=1):

@@ -13,13 +13,22 @@ from actuated_characters.runs.run_directory import PLOT, read_metrics
 from actuated_characters.whole_files import write_whole
 from msgs_config.arrays import FloatArray
 
+_OF_ROOT = ("root_error_mean_m", "root_error_max_m")
 NOMINAL = 1e-3
 """Share of a limit below which an effort is nowhere near it, as if there were none."""
 
 
 def describe_metrics(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Name and value of each figure that could be measured, as a table shows them."""
-    known = {name: _shown(value) for name, value in summary.items() if value is not None}
+    """Name and value of each figure, as a table shows them; `-` is one that has no meaning here.
+
+    Left out are those of a kind of joint, and of a time, that there is not.
+    """
+    always = ("fell",) if summary["fell"] is None else ("fell", *_OF_ROOT)
+    known = {
+        name: _shown(value)
+        for name, value in summary.items()
+        if value is not None or name in always
+    }
     of_root = known.pop("root_actuators", "0")
     if of_root != "0":
         known["actuators"] += f", {of_root} of them the root's assistance"
@@ -29,6 +38,8 @@ def describe_metrics(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _shown(value: object) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{name}: {part}" for name, part in value.items()) or "none"
+    if value is None:
+        return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 

@@ -96,7 +96,7 @@ class CharacterReport:
 
     def _result(self) -> Section:
         pictures, remarks = self._strip()
-        sentence = describe_end(self._recording, self._facts, self._metrics)
+        sentence = describe_end(float(self._recording.times[-1]), self._facts, self._metrics)
         return Section("", pictures, remarks=remarks, verdict=sentence, tiles=tiles(self._metrics))
 
     def _strip(self) -> tuple[list[Illustration], list[str]]:

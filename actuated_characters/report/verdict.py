@@ -2,10 +2,9 @@
 
 from collections.abc import Mapping
 
-from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.error_measures import fall_time
 from actuated_characters.report.facts import RunFacts
 
+_LIMP = "LIMP"  # the mode in which nothing drives the character
 _TILES = (
     ("mean joint error", "joint_error_mean_rad", "rad"),
     ("mean slider error", "slider_error_mean_m", "m"),
@@ -14,18 +13,20 @@ _TILES = (
 )
 
 
-def describe_end(recording: Recording, facts: RunFacts, metrics: Mapping[str, object]) -> str:
-    """A sentence on how a run ended."""
-    length = f"{recording.times[-1]:.4g} s"
-    if not facts.reference:
-        verdict = f"A run of {length} without a reference"
-    elif metrics["fell"]:
-        height, desired = recording.position[:, 2], recording.reference_position[:, 2]
-        verdict = f"It fell at {fall_time(recording.times, height, desired):.3g} s of {length}"
-    elif metrics["fell"] is not None:
-        verdict = f"It tracked its reference for {length} without a fall"
+def describe_end(length_s: float, facts: RunFacts, metrics: Mapping[str, object]) -> str:
+    """A sentence on how a run of a length in s ended, by its metrics; see `falls`."""
+    length, fell_at = f"{length_s:.4g} s", metrics["fell_at_s"]
+    stood = "" if metrics["fell"] is None else " without a fall"
+    if isinstance(fell_at, float):
+        verdict = f"It fell at {fell_at:.3g} s of {length}"
+        if metrics["fell_in_mode"] == _LIMP:
+            verdict += ", limp, as its behaviour wants it"
+    elif not facts.reference:
+        verdict = f"A run of {length} without a reference" + (stood and "," + stood)
+    elif metrics["fell"] is not None and metrics["root_error_mean_m"] is None:
+        verdict = f"It went on for {length}{stood}; its reference's root is where it was itself"
     else:
-        verdict = f"It tracked its reference for {length}"
+        verdict = f"It tracked its reference for {length}{stood}"
     return verdict + (f" (control law {facts.law})." if facts.law else ".")
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.runs.in_process import Watch, ticks_in_process
 from actuated_characters.runs.plan import RunPlan
@@ -22,9 +23,11 @@ from actuated_characters.runs.run_directory import (
     write_metrics,
     write_parameters,
 )
+from controller_node.parameters import make_controller
 from msgs_config.errors import RunError
 from msgs_config.messages import configuration
 from msgs_config.messages.session import SESSION, make_session
+from sim_node.simulation_factory import make_settings
 
 _START_TIMEOUT = 120.0  # s until the first answer, on a machine that may be busy with other things
 _VIEWER_TIMEOUT = 30.0  # s until its page is there
@@ -252,10 +255,16 @@ def run_in_process(
     write_parameters(directory, "sim_node", plan.simulator)
     write_parameters(directory, "controller_node", plan.controller)
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
-    measurement = Measurement(known)
+    terrain = make_settings(plan.simulator).world.terrain
+    measurement = Measurement(known, reader_for(plan.character, terrain))
+    controller = make_controller(plan.character, plan.reference, plan.controller)
+    mode = None
     started = time.perf_counter()
-    ticks = ticks_in_process(plan, pushes, throws, watch=watch)
+    ticks = ticks_in_process(plan, pushes, throws, controller, watch)
     for count, tick in enumerate(ticks, start=1):
+        if controller.mode is not None and controller.mode is not mode:
+            mode = controller.mode
+            measurement.add_mode(mode.stamp_ns, mode.phase.mode.value)
         measurement.add(tick)
         if count % _IN_PROCESS_REPORT == 0:
             progress(count)

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics.recording_metrics import fall_time
 from actuated_characters.render.stills import strip
 from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (
-    fall_time,
     joint_errors,
     root_force_share,
 )

@@ -78,17 +78,10 @@ def _track(runner: StudyRunner, clip: str) -> RunResult:
 
 
 def _row(character: Character, clip: str, outcome: RunResult) -> Row:
-    """A row of the table.
-
-    A fall: below half of the height, or unexpected links on the ground.
-    """
-    recording, feet = outcome.recording, set(character.feet)
+    """A row of the table."""
+    recording = outcome.recording
     errors = joint_errors(recording)
-    parents = {link.name: character.links[link.parent].name for link in character.links[1:]}
-    # a shin reaches down to its ankle, and to the ground where the foot turns over
-    legs = feet | {parents[foot] for foot in feet}
-    captured = _is_down(character, recording.reference_position[:-1:_EACH], feet)
-    down = _is_down(character, recording.position[::_EACH], legs) and not captured
+    feet, captured = set(character.feet), recording.reference_position[:-1:_EACH]
     return {
         "clip": clip,
         "loops": read_clip(character, clip).wraps,
@@ -97,8 +90,8 @@ def _row(character: Character, clip: str, outcome: RunResult) -> Row:
         "largest joint error (rad)": float(errors.max()),
         "mean root error (m)": outcome.measured("root_error_mean_m"),
         "root force / weight": root_force_share(recording),
-        "fell": bool(outcome.summary["fell"] or down or outcome.diverged),
-        "down in the capture": captured,
+        "fell": bool(outcome.summary["fell"] or outcome.diverged),
+        "down in the capture": _is_down(character, captured, feet),
         "share saturated": outcome.measured("saturated_fraction"),
         "real-time factor": outcome.measured("real_time_factor"),
     }

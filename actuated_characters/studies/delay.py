@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from actuated_characters.metrics.recording_metrics import fall_time
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (
     delayed_spectral_radius,
-    fall_time,
     joint_errors,
 )
 from controller_node.parameters import make_settings

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+import numpy as np
+
+from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.messages.throw import ProjectileThrow
@@ -15,6 +18,8 @@ from sim_node.physics.projectiles import Projectiles
 from sim_node.physics.touches import Touch, TouchedLinks
 
 _STATE_FILE = "state.bullet"  # the engine writes to files alone
+_RAYS = 10_000  # of one call; the engine takes 16,383
+_DEEPEST = 1000.0  # m below a point that is looked for a surface
 
 
 @dataclass(frozen=True)
@@ -118,6 +123,18 @@ class World:
             touched[body].append(Touch(link, (x, y, z), at))
             touched[body_b].append(Touch(link_b, (-x, -y, -z), at_b))
         return touched
+
+    def heights_below(self, points: FloatArray) -> FloatArray:
+        """Height z (r,) in m of the highest surface below each point (r, 3); 0 without one."""
+        heights = np.zeros(len(points))
+        for first in range(0, len(points), _RAYS):
+            rows = points[first : first + _RAYS]
+            ends = rows - (0.0, 0.0, _DEEPEST)
+            hits = pybullet.rayTestBatch(rows.tolist(), ends.tolist(), physicsClientId=self._client)
+            for row, (body, _, _, place, _) in enumerate(hits, start=first):
+                if body >= 0:
+                    heights[row] = place[2]
+        return heights
 
     def to_bytes(self) -> bytes:
         """The whole state, for any world of equal settings, characters and balls."""

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from actuated_characters.bags.recording import ModeChange, Recording
+from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.run_metrics import Measurement, Tick
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_throws import plan_throws
@@ -157,7 +158,9 @@ class _Run:
         """The figures of summary.json, as far as they are measured."""
         plan = self._plan
         known = configuration.parse(configuration.describe(plan.character, plan.simulator))
-        measurement = Measurement(known)
+        measurement = Measurement(known, reader_for(plan.character))
+        for each in self._modes:
+            measurement.add_mode(each.stamp_ns, each.phase.mode.value)
         for state in self._states:
             measurement.add_state(state)
         for row, state in enumerate(self._states[1:]):

@@ -6,6 +6,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.metrics.recording_metrics import has_fallen
 from actuated_characters.report.reactions import mode_spans
 from actuated_characters.studies.athletics.drawing import (
     draw_courses,
@@ -16,7 +17,6 @@ from actuated_characters.studies.athletics.drawing import (
 from actuated_characters.studies.athletics.measures import (
     Course,
     commanded,
-    has_fallen,
     longest_flight,
     taken,
 )

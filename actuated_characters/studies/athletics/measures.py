@@ -11,7 +11,6 @@ from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.geometry import rotations
 
 FEET = ("right_ankle", "left_ankle")
-_LOWEST = 0.55  # m: a root below it has fallen
 _WINDOW = 0.5  # s, over which speed and heading are averaged: more than a step
 
 
@@ -72,8 +71,3 @@ def longest_flight(recording: Recording) -> tuple[float, float]:
     times = recording.times
     spans = [(float(times[a]), float(times[b] - times[a])) for a, b in edges.reshape(-1, 2)]
     return max(spans, key=lambda span: span[1], default=(0.0, 0.0))
-
-
-def has_fallen(recording: Recording) -> bool:
-    """Whether the root was ever low."""
-    return bool(recording.position[:, 2].min() < _LOWEST)

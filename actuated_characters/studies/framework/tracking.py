@@ -82,15 +82,6 @@ def inertialess_response(
     return angle
 
 
-def fall_time(run: Recording) -> float | None:
-    """Time in s at which the root first is below half of its desired height; None if never.
-
-    A reference below 0.5 m lies by intention, which is no fall.
-    """
-    height, desired = run.position[:-1, 2], run.reference_position[:-1, 2]
-    return error_measures.fall_time(run.times[:-1], height, desired)
-
-
 def delayed_spectral_radius(
     mass_matrix: FloatArray,
     stiffness: FloatArray,

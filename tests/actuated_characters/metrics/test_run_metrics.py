@@ -65,6 +65,8 @@ def efforts(
 
 
 NONE = efforts()
+CHEST = (0.0, 0.6, 0.8)
+EXACT = 1e-9  # rad: exact but for what a controlled joint is off as it moves
 
 
 def state(tick: int, position: FloatArray, effort: FloatArray | None = NONE) -> StampedState:
@@ -119,7 +121,7 @@ def test_errors_are_means_over_joints_and_ticks_of_angles_and_distances() -> Non
         [
             # a hinge that turns knows its turns; the root's turn is none of a joint
             (entries(knee=4.0, turn=(0.0, 0.0, 1.0)), entries(knee=-2.0), NONE),
-            (entries(root=(3.0, 4.0, 1.0), slider=7.0), entries(chest=(0.0, 0.6, 0.8)), NONE),
+            (entries(root=(3.0, 4.0, 1.0), slider=7.0), entries(chest=CHEST, knee=EXACT), NONE),
             (entries(root=(0.0, 0.0, 2.0), knee=-0.5), entries(knee=0.3, slider=2.0), NONE),
         ]
     )
@@ -143,7 +145,6 @@ def test_ticks_without_a_reference_have_no_error_but_count() -> None:
     assert metrics["ticks"] == 3
     assert metrics["joint_error_mean_rad"] == pytest.approx(0.25)
     assert metrics["root_error_mean_m"] == 0.0
-    assert metrics["fell"] is False
     assert metrics["saturated_fraction"] == pytest.approx(1.0 / 9.0)
 
 
@@ -203,28 +204,7 @@ def test_actuators_are_the_commanded_degrees_of_freedom(
     assert metrics["degrees_of_freedom"] == 11
 
 
-# The fall
-
-
-@pytest.mark.parametrize(
-    ("height", "desired", "fell"),
-    [
-        (0.44, 0.9, True),
-        (0.46, 0.9, False),
-        (0.45, 0.9, False),  # half is not below half
-        (-1.0, 0.9, True),
-        (0.1, 0.5, False),  # a reference at 0.5 m or below lies by intention
-        (0.2, 0.51, True),
-        (0.0, 0.3, False),
-    ],
-)
-def test_it_fell_if_the_root_is_below_half_of_a_reference_that_stands(
-    height: float, desired: float, fell: bool
-) -> None:
-    upright = (entries(), entries(), NONE)
-    now = (entries(root=(0.0, 0.0, height)), entries(root=(0.0, 0.0, desired)), NONE)
-
-    assert measured([upright, now, upright])["fell"] is fell
+# A motion that is lost
 
 
 @pytest.mark.parametrize(

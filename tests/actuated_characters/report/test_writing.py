@@ -17,6 +17,7 @@ from std_msgs.msg import String
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
+from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.recording_metrics import contact_series, measure_recording
 from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.report.decimation import decimated, span_maxima, span_means
@@ -135,16 +136,16 @@ def test_the_page_begins_with_picture_verdict_and_errors_and_ends_with_the_topic
 
 
 def test_a_fall_is_in_the_verdict(tmp_path: Path) -> None:
-    made = make_run("humanoid", 0.1, WALK)
+    made = make_run("humanoid", 0.4, WALK)
     fallen = made.ticks[12].state.position.copy()
-    fallen[2] = 0.4
-    states = [replace(s, position=fallen) if n == 12 else s for n, s in enumerate(made.states)]
+    fallen[2] = 0.3
+    states = [replace(s, position=fallen) if n >= 12 else s for n, s in enumerate(made.states)]
     references = [tick.reference for tick in made.ticks if tick.reference is not None]
     messages = [*raw_states(made.plan, states), *raw_references(made.plan, references)]
 
     page = write_report(write_bag(tmp_path / "bag", [raw_configuration(made.plan), *messages]))
 
-    assert "It fell at 0.05 s of 0.1 s." in page.read_text(encoding="utf-8")
+    assert "It fell at 0.05 s of 0.4 s." in page.read_text(encoding="utf-8")
 
 
 def test_the_table_of_errors_is_that_of_the_messages(page: Page, walk: Eventful) -> None:
@@ -199,7 +200,7 @@ def test_the_figures_are_those_of_the_run(tmp_path: Path) -> None:
     made = make_run("humanoid", 0.1, WALK)
     recording = read_recording(write_bag(tmp_path / "bag", made.messages()))
     known = configuration.parse(configuration.describe(made.plan.character, made.plan.simulator))
-    measurement = Measurement(known)
+    measurement = Measurement(known, reader_for(made.plan.character))
     for tick in made.ticks:
         measurement.add(tick)
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from actuated_characters.metrics.recording_metrics import has_fallen
 from actuated_characters.studies.athletics import _case
 from actuated_characters.studies.athletics.measures import (
     commanded,
-    has_fallen,
     loaded,
     longest_flight,
     taken,

@@ -14,7 +14,6 @@ from actuated_characters.studies.framework.result import StudyResult
 from actuated_characters.studies.framework.study import RunResult, RunSpec
 from actuated_characters.studies.framework.tracking import (
     delayed_spectral_radius,
-    fall_time,
     inertialess_response,
     joint_errors,
     lag,
@@ -115,19 +114,6 @@ def test_a_joint_without_inertia_lags_as_a_first_order_filter(
     desired = 1.0 + 1j * speed * time_constant * follows
     late = (np.angle(filtered) - np.angle(desired)) / speed
     assert measured == pytest.approx(late, abs=1e-4)  # s; samples are 4 ms apart
-
-
-def test_a_fall_is_below_half_of_a_reference_that_stands(few_ticks: Recording) -> None:
-    def falls(height: list[float], desired: float) -> float | None:
-        position, reference = few_ticks.position.copy(), few_ticks.position.copy()
-        position[:, 2], reference[:, 2] = height, desired
-        return fall_time(replace(few_ticks, position=position, reference_position=reference))
-
-    height = [0.9, 0.5, 0.44, 0.1, 0.9, 0.9]
-
-    assert falls(height, desired=0.9) == few_ticks.times[2]
-    assert falls(height, desired=0.4) is None
-    assert falls([0.9] * 6, desired=0.9) is None
 
 
 @pytest.mark.parametrize("delay_ticks", [1, 2, 3, 4])
@@ -262,7 +248,7 @@ def test_delay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_assistance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(assistance, "_DURATION", 1.1)
+    monkeypatch.setattr(assistance, "_DURATION", 1.5)
     monkeypatch.setattr(assistance, "_STRENGTHS", (1.0, 0.01, 0.0))
     monkeypatch.setattr(assistance, "_PICTURES", 1)
     runner = InProcessRunner(tmp_path)
@@ -272,7 +258,7 @@ def test_assistance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     table = by_key(result, 1)
     falls, force = "falls at (s)", "root force / weight until then"
     assert table["x 1",][falls] is None
-    assert 0.5 < table["none",][falls] <= table["x 0.01",][falls] < 1.1
+    assert 0.5 < table["none",][falls] <= table["x 0.01",][falls] < 1.2
     assert table["x 1",][force] > table["x 0.01",][force] > 0.0
     assert table["none",][force] == 0.0
     # a root that is commanded, by nothing, and one that may not be
