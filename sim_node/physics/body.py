@@ -53,6 +53,7 @@ class Body:
         self._base_is_inertial = poses[0] == Pose()
         self._base_turn_back: list[float] = self._turns_back[0].tolist()
         self._base_read: BaseFrame | None = None  # since the engine's last step
+        self._base_centre: frames.Triple | None = None  # as the engine has it, and as long as that
         self._find_joints(character)
         set_link_dynamics(client, self._body, friction)
         pairs = zip(self._joints, self._axes, strict=True)
@@ -128,7 +129,7 @@ class Body:
 
     def forget_reading(self) -> None:
         """Forget what was read last: the engine's state is set to another one."""
-        self._base_read = None
+        self._base_read = self._base_centre = None
 
     def apply(self, effort: FloatArray) -> None:
         """Apply a generalised effort (n,) during the engine's next step, and only then."""
@@ -145,7 +146,10 @@ class Body:
         )
         if self._floating and any(values[:6]):
             self._apply_to_base(values[:3], values[3:6])
+        self._centre_at_step = self._base_centre or self._base_pose()[0]
         self._base_read = None  # the engine's next step moves it
+        if self._floating:
+            self._base_centre = None
 
     def _apply_to_base(self, force: Sequence[float], torque_in_base: Sequence[float]) -> None:
         """Apply a force (N, world) at the base link's origin, and a torque (N m, base frame)."""
@@ -173,6 +177,20 @@ class Body:
     def centres(self) -> list[Sequence[float]]:
         """Centres of mass (links, 3) in the world, m; plain numbers, of which few are used."""
         return [state[0] for state in self._link_states()]
+
+    def centres_at_step(self) -> list[Sequence[float]]:
+        """Centres of mass (links, 3) in the world when the engine's last step began, m.
+
+        To be asked for before `link_frames` and `centres`: the engine keeps those of its moving
+        links from where its step begins until it is asked where they are now.
+        """
+        moving = self._numbers[1:]
+        if not moving:
+            return [self._centre_at_step]
+        states = pybullet.getLinkStates(
+            self._body, moving, 0, computeForwardKinematics=0, physicsClientId=self._client
+        )
+        return [self._centre_at_step, *(state[0] for state in states)]
 
     def kinetic_energy(self) -> float:
         """Kinetic energy of all links, J, by the engine's own masses, inertia and velocities."""
@@ -238,15 +256,20 @@ class Body:
         return (base, *states)
 
     def _base_frame(self) -> BaseFrame:
-        com, inertial_turn = pybullet.getBasePositionAndOrientation(
-            self._body, physicsClientId=self._client
-        )
+        com, inertial_turn = self._base_pose()
         if self._base_is_inertial and all(com) and all(inertial_turn):
             return com, inertial_turn, frames.axes(inertial_turn)
         turn = frames.product(inertial_turn, self._base_turn_back)
         axes = frames.axes(turn)
         x, y, z = frames.to_parent(axes, self._base_offset)
         return (com[0] - x, com[1] - y, com[2] - z), turn, axes
+
+    def _base_pose(self) -> tuple[frames.Triple, frames.Quaternion]:
+        """Centre of mass in m and orientation xyzw of the base's inertial frame in the world."""
+        pose: tuple[frames.Triple, frames.Quaternion]
+        pose = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
+        self._base_centre = pose[0]
+        return pose
 
     def _read_base(self) -> tuple[frames.Triple, tuple[float, ...], frames.Quaternion]:
         """Origin, velocity (6,) and orientation xyzw of the floating base, message form."""

@@ -1,7 +1,7 @@
 """One character's part in a simulation: efforts and wrenches in, its state and contacts out."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +64,6 @@ class SimulatedCharacter:
 
     state: StampedState
     before: StampedState | None  # the state a tick earlier; None in an episode's first one
-    contacts: Contacts | None  # over the last tick; None if contacts were not watched
     pushes: tuple[ExternalWrench, ...]  # that acted during the last tick
     balls: Projectiles  # of the world that it is in
 
@@ -108,7 +107,8 @@ class SimulatedCharacter:
         self._delayed = deque([np.zeros(self.layout.size)] * self._delay_ticks)
         self._body, self.balls = body, balls
         body.set_state(self._position, self._velocity)
-        self.contacts = self._no_contacts
+        self._contacts: Contacts | None = self._no_contacts
+        self._touched: Callable[[], TouchedLinks] | None = None
         self.pushes = ()
         self.before = None
         self._read(stamp_ns, effort=None)
@@ -123,7 +123,8 @@ class SimulatedCharacter:
         if self._applied is not wanted:
             self.saturated_ticks += self.layout.norms(wanted) > self._limits.values
         self.pushes = tuple(pushes)
-        self.contacts = self._no_contacts if watches_contacts else None
+        self._contacts = self._no_contacts if watches_contacts else None
+        self._touched = None
 
     def begin_substep(self, first: bool) -> None:
         """Apply all forces again for one engine step."""
@@ -134,19 +135,37 @@ class SimulatedCharacter:
         self._body.apply(total)
         if self.pushes:
             self._body.push((push.link, push.wrench, push.point) for push in self.pushes)
-        if self.contacts is not None:
-            self._centres = self._body.centres()
 
-    def add_contacts(self, touched: TouchedLinks, share: float) -> None:
-        """Add the contacts of the last engine step, which is a share of the tick."""
-        assert self.contacts is not None
-        wrenches, touching = self._body.contact_wrenches(touched, self._centres)
-        if share == 1.0:  # mostly
-            self.contacts = Contacts(wrenches, touching)
+    def add_contacts(self, touched: Callable[[], TouchedLinks], share: float) -> None:
+        """Add the contacts of the last engine step, which is a share of the tick.
+
+        Where it is the whole tick, they are left to be found when somebody asks for them: the
+        engine has them until its next step. `touched` is what it has.
+        """
+        if share == 1.0:
+            self._touched = touched
             return
-        self.contacts = Contacts(
-            self.contacts.wrenches + share * wrenches, self.contacts.touching | touching
+        wrenches, touching = self._step_contacts(touched)
+        assert self._contacts is not None
+        self._contacts = Contacts(
+            self._contacts.wrenches + share * wrenches, self._contacts.touching | touching
         )
+
+    @property
+    def contacts(self) -> Contacts | None:
+        """What touched its links over the last tick; None if contacts were not watched."""
+        self.find_contacts()
+        return self._contacts
+
+    def find_contacts(self) -> None:
+        """Find the last tick's contacts, unless it was done, before the engine forgets them."""
+        if self._touched is not None:
+            touched, self._touched = self._touched, None
+            self._contacts = Contacts(*self._step_contacts(touched))
+
+    def _step_contacts(self, touched: Callable[[], TouchedLinks]) -> tuple[FloatArray, BoolArray]:
+        """Net wrenches (links, 6) of the last engine step, and which links (links,) touched."""
+        return self._body.contact_wrenches(touched(), self._body.centres_at_step())
 
     def end_tick(self, stamp_ns: int) -> None:
         """Read the state that the tick has led to."""
@@ -168,7 +187,8 @@ class SimulatedCharacter:
     def restore(self, snapshot: CharacterSnapshot) -> None:
         """Restore a snapshot; the engine's state is restored by the simulation."""
         self.state, self.before = snapshot.state, snapshot.before
-        self.contacts, self.pushes = snapshot.contacts, snapshot.pushes
+        self._contacts, self._touched = snapshot.contacts, None
+        self.pushes = snapshot.pushes
         self._delayed = deque(snapshot.delayed)
         self.saturated_ticks = snapshot.saturated_ticks.copy()
         self._position, self._velocity = snapshot.start
@@ -176,6 +196,7 @@ class SimulatedCharacter:
 
     def link_frames(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""
+        self.find_contacts()  # which need the links where they were before
         return self._body.link_frames()
 
     def base_frame(self) -> tuple[FloatArray, FloatArray]:

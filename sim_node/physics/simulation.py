@@ -77,7 +77,8 @@ class Simulation:
         )
         self.tick = first_tick
         self.episode = 1
-        self.watches_contacts = False  # finding out what touches takes time
+        # Finding out what touches takes time: with substeps in each of them, else if it is read.
+        self.watches_contacts = False
         self.throws: tuple[ProjectileThrow, ...] = ()  # at the beginning of the last tick
         self._thrown_at: tuple[int, ...] = ()
         self._world = self._fresh_world()
@@ -89,7 +90,9 @@ class Simulation:
         self.close()
 
     def close(self) -> None:
-        """End the engine."""
+        """End the engine; what the last tick has led to can be read after that."""
+        for character in self.characters:
+            character.find_contacts()
         self._world.close()
 
     @property
@@ -130,9 +133,8 @@ class Simulation:
                 character.begin_substep(first=substep == 0)
             self._world.step()
             if self.watches_contacts:
-                touched = self._world.touched_links()
                 for character in self.characters:
-                    character.add_contacts(touched, share=1.0 / substeps)
+                    character.add_contacts(self._world.touched_links, share=1.0 / substeps)
         self.tick += 1
         for character in self.characters:
             character.end_tick(self.stamp_ns)

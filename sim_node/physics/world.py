@@ -74,6 +74,7 @@ class World:
         if settings.terrain is not None:
             self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
         self.balls = Projectiles(self._client, settings.link_friction)
+        self._touched: TouchedLinks | None = None  # not asked for since the last step
 
     def __enter__(self) -> "World":
         return self
@@ -101,6 +102,7 @@ class World:
                 contactBreakingThreshold=self._own_breaking_threshold,
                 physicsClientId=self._client,
             )
+        self._touched = None
         pybullet.stepSimulation(physicsClientId=self._client)
 
     def touched_links(self) -> TouchedLinks:
@@ -108,8 +110,13 @@ class World:
 
         Points are where the surfaces were when the step began: the engine looks for contacts first,
         and moves last. On each body it is that body's own surface; the two are apart by the depth
-        at which the bodies are in each other.
+        at which the bodies are in each other. The engine has them until its next step.
         """
+        if self._touched is None:
+            self._touched = self._find_touched()
+        return self._touched
+
+    def _find_touched(self) -> TouchedLinks:
         touched = defaultdict[int, list[Touch]](list)
         # of all bodies: asked for those of one, the engine lets it come first in each, and then
         # turns the normal round but not the friction
@@ -145,6 +152,7 @@ class World:
 
     def from_bytes(self, state: bytes, throws: Sequence[ProjectileThrow] = ()) -> None:
         """Restore a state of `to_bytes`, exactly, in which there were the balls of `throws`."""
+        self._touched = None
         self.balls.replace(throws)
         with tempfile.TemporaryDirectory() as directory:
             file = Path(directory) / _STATE_FILE
