@@ -20,7 +20,7 @@ endif
 # and for each worker of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help venv demo backflip play test quick docs hashes pages other-numpy bench soak kills noise long-recording robots format clean distclean
+.PHONY: help venv demo backflip play test quick docs hashes pages other-numpy bench soak kills noise long-recording documented robots format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -81,6 +81,9 @@ noise: .venv/.installed ## Run among 20,000 mutated messages on each topic; same
 
 long-recording: .venv/.installed ## Record 5 minutes at 1 kHz; no message lost
 	$(BIN)/python -m tests.endurance.long_recording
+
+documented: .venv/.installed-test ## Run every documented command (an hour), and write docs/documented.md
+	$(BIN)/python -m tests.documented
 
 robots: .venv/.installed-test ## Try the URDF files of six packages (850 MB), and compare them with Pinocchio
 	$(BIN)/python -m pip install -qq -e '.[robots]'

@@ -60,7 +60,12 @@ def add_fork(commands: "Commands[argparse.ArgumentParser]") -> None:
     fork.add_argument(
         "--duration", type=float, metavar="S", help="length from the first state on, s (the run's)"
     )
-    fork.add_argument("--output", type=Path, metavar="DIR", help="where the results go (RUN-fork)")
+    fork.add_argument(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="where the results go (RUN-fork, with a number if it exists)",
+    )
     fork.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
     fork.add_argument(
         "--composed", action="store_true", help="simulator and controller in one process"
@@ -71,7 +76,13 @@ def _fork(options: argparse.Namespace) -> None:
     from actuated_characters.fork.execution import describe_new_hits, run_fork
     from actuated_characters.fork.plan import ForkInputs, plan_fork
     from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
-    from actuated_characters.runs.run_directory import BAG, PLOT, prepare_directory, read_metrics
+    from actuated_characters.runs.run_directory import (
+        BAG,
+        PLOT,
+        prepare_directory,
+        prepare_free_directory,
+        read_metrics,
+    )
     from msgs_config.errors import ConfigurationError
 
     run = options.bag.absolute()
@@ -82,7 +93,10 @@ def _fork(options: argparse.Namespace) -> None:
     settings = node_settings(options.set, NODES)
     inputs = ForkInputs(settings, options.push, options.throw, not options.no_later_inputs)
     planned = plan_fork(options.bag, options.at, inputs, options.duration)
-    prepare_directory(directory, overwrite=options.overwrite)
+    if options.output is None and not options.overwrite:
+        directory = prepare_free_directory(directory)
+    else:
+        prepare_directory(directory, overwrite=options.overwrite)
     for warning in planned.warnings:
         print(warning)
     last = planned.plan.ticks

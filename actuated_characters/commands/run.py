@@ -72,7 +72,10 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         help=f"simulated time in s ({_DURATION:g}, or that of a reconstruction)",
     )
     run.add_argument(
-        "--output", type=Path, metavar="DIR", help="where the results go (runs/CHARACTER-MOTION)"
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="where the results go (runs/CHARACTER-MOTION, with a number if it exists)",
     )
     run.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
     add_recorded(run)
@@ -94,13 +97,21 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 def _run(options: argparse.Namespace) -> None:
     from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
-    from actuated_characters.runs.run_directory import PLOT, prepare_directory, read_metrics
+    from actuated_characters.runs.run_directory import (
+        PLOT,
+        prepare_directory,
+        prepare_free_directory,
+        read_metrics,
+    )
 
     run = planned_run(options)
     plan, motion = run.plan, _motion_name(run.plan)
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
-    prepare_directory(directory, overwrite=options.overwrite)
+    if options.output is None and not options.overwrite:
+        directory = prepare_free_directory(directory)
+    else:
+        prepare_directory(directory, overwrite=options.overwrite)
     for warning in run.warnings:
         print(warning)
     if run.pushes and not options.push:

@@ -18,6 +18,7 @@ DAMAGED = BAG + ".damaged"  # what `recover` leaves beside the bag that it makes
 SUMMARY, SERIES, PLOT = "summary.json", "measurements.csv", "plot.png"
 STRIP, VIDEO = "strip.png", "video.mp4"  # what `render` makes of the bag
 REPORT = "report"  # what `report` does
+_MOST_NUMBERED = 10_000  # directories of one name
 
 
 def prepare_directory(directory: Path, *, overwrite: bool, characters: Sequence[str] = ()) -> None:
@@ -43,6 +44,20 @@ def prepare_directory(directory: Path, *, overwrite: bool, characters: Sequence[
         (directory / LOGS).mkdir()
     except OSError as error:
         raise RunError(f"cannot write to {directory}: {error.strerror or error}") from error
+
+
+def prepare_free_directory(directory: Path) -> Path:
+    """Make a directory ready whose name nobody gave: with a number, where it has results already.
+
+    Raises:
+        RunError: it cannot be written to.
+    """
+    for number in range(1, _MOST_NUMBERED):
+        free = directory if number == 1 else directory.with_name(f"{directory.name}-{number}")
+        if not free.exists() or not any(free.iterdir()):
+            break
+    prepare_directory(free, overwrite=False)
+    return free
 
 
 def metrics_directory(run: Path, namespace: str, *, is_alone: bool) -> Path:

@@ -10,7 +10,7 @@ from rich.console import Console
 from actuated_characters.commands.common.tables import make_table
 
 _PROGRAM = "actuated_characters"
-_COMMANDS = {
+OVERVIEW = {
     "play": "a humanoid that walks in the browser, to be pushed; needs the extra 'view'",
     "play --scene brawl": "another scene",
     "play --scene drive": "a humanoid that the arrow keys steer; needs 'view' and 'plan'",
@@ -35,7 +35,7 @@ def print_overview(options: argparse.Namespace) -> None:
         print(f"  {name}: {load_scene(name).title}")
     typed = sys.argv[0]
     program = typed if Path(typed).name == _PROGRAM else _PROGRAM
-    for words, about in _COMMANDS.items():
+    for words, about in OVERVIEW.items():
         print(f"\n# {about}\n{program} {words}")
 
 

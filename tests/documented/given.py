@@ -1,0 +1,90 @@
+"""Makes what a reader of the pages has already: captures, clips, and the pages' own code."""
+
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.documented.collecting import ROOT
+from tests.support.capture_makers import MAKERS as CAPTURE_MAKERS
+from tests.support.captures import capture
+
+_PROGRAM = ROOT / ".venv/bin/actuated_characters"
+
+
+def make(name: str, place: Path) -> None:
+    """Make a file or a folder of a name in a place; raises KeyError where nobody knows how."""
+    MAKERS[name](place / name)
+
+
+def _capture(path: Path) -> None:
+    capture(path, CAPTURE_MAKERS["mixamo"])
+
+
+def _captures(path: Path) -> None:
+    path.mkdir()
+    for clip in ("walk", "run"):
+        capture(path / f"{clip}.bvh", CAPTURE_MAKERS["mixamo"], clip)
+
+
+def _long_clip(path: Path) -> None:
+    """A clip of 6 s of walking, imported from BVH."""
+    own = path.with_name("own")
+    run = ("run", "--clip", "walk", "--duration", "6", "--composed", "--output", own)
+    _call(path, *run)
+    _call(path, "motion", "export", own, "--output", own / "own.bvh")
+    _call(path, "motion", "import", own / "own.bvh", "--output", path)
+    shutil.rmtree(own)
+
+
+def _clips(path: Path) -> None:
+    own = path.with_name("own_captures")
+    _captures(own)
+    _call(path, "motion", "import", own, "--output", path)
+    shutil.rmtree(own)
+
+
+def _cycles(path: Path) -> None:
+    path.mkdir()
+    clip = path.with_name("own.json")
+    _long_clip(clip)
+    _call(path, "motion", "loop", clip, "--output", path / "cycle.json")
+
+
+def _call(path: Path, *words: object) -> None:
+    command = [str(_PROGRAM), *map(str, words)]
+    subprocess.run(command, cwd=path.parent, check=True, capture_output=True)
+
+
+def _code(page: str, word: str) -> Callable[[Path], None]:
+    """The block of Python of a page that has a word in it."""
+
+    def write(path: Path) -> None:
+        text = (ROOT / page).read_text(encoding="utf-8")
+        (code,) = [
+            block
+            for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+            if word in block
+        ]
+        path.write_text(code, encoding="utf-8")
+
+    return write
+
+
+def _copy_of(file: str) -> Callable[[Path], None]:
+    return lambda path: shutil.copy(ROOT / file, path) and None
+
+
+MAKERS: dict[str, Callable[[Path], None]] = {
+    "my_capture.bvh": _capture,
+    "walk.bvh": _capture,
+    "captures": _captures,
+    "walk.json": _long_clip,
+    "clips": _clips,
+    "cycles": _cycles,
+    "reconstructed.json": _copy_of("tests/data/walk_reconstructed.json"),
+    "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
+    "swing.py": _code("README.md", "class Swing"),
+    "holder.py": _code("docs/python.md", "ControllerNode"),
+}
