@@ -201,19 +201,22 @@ class Simulation:
         )
 
     def load_snapshot(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot: what follows is what followed it, to the bit.
-
-        That holds of states that a step has led to; in a world without a step yet, the engine has
-        not found out what touches.
-        """
-        if snapshot.settings != self.settings:
+        """Go on from a snapshot: what follows is what followed it, to the bit."""
+        each = list(zip(self.characters, snapshot.characters, strict=True))
+        # in a world without a step yet the engine has not found out what touches: only a fresh one
+        # is like that
+        is_first = all(its.before is None for _, its in each)
+        if is_first or snapshot.settings != self.settings:
             self.settings = snapshot.settings
+            for character, its in each:
+                character.begin_in(*its.start)
             self._world.close()
             self._world = self._fresh_world()
-        self._world.from_bytes(snapshot.world, snapshot.balls)
+        if not is_first:
+            self._world.from_bytes(snapshot.world, snapshot.balls)
         self.tick, self.episode = snapshot.tick, snapshot.episode
         self.throws, self._thrown_at = snapshot.throws, snapshot.thrown_at
-        for character, its in zip(self.characters, snapshot.characters, strict=True):
+        for character, its in each:
             character.restore(its)
 
     def _fresh_world(self) -> World:

@@ -66,7 +66,7 @@ def advance(plan: RunPlan, simulation: Simulation, ticks: int, noise: float = 0.
     return np.array(rows)
 
 
-@pytest.mark.parametrize("ticks", [1, 90])
+@pytest.mark.parametrize("ticks", [0, 1, 90])
 def test_a_simulation_returns_to_what_it_saved(
     plan: RunPlan, simulation: Simulation, ticks: int
 ) -> None:
