@@ -1,6 +1,7 @@
 """The command `actuated_characters`: runs of simulator and controller, and what there is to run."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 
@@ -33,6 +34,7 @@ from actuated_characters.commands.study import add_study
 from actuated_characters.commands.view import add_view
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.process import EXIT_ERROR, limit_threads
+from msgs_config.runtime.ros_environment import check_domain_id
 
 _EXIT_INTERRUPTED = 130
 _RUN = "run"  # without a word of what to run
@@ -47,6 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complete(parser)
         given = sys.argv[1:] if arguments is None else list(arguments)
         options = parser.parse_args(given)
+        check_domain_id(os.environ)
         command = print_overview if given == [_RUN] else options.command
         code = command(options)
     except (ActuatedCharactersError, OSError) as error:

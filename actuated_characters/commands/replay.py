@@ -20,6 +20,7 @@ from actuated_characters.commands.common.settings import (
     node_settings,
 )
 from msgs_config.errors import ConfigurationError, ReplayError
+from msgs_config.runtime.ros_environment import DISCOVERY_RANGE, LOCALHOST, is_discovery_off
 from msgs_config.versions import describe_changes, installed_versions
 
 if TYPE_CHECKING:  # they take a second to import
@@ -154,6 +155,11 @@ def _replay_states(options: argparse.Namespace) -> None:
     else:
         recordings = list(read_recordings(options.bag))
     if options.no_start:
+        if is_discovery_off(os.environ):
+            raise ConfigurationError(
+                f"{DISCOVERY_RANGE} is OFF: the controller that --no-start waits for could not be "
+                f"found; set it to {LOCALHOST} for both"
+            )
         print(f"ROS_DOMAIN_ID={os.environ.get('ROS_DOMAIN_ID') or 0}", flush=True)
     for recording in recordings:
         with _progress(options.bag, len(recording.stamps_ns), "states") as (count, tell):

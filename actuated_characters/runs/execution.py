@@ -27,11 +27,19 @@ from controller_node.parameters import make_controller
 from msgs_config.errors import RunError
 from msgs_config.messages import configuration
 from msgs_config.messages.session import SESSION, make_session
+from msgs_config.runtime.ros_environment import (
+    DISCOVERY_RANGE,
+    DOMAIN_ID,
+    LOCALHOST,
+    is_discovery_off,
+)
 from sim_node.simulation_factory import make_settings
 
 _START_TIMEOUT = 120.0  # s until the first answer, on a machine that may be busy with other things
 _VIEWER_TIMEOUT = 30.0  # s until its page is there
 _POLL_PERIOD = 0.05  # s
+_SILENCE = 5.0  # s without a tick, after which the nodes' logs are of interest
+_SIGNS = ("waiting for ", "its type must be ")  # in a node's warning about what does not come
 _IN_PROCESS_REPORT = 100  # ticks between reports of progress
 _TICK = "tick "  # begins the recorder's lines about its progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
@@ -199,25 +207,55 @@ def _write_planned(
 
 @contextmanager
 def run_environment(directory: Path) -> Iterator[dict[str, str]]:
-    """An environment that keeps the run's traffic on this machine, and to itself."""
+    """An environment that keeps the run's traffic on this machine, and to itself.
+
+    Where discovery is off, which would hide the run's processes from each other, it is LOCALHOST.
+    """
     environment = {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        DISCOVERY_RANGE: LOCALHOST,
         "ROS_LOG_DIR": str(directory / LOGS),
         **os.environ,
     }
-    if environment.get("ROS_DOMAIN_ID"):
+    if is_discovery_off(environment):
+        print(f"{DISCOVERY_RANGE} is OFF; the processes of this run have {LOCALHOST}", flush=True)
+        environment[DISCOVERY_RANGE] = LOCALHOST
+    if environment.get(DOMAIN_ID):
         yield environment
         return
     with own_domain() as domain:
-        print(f"ROS_DOMAIN_ID={domain}")
-        yield {**environment, "ROS_DOMAIN_ID": str(domain)}
+        print(f"{DOMAIN_ID}={domain}")
+        yield {**environment, DOMAIN_ID: str(domain)}
+
+
+class _Silence:
+    """Prints, once each, what the nodes say that they wait for while no tick comes."""
+
+    def __init__(self, children: Sequence[Child]) -> None:
+        self._sizes = dict.fromkeys(children, 0)  # of the logs at the last tick
+        self._ticks, self._since = 0, time.monotonic()
+        self._printed: set[str] = set()
+
+    def look(self, ticks: int) -> None:
+        """Look at the nodes' logs if the number of ticks has been the same for a while."""
+        now = time.monotonic()
+        if ticks != self._ticks:
+            self._ticks, self._since = ticks, now
+            self._sizes = {child: child.log_size for child in self._sizes}
+        if now < self._since + _SILENCE:
+            return
+        self._since = now  # the logs need not be read all the time
+        for child, size in self._sizes.items():
+            line = f"{child.name}: {child.last_warning(size)}"
+            if line not in self._printed and any(sign in line for sign in _SIGNS):
+                self._printed.add(line)
+                print(line, flush=True)
 
 
 def wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> None:
     """Wait until the simulator has ended well, and the others have not ended before."""
     recorder = others[-1]
     start_deadline = time.monotonic() + _START_TIMEOUT
-    ticks = 0
+    ticks, silence = 0, _Silence([simulator, *others])
     while simulator.exit_code is None:
         for child in others:
             if child.exit_code is not None:
@@ -226,6 +264,7 @@ def wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> N
             if line.startswith(_TICK):
                 ticks = int(line.removeprefix(_TICK))
         progress(ticks)
+        silence.look(ticks)
         if ticks < 2 and time.monotonic() > start_deadline:
             raise RunError(
                 f"no answer within {_START_TIMEOUT:g} s; {simulator.name} says: "

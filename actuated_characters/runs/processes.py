@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -27,6 +28,9 @@ MODULES = {
 """The modules that are run by `python -m`, by the names of the nodes, or of several in one."""
 
 _END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
+_LAST_LINES = 3  # of a process that failed without an error of its own
+_PROGRESS = re.compile(r"(tick|flushed|state) [0-9]+$")  # lines for the parent, not for a reader
+_WARNED = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[0-9.]+\] \[[^]]*\]: (.+)")  # of rcutils
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 _LIBC = ctypes.CDLL(None)  # loaded before a fork, not after
 
@@ -99,14 +103,33 @@ class Child:
         return os.pread(descriptor, os.fstat(descriptor).st_size - offset, offset)
 
     def last_words(self) -> str:
-        """The reason for the end: the error in the log, or else its last line."""
-        lines = [line for line in self.stderr.splitlines() if line.strip()]
+        """The reason for the end: the error in the log, or else the last lines of all output.
+
+        Libraries below ROS write to either stream what is no log: both are looked through.
+        """
+        lines = _filled_lines(self.stderr)
         errors = [line for line in lines if line.startswith("error: ")]
         if errors:
             return errors[-1].removeprefix("error: ")
+        if self.exit_code is None and lines:
+            return lines[-1]
+        printed = [line for line in _filled_lines(self.stdout) if not _PROGRESS.match(line)]
+        last = " | ".join((printed + lines)[-_LAST_LINES:])
         if self.exit_code is not None and self.exit_code < 0:
-            return f"killed by {signal.Signals(-self.exit_code).name}"
-        return lines[-1] if lines else f"exit code {self.exit_code}; it logged nothing"
+            how = f"killed by {signal.Signals(-self.exit_code).name}"
+            return f"{how}; its last output: {last}" if last else how
+        return last or f"exit code {self.exit_code}; it printed nothing"
+
+    @property
+    def log_size(self) -> int:
+        """Bytes of the log so far."""
+        return self._log.stat().st_size
+
+    def last_warning(self, since: int) -> str:
+        """The text of the node's last warning beyond so many bytes of the log; empty: none."""
+        later = self._log.read_bytes()[since:].decode(errors="replace")
+        found = [match[1] for line in _filled_lines(later) if (match := _WARNED.match(line))]
+        return found[-1] if found else ""
 
     def send(self, number: signal.Signals) -> None:
         """Send a signal, unless the process has ended."""
@@ -122,6 +145,10 @@ class Child:
         except subprocess.TimeoutExpired:
             self._process.kill()
             return self._process.wait()
+
+
+def _filled_lines(text: str) -> list[str]:
+    return [line.strip() for line in text.splitlines() if line.strip()]
 
 
 class Children:

@@ -16,6 +16,7 @@ from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutEx
 from rclpy.node import Node
 
 from msgs_config.messages.topics import Topic
+from msgs_config.runtime.endpoint_types import EndpointTypes
 
 _SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
 _SHORT_REST = 0.002  # s; waking up from the executor takes up to that
@@ -108,6 +109,7 @@ class PollingExecutor:
         self._executor = SingleThreadedExecutor(context=nodes[0].context)
         for node in nodes:
             self._executor.add_node(node)
+        self._types = [EndpointTypes(node) for node in nodes]
         self._service_period = service_period
         self._busy_until = 0.0
         self._next_service = 0.0
@@ -119,6 +121,7 @@ class PollingExecutor:
     def rest(self) -> None:
         """Let others work; at most about 20 ms."""
         if time.monotonic() > self._busy_until:
+            self._look_at_types()
             self._turn(_SERVICE_PERIOD)
         else:
             self.serve()
@@ -141,7 +144,12 @@ class PollingExecutor:
         now = time.monotonic()
         if now > self._next_service:
             self._next_service = now + self._service_period
+            self._look_at_types()
             self.serve_pending()
+
+    def _look_at_types(self) -> None:
+        for each in self._types:
+            each.look()
 
     def serve_pending(self) -> None:
         """Do all that is ready: a flood of messages must not keep services waiting."""

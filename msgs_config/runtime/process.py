@@ -14,6 +14,12 @@ from typing import NoReturn, Protocol
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.runtime.exit_watchdog import exit_after
+from msgs_config.runtime.ros_environment import (
+    DISCOVERY_RANGE,
+    LOCALHOST,
+    check_domain_id,
+    is_discovery_off,
+)
 from msgs_config.runtime.shadowing import shadowed_packages
 from msgs_config.runtime.shared_memory import remove_orphans
 
@@ -23,7 +29,11 @@ _FAST_DDS = "rmw_fastrtps"
 _ANYWHERE, _LOCALHOST = (
     Path(__file__).with_name(f"{name}.xml") for name in ("fastdds", "fastdds_localhost")
 )
-_PROFILES, _RANGE = "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_HIDDEN = (
+    f"{DISCOVERY_RANGE} is OFF: no node of another process can find this one, nor be found by it; "
+    f"{LOCALHOST} lets those of this machine"
+)
 _PARAMETERS_ARE_SET = (
     "parameters are set by --ros-args -p NAME:=VALUE or --params-file FILE, and listed by "
     "'actuated_characters parameters'"
@@ -142,8 +152,8 @@ def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
     is_fast_dds = environment.get("RMW_IMPLEMENTATION", _FAST_DDS).startswith(_FAST_DDS)
     is_plain = not environment.get("ROS_STATIC_PEERS")
     is_plain &= environment.get("ROS_LOCALHOST_ONLY", "0") != "1"
-    if environment.get(_RANGE) == "LOCALHOST" and is_fast_dds and is_plain:
-        return {_RANGE: "SYSTEM_DEFAULT", _PROFILES: str(_LOCALHOST)}
+    if environment.get(DISCOVERY_RANGE) == LOCALHOST and is_fast_dds and is_plain:
+        return {DISCOVERY_RANGE: "SYSTEM_DEFAULT", _PROFILES: str(_LOCALHOST)}
     return {} if given is not None else {_PROFILES: str(_ANYWHERE)}
 
 
@@ -161,6 +171,9 @@ def _start_ros(about: str) -> None:
             raise SystemExit(0)
         if others:
             raise ConfigurationError(f"unknown argument {others[0]!r}; {_PARAMETERS_ARE_SET}")
+        check_domain_id(os.environ)
+        if is_discovery_off(os.environ):
+            print(f"warning: {_HIDDEN}", file=sys.stderr, flush=True)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's own, of several types: a bad file or argument
         reason = " ".join(str(error).split())

@@ -8,6 +8,7 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 
 from msgs_config.messages.session import REMEDY
 from msgs_config.messages.topics import Topic
+from msgs_config.runtime.endpoint_types import other_types, type_name
 from msgs_config.runtime.once_logger import OnceLogger
 
 _UNKNOWN_NODE = "a node whose name is not known"
@@ -29,11 +30,14 @@ def describe_conflict(node: Node, joint: str, topic: Topic) -> str:
 
 
 def describe_publishers(node: Node, topic: Topic) -> str:
-    """One sentence: the nodes that publish on a topic, and whose QoS does not fit."""
+    """One sentence: the nodes that publish on a topic, and whose type or QoS does not fit."""
     infos = node.get_publishers_info_by_topic(topic.name)
     if not infos:
         return f"'{topic.name}' has no publisher"
     sentence = f"'{topic.name}' is published by {', '.join(publisher_names(node, topic))}"
+    right = type_name(topic.message_type)
+    for other in other_types(infos, right):
+        sentence += f"; the type of {other.node} is {other.type_name}, and must be {right}"
     for info in infos:
         compatibility, reason = qos_check_compatible(info.qos_profile, topic.qos)
         if compatibility == QoSCompatibility.ERROR:

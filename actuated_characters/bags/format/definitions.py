@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from msgs_config.errors import RecordingError
+from msgs_config.runtime.endpoint_types import type_name
 
 
 class MessageDefinition(NamedTuple):
@@ -38,30 +39,29 @@ def read_definition(message_type: type) -> MessageDefinition:
     Raises:
         RecordingError: A file of the definition is not installed.
     """
-    *namespace, _ = message_type.__module__.split(".")
-    type_name = "/".join([*namespace, message_type.__name__])
-    description = json.loads(_read_installed(type_name, ".json"))
+    name = type_name(message_type)
+    description = json.loads(_read_installed(name, ".json"))
     hashes = {entry["type_name"]: entry["hash_string"] for entry in description["type_hashes"]}
-    texts = [_read_installed(type_name, ".msg")]
+    texts = [_read_installed(name, ".msg")]
     for nested in description["type_description_msg"]["referenced_type_descriptions"]:
-        package, _, name = nested["type_name"].split("/")
+        package, _, short = nested["type_name"].split("/")
         text = _read_installed(nested["type_name"], ".msg")
-        texts.append(f"{'=' * 80}\nMSG: {package}/{name}\n{text}")
-    return MessageDefinition(type_name, "\n".join(texts), hashes[type_name])
+        texts.append(f"{'=' * 80}\nMSG: {package}/{short}\n{text}")
+    return MessageDefinition(name, "\n".join(texts), hashes[name])
 
 
-def _read_installed(type_name: str, suffix: str) -> str:
+def _read_installed(name: str, suffix: str) -> str:
     """The text of a type's file, from the `share` folder beside the package's Python code.
 
     The ament index would do in a full ROS install only: nothing points it to the pip wheels.
     """
-    spec = find_spec(type_name.partition("/")[0])
+    spec = find_spec(name.partition("/")[0])
     folders = spec.submodule_search_locations if spec else None
     for folder in folders or ():
         for prefix in Path(folder).parents:
-            file = prefix / "share" / f"{type_name}{suffix}"
+            file = prefix / "share" / f"{name}{suffix}"
             if file.is_file():
                 return file.read_text(encoding="utf-8")
     raise RecordingError(
-        f"no definition of message type {type_name}: share/{type_name}{suffix} is not installed"
+        f"no definition of message type {name}: share/{name}{suffix} is not installed"
     )
