@@ -1,8 +1,7 @@
 """Disturbances that a planned walk survives untold: `python -m benchmarks.planner.pushes`.
 
-A row a kind of push at the root, at random moments and from random sides. A walk ends by falling:
-the centre of mass lower than 0.65 of the clip's, or the root turned by more than 1.5 rad from the
-clip's, where that has given way to. Kind `balls` throws them at the chest, kind `standing` holds a
+A row a kind of push at the root, at random moments and from random sides. A walk ends by falling,
+as `actuated_characters.metrics.falls` has it, against an upright posture. Kind `balls` throws them at the chest, kind `standing` holds a
 pose for a minute. Kind `fall` is a push that throws the character down, which is to get up and to
 walk on. Kind `any` is for `--picture`: the impulse that half of the walks bear, by direction. All
 of them take two hours on two cores.
@@ -28,6 +27,7 @@ from rich.progress import track  # noqa: E402
 from rich.table import Table  # noqa: E402
 
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
+from actuated_characters.metrics.falls import FallWatch, PostureReader  # noqa: E402
 from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
 from actuated_characters.runs.planned_throws import PlannedThrow, plan_throws  # noqa: E402
@@ -39,10 +39,8 @@ from controller_node.parameters import make_controller  # noqa: E402
 from controller_node.planner.anchor import Anchor  # noqa: E402
 from msgs_config.character.dynamics import DynamicsModel  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa: E402
-from msgs_config.geometry import rotations  # noqa: E402
 from msgs_config.messages.state import StampedReference, StampedState  # noqa: E402
 
-LOWEST, FARTHEST_TURN = 0.65, 1.5  # of the clip's height; rad
 LINK = "root"
 BALL = "mass=2.5 speed=8 target=chest at={:.4f} from={:.4f}"
 BALL_LIFETIME = 0.6  # s, of which it flies 0.2
@@ -73,6 +71,7 @@ class _Watch:
     def __init__(self, plan: RunPlan) -> None:
         self._centre_at = DynamicsModel(plan.character).centre_of_mass_at
         self.rate = plan.simulator.integer("rate")
+        self._fall = FallWatch(PostureReader(plan.character), 1.0 / EVERY)
         self._time = 0.0  # s
         self.errors: list[float] = []
         self.fell_at: float | None = None  # s
@@ -99,11 +98,7 @@ class _Watch:
         placed = anchor.to_world(there[np.newaxis])[0]
         self.errors.append(float(np.linalg.norm(here - placed)))
         self.away = float(np.linalg.norm(placed - there))
-        root, clip = rotations.exp(state.position[3:6]), rotations.exp(wanted.position[3:6])
-        turn = rotations.angle_between(
-            root, rotations.multiply(rotations.about_z(anchor.yaw), clip)
-        )
-        self.lies = bool(here[2] < LOWEST * there[2] or turn > FARTHEST_TURN)
+        self.lies = self._fall.has_fallen(state.position)
         if self.lies:
             self.fall()
 

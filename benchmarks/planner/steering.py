@@ -5,8 +5,7 @@ run, then it stands again. And a stop: running at its largest speed it gets no f
 
 The path error is the distance over the ground from the root to the course that the commands
 prescribe, at the same tick; `beside` is that to the nearest point of the course, whenever it is
-there. A character falls where its centre of mass is lower than 0.65 of the reference's, or its root
-is turned by more than 1.5 rad from it. It has stopped when the speed of its root over the ground,
+there. A character falls as `actuated_characters.metrics.falls` has it. It has stopped when the speed of its root over the ground,
 mean over the 0.25 s around, stays below 0.15 m/s; that counts from the timeout of the last velocity
 on, and in the figure of eight from the command to stop on. All takes a quarter of an hour on two
 cores.
@@ -31,16 +30,15 @@ from rich.progress import Progress  # noqa: E402
 from rich.table import Table  # noqa: E402
 
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
+from actuated_characters.metrics.falls import FallWatch, PostureReader  # noqa: E402
 from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
 from actuated_characters.runs.planned_velocities import plan_velocities  # noqa: E402
-from benchmarks.planner.pushes import FARTHEST_TURN, LOWEST, NODES  # noqa: E402
+from benchmarks.planner.pushes import NODES  # noqa: E402
 from controller_node.references.steering.reference import SteeredReference  # noqa: E402
 from controller_node.references.steering.velocity import VelocityCommand  # noqa: E402
 from msgs_config.arrays import FloatArray  # noqa: E402
-from msgs_config.character.dynamics import DynamicsModel  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa: E402
-from msgs_config.geometry import rotations  # noqa: E402
 
 EIGHT = "1,0,0.4@1 1,0,-0.4@16.7 2.2,0,0.7@32.4 2.2,0,-0.7@41.4 0,0,0@50.4"
 EIGHT_ENDS, EIGHT_LASTS = 50.4, 60.0  # s
@@ -114,14 +112,11 @@ def _plan(task: Task) -> RunPlan:
 
 def _roots(plan: RunPlan) -> tuple[FloatArray, bool]:
     """Places of the root on the ground (t, 2) m after each tick, and whether it fell at the end."""
-    centre_at = DynamicsModel(plan.character).centre_of_mass_at
+    fall = FallWatch(PostureReader(plan.character), plan.simulator.integer("rate"))
     roots: list[tuple[float, float]] = []
     try:
         for tick in ticks_in_process(plan):
-            assert tick.reference is not None
-            here, wanted = tick.state.position, tick.reference.position
-            turn = rotations.angle_between(rotations.exp(here[3:6]), rotations.exp(wanted[3:6]))
-            if centre_at(here)[2] < LOWEST * centre_at(wanted)[2] or turn > FARTHEST_TURN:
+            if fall.has_fallen(tick.state.position):
                 return np.array(roots), True
             x, y = tick.following.position[:2].tolist()
             roots.append((x, y))
