@@ -133,6 +133,6 @@ distclean: clean ## Remove .venv too
 .venv/.installed-test: $(PACKAGING) | .venv/.created
 	@echo "installing the package and its test tools into .venv ..."
 	@$(BIN)/python -m pip install -qq -e '.[wheels,test]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
-	@touch .venv/.installed $@
+	@touch .venv/.installed .venv/.installed-plan .venv/.installed-view $@  # it has their extras, too
 
 PIP_FAILED := error: pip failed. It needs the network, and the wheels of ROS 2 are for Linux on x86-64 only.

@@ -1,10 +1,10 @@
 """Disturbances that a planned walk survives untold: `python -m benchmarks.planner.pushes`.
 
 A row a kind of push at the root, at random moments and from random sides. A walk ends by falling,
-as `actuated_characters.metrics.falls` has it, against an upright posture. Kind `balls` throws them at the chest, kind `standing` holds a
-pose for a minute. Kind `fall` is a push that throws the character down, which is to get up and to
-walk on. Kind `any` is for `--picture`: the impulse that half of the walks bear, by direction. All
-of them take two hours on two cores.
+as `actuated_characters.metrics.falls` has it, against an upright posture. Kind `balls` throws them
+at the chest, kind `standing` holds a pose for a minute. Kind `fall` is a push that throws the
+character down, which is to get up and to walk on. Kind `any` is for `--picture`: the impulse that
+half of the walks bear, by direction. All of them take two hours on two cores.
 """
 
 import argparse

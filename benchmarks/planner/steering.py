@@ -5,10 +5,10 @@ run, then it stands again. And a stop: running at its largest speed it gets no f
 
 The path error is the distance over the ground from the root to the course that the commands
 prescribe, at the same tick; `beside` is that to the nearest point of the course, whenever it is
-there. A character falls as `actuated_characters.metrics.falls` has it. It has stopped when the speed of its root over the ground,
-mean over the 0.25 s around, stays below 0.15 m/s; that counts from the timeout of the last velocity
-on, and in the figure of eight from the command to stop on. All takes a quarter of an hour on two
-cores.
+there. A character falls as `actuated_characters.metrics.falls` has it. It has stopped when the
+speed of its root over the ground, mean over the 0.25 s around, stays below 0.15 m/s; that counts
+from the timeout of the last velocity on, and in the figure of eight from the command to stop on.
+All takes a quarter of an hour on two cores.
 """
 
 import argparse

@@ -110,11 +110,14 @@ def _run(text: str, place: Path, promise: Promise) -> tuple[int, str, bool]:
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-        shown = promise.page and _shows_a_page(log, process)
         try:
+            shown = promise.page and _shows_a_page(log, process)
             process.wait(promise.ends_after or _LONGEST)
         except subprocess.TimeoutExpired:
             _interrupt(process)
+        except BaseException:
+            _interrupt(process)  # it has a session of its own, where our Ctrl-C does not come
+            raise
     return process.returncode, log.read_text(encoding="utf-8", errors="replace"), shown
 
 
