@@ -21,6 +21,7 @@ from msgs_config.shared_parameters import collides, placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, as_values, describe_start
 from sim_node.physics.probe import measure_probe
+from sim_node.physics.short_links import describe_speed_bound
 from sim_node.world_parameters import STEADY_CONTACTS
 
 SHARED = ("rate", "gravity", "placement", "collision", "command_delay_ticks")
@@ -93,7 +94,7 @@ def make_plan(
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings + simulator.warnings + controller.warnings
-    warnings += describe_start(character, simulator)
+    warnings += describe_start(character, simulator) + describe_speed_bound(character, simulator)
     return RunPlan(character, motion.reference, simulator, controller, warnings)
 
 

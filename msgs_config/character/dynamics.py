@@ -181,6 +181,14 @@ class DynamicsModel:
         """Mass of all links together, kg."""
         return float(self._model.body_subtreemass[1])
 
+    def subtree(self, link: int) -> tuple[FloatArray, float]:
+        """Centre of mass (3,) in the world, m, and mass, kg, of a link and all that it carries.
+
+        `link` is an index of `Character.links`.
+        """
+        body = link + 1
+        return self._data.subtree_com[body].copy(), float(self._model.body_subtreemass[body])
+
     def inertia_of_entries(self) -> FloatArray:
         """The diagonal (n,) of the mass matrix at the state taken over: kg, kg m^2."""
         diagonal: FloatArray = self._mass.take(self._diagonal)

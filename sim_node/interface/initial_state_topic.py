@@ -23,6 +23,7 @@ from sim_node.initial_state import (
 )
 from sim_node.interface.publisher_diagnosis import describe_publishers, publisher_names
 from sim_node.parameters import SimulatorParameters
+from sim_node.physics.short_links import describe_speed_bound
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
@@ -151,7 +152,9 @@ class _Subscription:
 
 
 def log_warnings(node: Node, parameters: SimulatorParameters) -> None:
-    """Log likely mistakes in characters' files, and which characters begin below the ground."""
+    """Log likely mistakes in files, where a character begins below the ground, and its bounds."""
     for each in parameters.characters:
-        for warning in (*each.character.warnings, *describe_start(each.character, each.values)):
+        character, values = each.character, each.values
+        bound = describe_speed_bound(character, values)
+        for warning in (*character.warnings, *describe_start(character, values), *bound):
             node.get_logger().warning(f"{each.prefix}{warning}")

@@ -34,8 +34,13 @@ class Body:
     a link, in the order of `Character.links`.
     """
 
-    def __init__(self, client: int, character: Character, friction: float) -> None:
-        """Load the character; `friction` is that of every link.
+    def __init__(
+        self, client: int, character: Character, friction: float, speed_bound: float
+    ) -> None:
+        """Load the character.
+
+        `friction` is that of every link, `speed_bound` in rad/s and m/s that of every degree of
+        freedom.
 
         Raises:
             CharacterError: the engine refuses the URDF or a mesh.
@@ -55,7 +60,7 @@ class Body:
         self._base_read: BaseFrame | None = None  # since the engine's last step
         self._base_centre: frames.Triple | None = None  # as the engine has it, and as long as that
         self._find_joints(character)
-        set_link_dynamics(client, self._body, friction)
+        set_link_dynamics(client, self._body, friction, speed_bound)
         pairs = zip(self._joints, self._axes, strict=True)
         balls = [number for number, axes in pairs if axes is not None]
         remove_motors(client, self._body, self._joints, balls)

@@ -5,17 +5,21 @@ from collections.abc import Sequence
 from msgs_config.character.bullet import pybullet
 from msgs_config.geometry import rotations
 
-_UNLIMITED_SPEED = 1e9  # Bullet clamps at 100 otherwise, and a divergence would stay unseen
+UNLIMITED_SPEED = 1e9
+"""A bound that nothing sound reaches, rad/s or m/s; at Bullet's 100 no divergence would be seen."""
 
 
-def set_link_dynamics(client: int, body: int, friction: float) -> None:
-    """Switch off the damping of a body's links and joints, and set every link's friction."""
+def set_link_dynamics(client: int, body: int, friction: float, speed_bound: float) -> None:
+    """Switch off the damping of a body's links and joints, and set every link's friction.
+
+    `speed_bound` in rad/s and m/s is that of every degree of freedom, the base's too.
+    """
     # One call a setting: a link silently loses some of those that share a call.
     settings = (
         {"linearDamping": 0.0, "angularDamping": 0.0},
         {"jointDamping": 0.0},
         {"lateralFriction": friction},
-        {"maxJointVelocity": _UNLIMITED_SPEED},
+        {"maxJointVelocity": speed_bound},
     )
     for link in range(-1, pybullet.getNumJoints(body, physicsClientId=client)):
         for setting in settings:

@@ -15,6 +15,7 @@ from sim_node.initial_state import check_length
 from sim_node.physics.body import Body
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.projectiles import Projectiles
+from sim_node.physics.short_links import speed_bound
 from sim_node.physics.touches import TouchedLinks
 from sim_node.physics.wrenches import ExternalWrench
 
@@ -66,6 +67,7 @@ class SimulatedCharacter:
     before: StampedState | None  # the state a tick earlier; None in an episode's first one
     pushes: tuple[ExternalWrench, ...]  # that acted during the last tick
     balls: Projectiles  # of the world that it is in
+    speed_bound: float  # rad/s or m/s, of every degree of freedom in the engine
 
     def __init__(
         self, setup: CharacterSetup, *, delay_ticks: int, step_s: float, speed_limit: float
@@ -90,6 +92,7 @@ class SimulatedCharacter:
         self._velocity = self._initial("initial_velocity", setup.initial_velocity)
         self._passive = PassiveForces(setup.character, step_s, setup.inverse_mass)
         self._delay_ticks = delay_ticks
+        self.speed_bound = speed_bound(setup.character, step_s, speed_limit)
         # (2, n) largest position and velocity of a sound state
         self._bounds = np.array([[np.finfo(float).max], [speed_limit]]).repeat(self.layout.size, 1)
 

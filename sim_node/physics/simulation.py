@@ -223,7 +223,8 @@ class Simulation:
         world = World(self.settings.world)
         try:
             for character in self.characters:
-                character.enter(world.add(character.character), world.balls, self.stamp_ns)
+                body = world.add(character.character, character.speed_bound)
+                character.enter(body, world.balls, self.stamp_ns)
         except Exception:
             world.close()
             raise

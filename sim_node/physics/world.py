@@ -14,6 +14,7 @@ from msgs_config.character.bullet import connect, load_urdf, pybullet
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.body import Body
+from sim_node.physics.engine_defaults import UNLIMITED_SPEED
 from sim_node.physics.projectiles import Projectiles
 from sim_node.physics.touches import Touch, TouchedLinks
 
@@ -86,9 +87,12 @@ class World:
         """End the engine; the world cannot be used any more."""
         pybullet.disconnect(self._client)
 
-    def add(self, character: Character) -> Body:
-        """Put a character into the world, at the pose of its URDF."""
-        return Body(self._client, character, self._link_friction)
+    def add(self, character: Character, speed_bound: float = UNLIMITED_SPEED) -> Body:
+        """Put a character into the world, at the pose of its URDF.
+
+        No degree of freedom is let be faster than `speed_bound`, rad/s or m/s.
+        """
+        return Body(self._client, character, self._link_friction, speed_bound)
 
     def set_gravity(self, gravity: float) -> None:
         """Set gravity in m/s^2 along -z."""
