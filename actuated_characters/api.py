@@ -1,6 +1,7 @@
 """Simulation and controller for Python, without ROS; the states are those of `run`, to the bit."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -24,7 +25,7 @@ from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import as_values
 from sim_node.node_settings import make_node_settings
 from sim_node.physics import simulation
-from sim_node.physics.wrenches import WrenchQueue
+from sim_node.physics.wrenches import ExternalWrench, WrenchQueue
 from sim_node.simulation_factory import make_character_setup, make_settings
 
 if TYPE_CHECKING:
@@ -111,6 +112,17 @@ class Controller:
         return effort_message(layout, message.header, effort, self._commanded)
 
 
+@dataclass(frozen=True)
+class SimulationSnapshot:
+    """A state of a `Simulation` and all that follows from it; it can be pickled."""
+
+    character: tuple[str, ...]  # its file's name, and those of its degrees of freedom
+    world: simulation.Snapshot
+    first_tick: int  # of the episode
+    pushes: tuple[ExternalWrench, ...]  # that wait or act
+    states: StateHash  # over the states so far
+
+
 class Simulation:
     """Forward dynamics: one character in its world, a tick a step, as `sim_node` simulates it."""
 
@@ -168,9 +180,14 @@ class Simulation:
         return self._simulation.characters[0].state
 
     @property
+    def settings(self) -> simulation.SimulationSettings:
+        """What it depends on besides the character, where that begins, and the efforts."""
+        return self._simulation.settings
+
+    @property
     def rate_hz(self) -> int:
         """Ticks a second."""
-        return self._simulation.settings.rate_hz
+        return self.settings.rate_hz
 
     @property
     def ticks(self) -> int:
@@ -258,6 +275,41 @@ class Simulation:
         self._first_tick = self._simulation.tick
         if start is not None:
             self._simulation.begin_in({"": start})
+        return self.state
+
+    @property
+    def _kind(self) -> tuple[tuple[str, ...], simulation.SimulationSettings]:
+        """What another simulation's snapshot must have in common with this one."""
+        return (self.character.file.name, *self.character.layout.dof_names), self.settings
+
+    def snapshot(self) -> SimulationSnapshot:
+        """The present state and all that follows from it, for `restore`; takes 0.3 ms."""
+        return SimulationSnapshot(
+            self._kind[0],
+            self._simulation.snapshot(),
+            self._first_tick,
+            self._pushes.pushes,
+            self._hash.copy(),
+        )
+
+    def restore(self, snapshot: SimulationSnapshot) -> StampedState:
+        """Go on from a snapshot, to the bit; the state in which it was taken.
+
+        It may be that of another simulation of the same character and parameters, in another
+        process as well. A snapshot that was pickled begins `state_hash` anew.
+
+        Raises:
+            ConfigurationError: it is of another character, or other parameters.
+        """
+        if self._kind != (snapshot.character, snapshot.world.settings):
+            raise ConfigurationError(
+                f"the snapshot is of a simulation of {snapshot.character[0]} with its parameters, "
+                f"this is one of {self.character.file.name}; both must be the same"
+            )
+        self._simulation.load_snapshot(snapshot.world)
+        self._first_tick = snapshot.first_tick
+        self._pushes.replace(snapshot.pushes)
+        self._hash = snapshot.states.copy()
         return self.state
 
 

@@ -1,40 +1,67 @@
-"""Tracking a motion by joint torques as a Gymnasium environment, `actuated_characters/Track-v0`.
+"""Tracking a motion as a Gymnasium environment, `actuated_characters/Track-v0`."""
 
-The reward is that of DeepMimic (Peng et al. 2018, "DeepMimic", section 5), where the weight of the
-end effectors, which it leaves out, goes to the centre of mass:
-`0.65 exp(-2 sum |q_d - q|^2) + 0.1 exp(-0.1 sum |v_d - v|^2) + 0.25 exp(-10 |c_d - c|^2)`, the sums
-over joints, c the centre of mass, d of the desired state at the new state's time.
-"""
-
+import hashlib
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NoReturn
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
 
-from actuated_characters.api import Controller, Simulation
-from actuated_characters.metrics.error_measures import is_lost
-from actuated_characters.runs.plan import SHARED
-from controller_node.references.base import ReferenceState
+from actuated_characters.api import Simulation, SimulationSnapshot
+from actuated_characters.environments.actions import (
+    TARGETS,
+    TORQUES,
+    Actuation,
+    TargetActuation,
+    TorqueActuation,
+    check_action,
+)
+from actuated_characters.environments.assessment import Assessment
+from actuated_characters.environments.camera import FollowingCamera
+from actuated_characters.environments.motion import EpisodeMotion
+from actuated_characters.environments.options import controller_values, with_shared
+from actuated_characters.render.engine.camera_pose import Size
+from actuated_characters.render.engine.renderer import Picture
+from controller_node.model_check import check_inertia
+from controller_node.parameters import make_settings
+from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
-from msgs_config.errors import ConfigurationError, SimulationError
-from msgs_config.geometry import rotations
+from msgs_config.errors import ConfigurationError, SimulationError, one_of
+from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
+from msgs_config.parameters import Values
+from msgs_config.shared_parameters import collides, placed
 
-_DOWN = np.array((0.0, 0.0, -1.0))
-_BASE = 6  # entries of a floating base
+_NONE: Mapping[str, object] = MappingProxyType({})
+_RESET_OPTIONS = ("start",)
+_POSES_IN_VIEW, _TIME_IN_VIEW = 16, 4.0  # of the reference, s, that the camera is far enough for
+
+
+@dataclass(frozen=True)
+class TrackState:
+    """All that an environment goes on from; it can be pickled."""
+
+    kind: str  # a hash of the options that must be equal
+    simulation: SimulationSnapshot
+    start: float  # s of the reference, where the episode began
+    random: Mapping[str, Any]  # the generator's state
+    observation: FloatArray  # the last one
 
 
 class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
-    """A character that is to follow a reference by the efforts of its motors.
+    """A character that is to follow a reference by its motors; no force acts on a floating base.
 
-    Action: efforts (a,) of the actuated degrees of freedom, N and N m, within their limits, held
-    for `ticks_per_step` ticks. There is no force on a floating base.
+    Action, held for `ticks_per_step` ticks, one entry (a,) an actuated degree of freedom:
+    `targets`: offsets to the reference, rad and m, of a ball joint a rotation vector in the child
+    frame; the law of `controller_node` acts in each tick, with the character's gains. At zero the
+    states are those of `run` without `root_assistance`, to the bit. `angles`: positions of the
+    joints, as a state has them, that the same law tracks instead of the reference's. `torques`:
+    efforts, N m and N. All may be beyond the bounds of the space; efforts are kept within limits.
 
     Observation, one array of doubles: of a floating base the height of its origin (m), the
     direction of gravity and the linear velocity (m/s), both in the base frame, and its angular
@@ -45,68 +72,97 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
     than half of it, or the simulation diverges; it is truncated after `duration`.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012 - as the base class declares it
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012 - as its base has it
 
     def __init__(
         self,
         character: str = "humanoid",
         *,
+        action: str = TARGETS,
         duration: float = 10.0,
         ticks_per_step: int = 8,
         random_start: bool = False,
-        simulator: Mapping[str, object] = MappingProxyType({}),
+        render_mode: str | None = None,
+        render_size: Size = (480, 360),
+        simulator: Mapping[str, object] = _NONE,
+        controller: Mapping[str, object] = _NONE,
         **reference: object,
     ) -> None:
         """Load the character and its world.
 
         Args:
             character: Name of one that ships, or path of its YAML or URDF file.
+            action: What actions mean: `targets`, `angles` or `torques`.
             duration: Of an episode, s.
             ticks_per_step: How long an action is held; at 240 Hz, 8 are 1/30 s.
             random_start: Begin each episode at a random time, up to `duration`, of the reference.
+            render_mode: `rgb_array`: `render` returns a picture, with the reference as a ghost.
+            render_size: Width and height of a picture, pixels.
             simulator: Parameters of `sim_node`, by name.
-            reference: `controller_node`'s parameters of the motion: `clip="walk"`, for instance.
+            controller: Parameters of `controller_node`, by name: `{"gains.right_knee.p": 300.0}`.
+            reference: The same for names without a dot: `clip="walk"`, for instance.
 
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
         """
+        check_action(action)
         _check(duration, ticks_per_step, simulator)
-        shared = {name: simulator[name] for name in SHARED if name in simulator}
-        controller = Controller(load_character(character), shared, **reference)
-        self._character, self._reference = controller.character, controller.reference
-        self._layout = self._character.layout
-        self._simulation = Simulation(
-            self._character, controller.start, simulator, watch_contacts=False
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ConfigurationError(
+                one_of("render_mode", render_mode, self.metadata["render_modes"])
+            )
+        simulator, given = with_shared(simulator, controller, reference)
+        self._character = placed(load_character(character, collides(simulator)), simulator)
+        values = controller_values(self._character, given)
+        motion = make_motion(self._character, values)
+        clock = TickClock(values.integer("rate"))
+        self._motion = EpisodeMotion(motion.reference, clock)
+        model = DynamicsModel(self._character, values.number("gravity"))
+        check_inertia(model, self._character)
+        self._actuation = self._make_actuation(action, values, model, clock)
+        self.action_space = self._actuation.space
+        self._assessment = Assessment(self._character, model)
+        self.observation_space = gymnasium.spaces.Box(
+            -np.inf, np.inf, (self._assessment.size,), dtype=np.float64
         )
-        self._joints = slice(_BASE if self._layout.has_floating_base else 0, None)
-        self._model = DynamicsModel(self._character)
-        self._actuated = self._layout.mask(self._layout.actuated_joint_names)
+        self._simulation = Simulation(
+            self._character, motion.first_state(), simulator, watch_contacts=False
+        )
+        options = (action, ticks_per_step, sorted(values.items()))
+        self._kind = hashlib.sha256(repr(options).encode()).hexdigest()
         self._duration, self._ticks, self._random = duration, ticks_per_step, random_start
-        self._start = 0.0  # s of the reference, where the episode began
-        self._is_fresh = True
-        self._make_spaces()
+        self._is_fresh, self._is_closed = True, False
+        self.render_mode, self._render_size = render_mode, render_size
+        self.metadata = {**self.metadata, "render_fps": round(clock.rate_hz / ticks_per_step)}
+        self._camera: FollowingCamera | None = None
+        self._see()
 
-    def _make_spaces(self) -> None:
-        limits = np.repeat(self._character.effort_limits(), self._layout.vector_lengths)
-        bound = limits[self._actuated]
-        self.action_space = spaces.Box(-bound, bound, dtype=np.float64)
-        size = len(self._observe())
-        self.observation_space = spaces.Box(-np.inf, np.inf, (size,), dtype=np.float64)
+    def _make_actuation(
+        self, action: str, values: Values, model: DynamicsModel, clock: TickClock
+    ) -> Actuation:
+        if action == TORQUES:
+            return TorqueActuation(self._character)
+        settings = make_settings(self._character, values)
+        return TargetActuation(action, self._character, settings, self._motion, model, clock)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
-        """Begin an episode; `options` may have `start`, the reference's time in s."""
+        """Begin an episode; `options` may have `start`, the reference's time in s.
+
+        Raises:
+            ConfigurationError: the start is no time, or there is another option.
+        """
         super().reset(seed=seed)
-        self._start = float((options or {}).get("start", self._drawn_start()))
-        if not 0.0 <= self._start < math.inf:
-            raise ConfigurationError(f"start is {self._start} s; it must be 0 or later")
-        first = self._reference.sample(self._start)
-        start = StampedState(0, first.configuration.position, first.velocity, None)
-        if not self._is_fresh or self._start:
-            self._simulation.reset(start)
+        start = self._drawn_start() if not options else _start_of(options)
+        self._motion.begin(start)
+        first = self._motion.at(0)
+        if not self._is_fresh or start:
+            self._simulation.reset(
+                StampedState(0, first.configuration.position, first.velocity, None)
+            )
         self._is_fresh = False
-        return self._observe(), self._info()
+        return self._see(), self._info()
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Hold an action (a,) for `ticks_per_step` ticks; see the class for what comes back.
@@ -119,21 +175,84 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         shape = self.action_space.shape
         if np.shape(action) != shape or not np.isfinite(action).all():
             raise ConfigurationError(f"an action must have shape {shape} and finite numbers")
-        effort = np.zeros(self._layout.size)
-        effort[self._actuated] = action
         self._is_fresh = False
+        self._actuation.hold(action)
+        simulation, effort = self._simulation, self._actuation.effort
         try:
             for _ in range(self._ticks):
-                self._simulation.step(effort)
+                simulation.step(effort(simulation.ticks, simulation.state))
         except SimulationError:
-            return self._seen, 0.0, True, False, {**self._info(), "diverged": True}
-        reward, is_over = self._judge()
-        is_complete = self._simulation.ticks >= round(self._duration * self._simulation.rate_hz)
-        return self._observe(), reward, is_over, is_complete, self._info()
+            return self._seen.copy(), 0.0, True, False, {**self._info(), "diverged": True}
+        reward, is_over = self._assessment.reward(
+            simulation.state, self._motion.at(simulation.ticks)
+        )
+        is_complete = simulation.ticks >= round(self._duration * simulation.rate_hz)
+        return self._see(), reward, is_over, is_complete, self._info()
+
+    def get_state(self) -> TrackState:
+        """The state of episode and random numbers, to be given to `set_state`; can be pickled."""
+        return TrackState(
+            self._kind,
+            self._simulation.snapshot(),
+            self._motion.start,
+            self.np_random.bit_generator.state,
+            self._seen,
+        )
+
+    def set_state(self, state: TrackState) -> tuple[FloatArray, dict[str, Any]]:
+        """Go on from a state of this environment, or of one with the same options, to the bit.
+
+        Returns observation and information, as `reset` does.
+
+        Raises:
+            ConfigurationError: the state is of an environment with other options.
+        """
+        if not isinstance(state, TrackState) or state.kind != self._kind:
+            raise ConfigurationError(
+                "the state is not one of an environment with these options: character, action, "
+                "ticks_per_step and the parameters must be equal"
+            )
+        self._simulation.restore(state.simulation)
+        self._motion.begin(state.start)
+        self.np_random.bit_generator.state = state.random
+        self._seen, self._is_fresh = state.observation, False
+        return self._seen.copy(), self._info()
+
+    def render(self) -> Picture | None:
+        """A picture (h, w, 3), red, green, blue; None, with a warning, without a render mode.
+
+        Raises:
+            ConfigurationError: the size is not sensible.
+            CharacterError: a file of the character cannot be drawn.
+        """
+        if self.render_mode is None:
+            gymnasium.logger.warn("render has nothing to do: make it with render_mode='rgb_array'")
+            return None
+        if self._camera is None:
+            ticks = round(min(self._duration, _TIME_IN_VIEW) * self._simulation.rate_hz)
+            shown = np.linspace(0, ticks, _POSES_IN_VIEW).astype(int).tolist()
+            self._camera = FollowingCamera(
+                self._character,
+                self._simulation.settings.world,
+                self._render_size,
+                [self._motion.at(tick).configuration.position for tick in shown],
+            )
+        desired = self._motion.at(self._simulation.ticks)
+        return self._camera.picture(self._simulation.state.position, desired.configuration.position)
 
     def close(self) -> None:
-        """End the engine."""
-        self._simulation.close()
+        """End the engines; once it is closed, nothing happens."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._simulation.close()
+            if self._camera is not None:
+                self._camera.close()
+
+    def __reduce__(self) -> NoReturn:
+        raise ConfigurationError(
+            "an environment cannot be copied or pickled; make another one with the same options "
+            "and give it this one's get_state()"
+        )
 
     @property
     def simulation(self) -> Simulation:
@@ -143,40 +262,31 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
     def _drawn_start(self) -> float:
         return float(self.np_random.uniform(0.0, self._duration)) if self._random else 0.0
 
-    def _desired(self, ahead: int = 0) -> ReferenceState:
-        ticks = self._simulation.ticks + ahead
-        return self._reference.sample(self._start + ticks / self._simulation.rate_hz)
-
-    def _observe(self) -> FloatArray:
-        state, desired = self._simulation.state, self._desired(self._ticks)
-        layout, base = self._layout, np.zeros(0)
-        here = layout.configuration(state.position)
-        if layout.has_floating_base:
-            back = rotations.conjugate(here.orientations_xyzw[0])
-            turned = [rotations.rotate(back, vector) for vector in (_DOWN, state.velocity[:3])]
-            base = np.concatenate((state.position[2:3], *turned, state.velocity[3:_BASE]))
-        difference = layout.difference(here, desired.configuration)
-        own = (base, state.position[self._joints], state.velocity[self._joints])
-        self._seen = np.concatenate((*own, difference, desired.velocity))
+    def _see(self) -> FloatArray:
+        """The observation of the present state, which is kept; a copy of it."""
+        ahead = self._motion.at(self._simulation.ticks + self._ticks)
+        self._seen = self._assessment.observation(self._simulation.state, ahead)
         return self._seen.copy()
-
-    def _judge(self) -> tuple[float, bool]:
-        """The reward of the present state, and whether the motion is lost."""
-        layout, joints = self._layout, self._joints
-        state, desired = self._simulation.state, self._desired()
-        turn = layout.difference(layout.configuration(state.position), desired.configuration)
-        pose = float(np.sum(turn[joints] ** 2))
-        speed = float(np.sum((desired.velocity - state.velocity)[joints] ** 2))
-        centre = self._model.centre_of_mass_at(state.position)
-        wanted = self._model.centre_of_mass_at(desired.configuration.position)
-        away = float(np.sum((wanted - centre) ** 2))
-        reward = 0.65 * np.exp(-2.0 * pose) + 0.1 * np.exp(-0.1 * speed) + 0.25 * np.exp(-10 * away)
-        return float(reward), layout.has_floating_base and is_lost(centre, wanted)
 
     def _info(self) -> dict[str, Any]:
         """Time in s since the episode began, and of the reference."""
         elapsed = self._simulation.time
-        return {"time": elapsed, "reference_time": self._start + elapsed}
+        return {"time": elapsed, "reference_time": self._motion.start + elapsed}
+
+
+def _start_of(options: Mapping[str, Any]) -> float:
+    """The time of the reference in s at which options of `reset` begin an episode."""
+    for name in options:
+        if name not in _RESET_OPTIONS:
+            raise ConfigurationError(one_of("option of reset", name, list(_RESET_OPTIONS)))
+    start = options["start"]
+    try:
+        time = float(start)
+    except (TypeError, ValueError):
+        time = math.nan
+    if not 0.0 <= time < math.inf:
+        raise ConfigurationError(f"start is {start} s; it must be 0 or later")
+    return time
 
 
 def _check(duration: float, ticks_per_step: int, simulator: Mapping[str, object]) -> None:

@@ -58,10 +58,24 @@ class Tick:
 
 
 class StateHash:
-    """A hash over every tick's state, its doubles bit for bit."""
+    """A hash over every tick's state, its doubles bit for bit.
 
-    def __init__(self) -> None:
-        self._hash = hashlib.sha256()
+    A copy goes on from the same states. A pickled one begins anew with the hash so far: what
+    SHA-256 remembers cannot be sent to another process.
+    """
+
+    def __init__(self, before: str = "") -> None:
+        """Begin; `before` is the hash of states that are known by nothing else."""
+        self._hash = hashlib.sha256(before.encode())
+
+    def __reduce__(self) -> tuple[type["StateHash"], tuple[str]]:
+        return StateHash, (self.hexdigest(),)
+
+    def copy(self) -> "StateHash":
+        """Another one, of the same states so far."""
+        other = StateHash()
+        other._hash = self._hash.copy()
+        return other
 
     def add(self, state: StampedState) -> None:
         """Add a state: stamp, position and velocity."""

@@ -67,6 +67,15 @@ class WrenchQueue:
         self._pushes = [p for p in self._pushes if tick < p.first_tick + p.ticks]
         return [push for push in self._pushes if push.acts_at(tick)]
 
+    @property
+    def pushes(self) -> tuple[ExternalWrench, ...]:
+        """Those that wait or act."""
+        return tuple(self._pushes)
+
+    def replace(self, pushes: Sequence[ExternalWrench]) -> None:
+        """Have these pushes, of a queue of the same character, and no others."""
+        self._pushes = list(pushes)
+
     def clear(self) -> None:
         """Forget all."""
         self._pushes.clear()

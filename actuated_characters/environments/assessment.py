@@ -1,0 +1,78 @@
+"""What an environment makes of a state: an observation, a reward, and whether the motion is lost.
+
+The reward is that of DeepMimic (Peng et al. 2018, "DeepMimic", section 5), where the weight of the
+end effectors, which it leaves out, goes to the centre of mass:
+`0.65 exp(-2 sum |q_d - q|^2) + 0.1 exp(-0.1 sum |v_d - v|^2) + 0.25 exp(-10 |c_d - c|^2)`, the sums
+over joints, c the centre of mass, d of the desired state at the new state's time.
+"""
+
+import math
+
+import numpy as np
+
+from actuated_characters.metrics.error_measures import is_lost
+from controller_node.references.base import ReferenceState
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.model import Character
+from msgs_config.geometry import fixed_order, frames
+from msgs_config.messages.state import StampedState
+
+_DOWN = (0.0, 0.0, -1.0)
+_BASE = 6  # entries of a floating base
+_OF_BASE = 10  # numbers in an observation: height, gravity, velocity, angular velocity
+
+
+class Assessment:
+    """Observations (k,) and rewards of one character's states, by a model of its dynamics."""
+
+    def __init__(self, character: Character, model: DynamicsModel) -> None:
+        """The model is in another state after each call."""
+        self._model = model
+        self._floats = character.layout.has_floating_base
+        self._joints = slice(_BASE if self._floats else 0, None)
+        size = character.layout.size
+        joints = size - (_BASE if self._floats else 0)
+        self._parts = np.cumsum([_OF_BASE * self._floats, joints, joints, size, size]).tolist()
+
+    @property
+    def size(self) -> int:
+        """How many numbers an observation has."""
+        return int(self._parts[-1])
+
+    def observation(self, state: StampedState, ahead: ReferenceState) -> FloatArray:
+        """The observation (k,) of a state, with the desired state that lies ahead."""
+        base, position, velocity, error, _ = self._parts
+        seen = np.empty(self.size)
+        if self._floats:
+            axes = frames.axes(frames.quaternion(state.position[3:_BASE].tolist()))
+            linear, angular = np.split(state.velocity[:_BASE], 2)
+            seen[0] = state.position[2]
+            seen[1:4] = frames.to_child(axes, _DOWN)
+            seen[4:7] = frames.to_child(axes, linear.tolist())
+            seen[7:base] = angular
+        seen[base:position] = state.position[self._joints]
+        seen[position:velocity] = state.velocity[self._joints]
+        seen[velocity:error] = self._error(state, ahead)
+        seen[error:] = ahead.velocity
+        return seen
+
+    def reward(self, state: StampedState, desired: ReferenceState) -> tuple[float, bool]:
+        """The reward of a state, 0 to 1, and whether the motion is lost."""
+        turn = self._error(state, desired)[self._joints]
+        spin = (desired.velocity - state.velocity)[self._joints]
+        centre = self._model.centre_of_mass_at(state.position)
+        wanted = self._model.centre_of_mass_at(desired.configuration.position)
+        pose = 0.65 * math.exp(-2.0 * float(fixed_order.dot(turn, turn)))
+        speed = 0.1 * math.exp(-0.1 * float(fixed_order.dot(spin, spin)))
+        away = wanted - centre
+        place = 0.25 * math.exp(-10.0 * float(fixed_order.dot(away, away)))
+        return pose + speed + place, self._is_over(centre, wanted)
+
+    def _is_over(self, centre: FloatArray, wanted: FloatArray) -> bool:
+        """Whether the centre of mass (3,), m, is where an episode ends; never on a fixed base."""
+        return self._floats and is_lost(centre, wanted)
+
+    def _error(self, state: StampedState, desired: ReferenceState) -> FloatArray:
+        """The error (n,) from a state to a desired one: `JointLayout.difference`."""
+        return self._model.compute_error(state.position, desired.configuration.position)
