@@ -1,20 +1,20 @@
 """`viewer`: shows characters in a browser; subscribes like any other node, and delays none."""
 
 import time
-from collections import deque
 from collections.abc import Mapping
-from queue import SimpleQueue
 from typing import Any
 
 from rclpy.node import Node
 
-from actuated_characters.viewer.controls.hands import Action, Hands
+from actuated_characters.viewer.controls.actions import ActionQueue
+from actuated_characters.viewer.controls.hands import Hands
 from actuated_characters.viewer.controls.panel import Panel, Subject
 from actuated_characters.viewer.controls.shown_parameters import Shown, shown_parameters
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
 from actuated_characters.viewer.parameters import PARAMETERS
 from actuated_characters.viewer.simulators import Simulators, Watched
+from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.request_check import RequestCheck
 from actuated_characters.viewer.web.server import (
     describe_address,
@@ -35,7 +35,6 @@ _FIRST_SEARCH_PERIOD = 0.2  # s, while none is known
 _IDLE_PERIOD = 0.1  # s between looks for clients
 _LEAST_REST = 0.003  # s a picture, for the threads that send it
 _LEAF = "character"  # below a namespace's name in the scene, where there may be other namespaces
-_MOST_REJECTIONS = 100  # between looks
 
 
 class ViewerNode(Node):
@@ -53,11 +52,11 @@ class ViewerNode(Node):
         self._period = 1.0 / values.number("fps")
         self._once_logger = OnceLogger(self)
         host = values.text("host")
-        self._rejections: deque[str] = deque(maxlen=_MOST_REJECTIONS)
+        self._rejections = Rejections()
         listening = open_socket(host, values.integer("port") or None)
-        self._server = start_server(listening, RequestCheck(host), self._rejections.append)
+        self._server = start_server(listening, RequestCheck(host), self._rejections.note)
         self._scene = BrowserScene(self._server)
-        self._actions: SimpleQueue[Action] = SimpleQueue()
+        self._actions = ActionQueue()
         self._hands = Hands(self, self._scene, self._actions)
         self._panel = Panel(self, self._server.gui, self._scene, self._hands, self._actions)
         self._simulators = Simulators(self, self.get_namespace().rstrip("/"), self._log)
@@ -98,16 +97,15 @@ class ViewerNode(Node):
         self._simulators.look()
         for watched in self._simulators.gone():
             self._remove(watched.below)
-        for reason in self._take_rejections():
-            self._log(f"rejected a request: {reason}")
+        for sentence in self._rejections.take():
+            self.get_logger().warning(sentence)
 
     def _update(self, *, is_watched: bool, seconds: float) -> None:
         """Bring the scene to the newest states; `seconds` since the last call."""
         for watched in self._simulators.changed():
             self._rebuild(watched)
         self._simulators.watch(watches=is_watched)
-        for _ in range(self._actions.qsize()):
-            self._actions.get()()
+        self._actions.run()
         self._show_panel()
         if not is_watched:
             return
@@ -179,10 +177,3 @@ class ViewerNode(Node):
 
     def _log(self, sentence: str) -> None:
         self._once_logger.log_once(sentence)
-
-    def _take_rejections(self) -> list[str]:
-        """What was rejected since the last call; noted in the server's thread."""
-        taken = []
-        while self._rejections:
-            taken.append(self._rejections.popleft())
-        return taken

@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from queue import SimpleQueue
 from typing import Any, Literal
 
 import viser
@@ -18,7 +17,7 @@ from geometry_msgs.msg import Twist
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from actuated_characters.viewer.controls.hands import Action
+from actuated_characters.viewer.controls.actions import ActionQueue
 from msgs_config.messages import topics
 
 _WALK, _RUN, _BACK, _TURN = 1.0, 2.2, -0.4, 0.8  # m/s and rad/s, by keys
@@ -99,7 +98,7 @@ class DrivingInput:
 class DrivingControls:
     """A folder of the panel; hidden where no controller takes velocities."""
 
-    def __init__(self, node: Node, gui: viser.GuiApi, actions: "SimpleQueue[Action]") -> None:
+    def __init__(self, node: Node, gui: viser.GuiApi, actions: ActionQueue) -> None:
         self._node, self._gui, self._actions = node, gui, actions
         self._below: str | None = None  # the namespace of the character that is driven, if any
         self._publisher: Publisher | None = None  # of its topic

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import viser
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
+from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.touch import STIFFNESS, Drag, aim_throw, spring_force
 from actuated_characters.viewer.drawing.drawn_character import Bind
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
@@ -22,9 +22,6 @@ from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.topics import Topic
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 
-Action = Callable[[], None]
-"""Something that a client did, for the node's own thread."""
-
 _SPRING = (230, 60, 20)
 _GRAVITY, _WRENCH_DURATION = 9.81, 0.1  # what simulators have by default
 
@@ -32,7 +29,7 @@ _GRAVITY, _WRENCH_DURATION = 9.81, 0.1  # what simulators have by default
 class Hands:
     """Drags and throws of all clients. Its methods are for the node's thread."""
 
-    def __init__(self, node: Node, scene: BrowserScene, actions: "SimpleQueue[Action]") -> None:
+    def __init__(self, node: Node, scene: BrowserScene, actions: ActionQueue) -> None:
         self.stiffness = STIFFNESS  # N/m
         self.ball_mass, self.ball_speed = 2.0, 8.0  # kg, m/s
         self.wrench_durations: dict[str, float] = {}

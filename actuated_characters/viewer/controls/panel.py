@@ -4,15 +4,15 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from queue import SimpleQueue
 from typing import Any
 
 import viser
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
+from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.drive import DrivingControls
-from actuated_characters.viewer.controls.hands import Action, Hands
+from actuated_characters.viewer.controls.hands import Hands
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.controls.parameter_controls import ParameterControls
 from actuated_characters.viewer.controls.requests import Requests
@@ -49,7 +49,7 @@ class Panel:
         gui: viser.GuiApi,
         scene: BrowserScene,
         hands: Hands,
-        actions: "SimpleQueue[Action]",
+        actions: ActionQueue,
     ) -> None:
         self._gui, self._scene, self._hands, self._actions = gui, scene, hands, actions
         self.requests = Requests(node)

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from queue import SimpleQueue
 from typing import Any, Protocol
 
 import viser
 
+from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.drawing.drawn_character import SHOWN
 from actuated_characters.viewer.drawing.scene import BrowserScene
@@ -17,8 +17,6 @@ _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _PLAY, _PAUSE, _BACK, _NEXT, _START = "Play", "Pause", "-1", "+1", "Start"
 _PNG, _MP4, _CANCEL = "PNG", "MP4", "Cancel"
 _OF_SCENE = {name: label for name, label in SHOWN.items() if name != "reference"}
-
-Action = Callable[[], None]
 
 
 class Shown(Protocol):
@@ -45,7 +43,7 @@ class RecordedPanel:
         gui: viser.GuiApi,
         scene: BrowserScene,
         timeline: Timeline,
-        actions: "SimpleQueue[Action]",
+        actions: ActionQueue,
         shown: Shown,
     ) -> None:
         self._gui, self._scene, self._timeline = gui, scene, timeline

@@ -12,6 +12,7 @@ from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.video import write_video
 from actuated_characters.viewer.drawing.scene import BACKGROUND
+from actuated_characters.viewer.web.server import ViewerServer
 from actuated_characters.whole_files import write_whole
 from msgs_config.errors import RecordingError
 
@@ -34,10 +35,17 @@ def take_picture(client: viser.ClientHandle, size: Size) -> Picture:
         RecordingError: the browser has gone, or does not respond.
     """
     width, height = size
+    server = client._viser_server
+    assert isinstance(server, ViewerServer)
     try:
-        drawn = client.get_render(height, width, transport_format="png", timeout=_PATIENCE)
+        with server.awaiting_picture(client):
+            drawn = client.get_render(height, width, transport_format="png", timeout=_PATIENCE)
     except (RuntimeError, TimeoutError) as error:
         raise RecordingError(f"the browser has sent no picture: {error}") from error
+    if drawn.shape != (height, width, 4):
+        raise RecordingError(
+            f"the browser has sent a picture of shape {drawn.shape}, not {(height, width, 4)}"
+        )
     opacity = drawn[..., 3:].astype(np.float64) / 255.0
     mixed = opacity * drawn[..., :3] + (1.0 - opacity) * np.array(BACKGROUND)
     picture: Picture = np.round(mixed).astype(np.uint8)

@@ -1,6 +1,5 @@
 """Opens the page of a recorded run."""
 
-from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,11 +7,10 @@ from rich.console import Console
 
 from actuated_characters.viewer.recorded.player import RecordedPlayer
 from actuated_characters.viewer.recorded.run import check_comparable, read_run
+from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.request_check import RequestCheck
 from actuated_characters.viewer.web.server import describe_address, open_socket, start_server
 from actuated_characters.viewer.web.server import stop_server as stop
-
-_MOST_REJECTIONS = 100  # between two pictures
 
 
 def show_recorded(
@@ -29,9 +27,9 @@ def show_recorded(
         beside = [read_run(other) for other in others]
     for other in beside:
         check_comparable(run, other)
-    rejections: deque[str] = deque(maxlen=_MOST_REJECTIONS)
+    rejections = Rejections()
     listening = open_socket(host, port)
-    server = start_server(listening, RequestCheck(host), rejections.append)
+    server = start_server(listening, RequestCheck(host), rejections.note)
     try:
         player = RecordedPlayer(server, run, beside)
         for line in describe_address(host, listening.getsockname()[1]):

@@ -1,16 +1,15 @@
 """Shows a recorded run in a browser: no node, for nothing of it is on topics."""
 
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from queue import SimpleQueue
 
 import viser
 
+from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
-from actuated_characters.viewer.recorded.controls import REFERENCE, Action, RecordedPanel
+from actuated_characters.viewer.recorded.controls import REFERENCE, RecordedPanel
 from actuated_characters.viewer.recorded.export import (
     FPS,
     CancelledError,
@@ -22,6 +21,7 @@ from actuated_characters.viewer.recorded.forking import Fork
 from actuated_characters.viewer.recorded.plots import Plots, curves
 from actuated_characters.viewer.recorded.run import RecordedRun, check_comparable, read_run
 from actuated_characters.viewer.recorded.timeline import Timeline, frame_times
+from actuated_characters.viewer.web.rejections import Rejections
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
 
@@ -38,7 +38,7 @@ class RecordedPlayer:
         self._server, self._run = server, run
         self._ghosts = {_name(other, run): other for other in others}
         self._timeline = Timeline(run.times)
-        self._actions: SimpleQueue[Action] = SimpleQueue()
+        self._actions = ActionQueue()
         self._scene = BrowserScene(server)
         self._drawn = [
             DrawnCharacter(
@@ -61,19 +61,18 @@ class RecordedPlayer:
         self._plotted = ""
         self._fork: Fork | None = None
 
-    def play(self, fps: float, rejections: "deque[str]") -> None:
-        """Show it until an interruption; `rejections` are of requests, to be printed."""
+    def play(self, fps: float, rejections: Rejections) -> None:
+        """Show it until an interruption, and print what is rejected."""
         before = time.monotonic()
         try:
             while True:
                 now = time.monotonic()
-                for _ in range(self._actions.qsize()):
-                    self._actions.get()()
+                self._actions.run()
                 self._timeline.advance(now - before)
                 self._draw(now - before)
                 self._look_at_fork()
-                while rejections:
-                    print(f"rejected a request: {rejections.popleft()}", flush=True)
+                for sentence in rejections.take():
+                    print(sentence, flush=True)
                 before = now
                 time.sleep(max(1.0 / fps - (time.monotonic() - now), _LEAST_REST))
         finally:

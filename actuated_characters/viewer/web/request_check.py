@@ -2,18 +2,21 @@
 
 A browser lets any page open a websocket to this machine, and names the page in the header `Origin`.
 A page whose own name was made to resolve to this machine (DNS rebinding) has the right origin, but
-its name in the header `Host`.
+its name in the header `Host`. And viser's page takes scene and scripts from wherever its own
+address says (`?websocket=`, `?playbackPath=`), to which a page from elsewhere can lead a browser.
 """
 
 import socket
 from collections.abc import Sequence
 from ipaddress import ip_address
-from urllib.parse import urlsplit
+from urllib.parse import parse_qsl, urlsplit
 
 LOOPBACK = "127.0.0.1"
 
 _LOCAL = "localhost"
 _SCHEMES = ("http", "https")
+_SOURCES = ("websocket", "playbackPath")  # that viser's page takes from its address
+_SCHEMES_OF_SOURCES = ("http", "https", "ws", "wss")
 _LONGEST = 100  # characters of a header that a line shows
 
 
@@ -41,6 +44,17 @@ class RequestCheck:
             return f"it comes from a page of {_shown(origins)}, not of this server"
         return None
 
+    def find_target_fault(self, target: str, host: str) -> str | None:
+        """The reason to reject a request's target, path and query, None if there is none.
+
+        `host` is its header `Host`, which was found to be this server's.
+        """
+        query = target.partition("?")[2]
+        for name, source in parse_qsl(query, keep_blank_values=True):
+            if name in _SOURCES and not _leads_to(source, host):
+                return f"its {name} is {_shown([source])}, not this server"
+        return None
+
     def _is_own(self, host: str) -> bool:
         name = _name(host)
         if name is None or name in self._names:
@@ -64,6 +78,12 @@ def _is_of(origin: str, host: str) -> bool:
     """Whether a page's origin is the server that the header `Host` names, its port included."""
     scheme, separator, place = origin.partition("://")
     return scheme in _SCHEMES and bool(separator) and place.lower() == host.lower()
+
+
+def _leads_to(source: str, host: str) -> bool:
+    """Whether an address is one of a host, whole and plain: browsers read others in many ways."""
+    place = f"{source.lower()}/"
+    return any(place.startswith(f"{each}://{host.lower()}/") for each in _SCHEMES_OF_SOURCES)
 
 
 def _name(host: str) -> str | None:

@@ -1,35 +1,31 @@
-"""The viewer's web server: viser's, on one socket, behind a check of each request.
+"""The viewer's web server: viser's, on one socket, behind a check of each request and message.
 
-viser has no hook for such a check. It makes its server by `websockets.asyncio.server.serve`, which
+viser has no hook for such checks. It makes its server by `websockets.asyncio.server.serve`, which
 here, while viser starts, is one that checks, and that has a socket which is bound already.
 """
 
+import asyncio
 import io
 import os
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
-from http import HTTPStatus
 from typing import Any
 
 import viser
 import websockets.asyncio.server
-from websockets.asyncio.server import ServerConnection
-from websockets.http11 import Request, Response
+from websockets.exceptions import ConnectionClosed
 
+from actuated_characters.viewer.web.connection import CheckedConnection, Reject
+from actuated_characters.viewer.web.gate import ServerGate
+from actuated_characters.viewer.web.message_check import MessageCheck
 from actuated_characters.viewer.web.request_check import RequestCheck, is_loopback
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, RecordingError
 
 FIRST_PORT = 8080
 
 _PORTS = 100  # that are tried
-_NOT_FRAMED = {  # a page from elsewhere must not show this one within itself either
-    "X-Frame-Options": "DENY",
-    "Content-Security-Policy": "frame-ancestors 'none'",
-}
-
-Reject = Callable[[str], None]
-"""Is told, in the server's thread, why a request was rejected."""
+_PATIENCE = 10.0  # s for a page to respond to a ping
 
 
 class ViewerServer(viser.ViserServer):
@@ -39,6 +35,29 @@ class ViewerServer(viser.ViserServer):
         """Do nothing: viser would let others in through a server of its makers'."""
         del verbose
         return None
+
+    @contextmanager
+    def awaiting_picture(self, client: viser.ClientHandle) -> Iterator[None]:
+        """Have a client's page send a picture, which is larger than any other message.
+
+        Raises:
+            RecordingError: the page has gone, or does not respond.
+        """
+        connection = self._websock_server._live_connections.get(client.client_id)
+        if not isinstance(connection, CheckedConnection):
+            raise RecordingError("the browser has gone")
+        self._await_picture(connection, awaits=True)
+        try:
+            yield
+        finally:
+            self._await_picture(connection, awaits=False)
+
+    def _await_picture(self, connection: CheckedConnection, *, awaits: bool) -> None:
+        awaiting = connection.await_picture(awaits=awaits)
+        try:
+            asyncio.run_coroutine_threadsafe(awaiting, self._event_loop).result(_PATIENCE)
+        except (ConnectionClosed, TimeoutError) as error:
+            raise RecordingError(f"the browser does not respond: {error}") from error
 
 
 def open_socket(host: str, port: int | None) -> socket.socket:
@@ -82,14 +101,20 @@ def start_server(listening: socket.socket, check: RequestCheck, reject: Reject) 
     Raises:
         ConfigurationError: the installed viser starts its server in a way that cannot be checked.
     """
-    with _checked_serve(listening, check, reject) as used, redirect_stdout(io.StringIO()):
+    gate = ServerGate(check, reject)
+    unchecked = ConfigurationError(
+        f"viser {viser.__version__} starts its server in a way in which requests cannot be "
+        "checked; install viser 1.1"
+    )
+    if not viser.__version__.startswith("1.1."):
+        raise unchecked
+    with _guarded_serve(listening, gate) as used, redirect_stdout(io.StringIO()):
         server = ViewerServer(verbose=False)
     if not used:
         server.stop()
-        raise ConfigurationError(
-            f"viser {viser.__version__} starts its server in a way in which requests cannot be "
-            "checked; install viser 1.1"
-        )
+        raise unchecked
+    server._event_loop.set_exception_handler(gate.handle_error)
+    gate.open(MessageCheck(server))
     return server
 
 
@@ -100,33 +125,19 @@ def stop_server(server: ViewerServer) -> None:
 
 
 @contextmanager
-def _checked_serve(
-    listening: socket.socket, check: RequestCheck, reject: Reject
-) -> Iterator[list[bool]]:
-    """Have `serve` check requests; yields a list that is not empty once it was called."""
+def _guarded_serve(listening: socket.socket, gate: ServerGate) -> Iterator[list[bool]]:
+    """Have `serve` use a gate; yields a list that is not empty once it was called."""
     serve = websockets.asyncio.server.serve
     used: list[bool] = []
 
-    def checked(
+    def guarded(
         handler: Any, host: object, port: object, *, process_request: Any, **options: Any
     ) -> Any:
         del host, port
         used.append(True)
+        return serve(handler, sock=listening, **{**options, **gate.options(process_request)})
 
-        def process(connection: ServerConnection, request: Request) -> Response | None:
-            headers = request.headers
-            fault = check.find_fault(headers.get_all("Host"), headers.get_all("Origin"))
-            if fault is not None:
-                reject(fault)
-                return connection.respond(HTTPStatus.FORBIDDEN, f"rejected: {fault}\n")
-            response: Response | None = process_request(connection, request)
-            if response is not None:
-                response.headers.update(_NOT_FRAMED)
-            return response
-
-        return serve(handler, sock=listening, process_request=process, **options)
-
-    websockets.asyncio.server.serve = checked  # type: ignore[assignment,misc]
+    websockets.asyncio.server.serve = guarded  # type: ignore[assignment,misc]
     try:
         yield used
     finally:

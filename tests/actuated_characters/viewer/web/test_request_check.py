@@ -106,3 +106,51 @@ def test_who_opens_it_to_the_network_may_use_addresses_and_the_machines_names(
 )
 def test_addresses_that_others_can_reach_are_told_apart(host: str, only_here: bool) -> None:
     assert is_loopback(host) is only_here
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "websocket=ws://evil.example",
+        "websocket=wss://evil.example/",
+        "websocket=//evil.example",
+        "websocket=///evil.example",
+        "websocket=ws:evil.example",
+        "websocket=",
+        "websocket",
+        "websocket=ws://localhost:8081",
+        "websocket=ws://localhost:8080.evil.example",
+        "websocket=ws://localhost:8080@evil.example",
+        "websocket=ws://localhost:8080%40evil.example",
+        "websocket=ws://localhost:8080%5C@evil.example",
+        "websocket=%20ws://evil.example",
+        "websocket=ws%3A%2F%2Fevil.example",
+        "%77ebsocket=ws://evil.example",
+        "web%73ocket=ws://evil.example",
+        "darkMode&websocket=ws://evil.example",
+        "websocket=ws://localhost:8080&websocket=ws://evil.example",
+        "playbackPath=https://evil.example/scene.viser",
+        "playbackPath=data:application/octet-stream;base64,AAAA",
+        "playback%50ath=//evil.example/scene.viser",
+    ],
+)
+def test_an_address_that_leads_the_page_to_another_server_is_refused(query: str) -> None:
+    fault = RequestCheck("127.0.0.1").find_target_fault(f"/?{query}", "localhost:8080")
+
+    assert fault is not None
+    assert "\n" not in fault
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "/",
+        "/index.html?darkMode",
+        "/?websocket=ws://localhost:8080",
+        "/?websocket=ws%3A%2F%2FLocalhost%3A8080%2F",
+        "/?initialCameraPosition=1,2,3&showStats",
+        "/websocket=ws://evil.example",
+    ],
+)
+def test_an_address_that_leads_to_this_server_is_taken(target: str) -> None:
+    assert RequestCheck("127.0.0.1").find_target_fault(target, "localhost:8080") is None

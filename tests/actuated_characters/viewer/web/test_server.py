@@ -102,9 +102,105 @@ def test_the_page_is_served_and_none_may_frame_it(running: Running) -> None:
     page = running.get("/", f"localhost:{running.port}")
 
     assert page.status == HTTPStatus.OK
-    assert page.getheader("Content-Security-Policy") == "frame-ancestors 'none'"
     assert page.getheader("X-Frame-Options") == "DENY"
     assert b"<html" in page.read()
+
+
+@pytest.mark.parametrize("path", ["/", "/missing", "/?websocket=ws://evil.example"])
+def test_each_response_lets_the_page_speak_with_its_own_server_alone(
+    running: Running, path: str
+) -> None:
+    response = running.get(path, f"localhost:{running.port}")
+
+    given = (response.getheader("Content-Security-Policy") or "").split("; ")
+    policy = {name: sources for name, _, sources in (each.partition(" ") for each in given)}
+    assert policy["default-src"] == policy["base-uri"] == policy["form-action"] == "'none'"
+    assert policy["frame-ancestors"] == "'none'"
+    assert policy["connect-src"] == "'self' data: blob:"
+    own = {"'self'", "'none'", "'unsafe-inline'", "'wasm-unsafe-eval'", "data:", "blob:"}
+    assert {source for sources in policy.values() for source in sources.split()} <= own
+    assert response.getheader("X-Content-Type-Options") == "nosniff"
+    assert response.getheader("Referrer-Policy") == "no-referrer"
+    assert response.getheader("Cross-Origin-Resource-Policy") == "same-origin"
+    assert response.getheader("Cross-Origin-Opener-Policy") == "same-origin"
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("/" + 300 * "a", HTTPStatus.NOT_FOUND),
+        ("/" + 2000 * "a/", HTTPStatus.REQUEST_URI_TOO_LONG),
+        ("/" + 1000 * "%41", HTTPStatus.REQUEST_URI_TOO_LONG),
+        ("/" + 200 * "a/", HTTPStatus.NOT_FOUND),
+        ("/%00", HTTPStatus.NOT_FOUND),
+        ("/%ff%fe", HTTPStatus.NOT_FOUND),
+        ("/" + 120 * "%F0%9F%98%80" + "/x", HTTPStatus.NOT_FOUND),
+        ("/../../etc/passwd", HTTPStatus.NOT_FOUND),
+    ],
+)
+def test_a_path_of_no_page_is_said_to_be_none(
+    running: Running, path: str, status: HTTPStatus
+) -> None:
+    assert running.get(path, f"localhost:{running.port}").status == status
+
+
+def test_a_request_line_beyond_all_bounds_ends_its_connection_alone(running: Running) -> None:
+    with socket.create_connection(("127.0.0.1", running.port), timeout=10.0) as connection:
+        connection.sendall(b"GET /" + 20_000 * b"a" + b" HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        assert b" 500 " not in connection.recv(100)
+    assert running.open(None)
+
+
+@pytest.mark.parametrize("header", ["Upgrade", "Accept-Encoding"])
+def test_a_header_that_is_given_twice_is_no_error_of_the_server(
+    running: Running, header: str
+) -> None:
+    with socket.create_connection(("127.0.0.1", running.port), timeout=10.0) as connection:
+        lines = f"GET / HTTP/1.1\r\nHost: localhost:{running.port}\r\n" + 2 * f"{header}: x\r\n"
+        connection.sendall(f"{lines}\r\n".encode())
+        assert connection.recv(100).startswith(b"HTTP/1.1 400 ")
+
+
+def test_a_page_that_comes_before_viser_is_whole_waits(running: Running) -> None:
+    listening = open_socket("127.0.0.1", 0)
+    rejected: list[str] = []
+    seen = Running(running.server, listening.getsockname()[1], rejected)
+    statuses: list[int] = []
+
+    class ComesEarly(ViewerServer):
+        """A viser that a page asks while it is made: after its server listens, before its scene."""
+
+        def request(self) -> None:
+            page = seen.get("/", f"localhost:{seen.port}")
+            assert page.getheader("Refresh") == "1"
+            statuses.append(page.status)
+            with pytest.raises(InvalidStatus) as refused:
+                connect(f"ws://127.0.0.1:{seen.port}", subprotocols=[PROTOCOL])  # type: ignore[list-item]
+            statuses.append(refused.value.response.status_code)
+
+        def __setattr__(self, name: str, value: object) -> None:
+            if name == "_event_loop":
+                self.request()
+            super().__setattr__(name, value)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(server_module, "ViewerServer", ComesEarly)
+        server = start_server(listening, RequestCheck("127.0.0.1"), rejected.append)
+    try:
+        assert statuses == [HTTPStatus.SERVICE_UNAVAILABLE, HTTPStatus.SERVICE_UNAVAILABLE]
+        assert seen.open(None)
+        assert not rejected
+    finally:
+        stop_server(server)
+
+
+def test_a_client_of_another_version_of_viser_is_told_so(
+    running: Running, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(InvalidStatus) as refused:
+        connect(f"ws://127.0.0.1:{running.port}")
+    assert refused.value.response.status_code == HTTPStatus.BAD_REQUEST
+    assert capfd.readouterr() == ("", "")
 
 
 def test_nothing_listens_on_another_address(running: Running) -> None:
@@ -160,6 +256,17 @@ def test_a_viser_that_makes_its_server_otherwise_is_not_used(
     with (
         open_socket("127.0.0.1", 0) as listening,
         pytest.raises(ConfigurationError, match="cannot be checked"),
+    ):
+        start_server(listening, RequestCheck("127.0.0.1"), lambda fault: None)
+
+
+def test_another_viser_than_the_one_whose_insides_are_known_is_not_used(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(viser, "__version__", "1.2.0")
+    with (
+        open_socket("127.0.0.1", 0) as listening,
+        pytest.raises(ConfigurationError, match=r"viser 1\.2\.0 .*; install viser 1\.1"),
     ):
         start_server(listening, RequestCheck("127.0.0.1"), lambda fault: None)
 

@@ -1,0 +1,29 @@
+"""What the viewer's server has rejected, from its thread to the one that tells the user."""
+
+from collections import deque
+
+_MOST_WAITING = 100  # sentences between two looks
+_MOST_TOLD = 100  # different sentences: a hostile sender must not fill memory and log
+_LONGEST = 300  # characters
+
+
+class Rejections:
+    """Sentences, each told once."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[str] = deque(maxlen=_MOST_WAITING)
+        self._told: set[str] = set()
+        self.note = self._waiting.append
+        """Notes a sentence; for any thread."""
+
+    def take(self) -> list[str]:
+        """The sentences since the last call that were not told before."""
+        new = []
+        while self._waiting and len(self._told) <= _MOST_TOLD:
+            sentence = self._waiting.popleft()[:_LONGEST]
+            if len(self._told) == _MOST_TOLD:
+                sentence = f"more than {_MOST_TOLD} different rejections; further ones are not told"
+            if sentence not in self._told:
+                self._told.add(sentence)
+                new.append(sentence)
+        return new
