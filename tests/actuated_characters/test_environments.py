@@ -1,10 +1,12 @@
 """The Gymnasium environment: its library's own checker, our states, and when an episode ends."""
 
 import math
+import os
 import timeit
 import warnings
 from pathlib import Path
 from time import process_time
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -298,10 +300,12 @@ def test_an_episode_is_truncated_after_its_duration_and_may_begin_anywhere() -> 
 
 def test_the_page_works() -> None:
     page = (Path(__file__).parents[2] / "docs" / "python.md").read_text("utf-8")
-    (code,) = [part for part in page.split("```") if "import gymnasium" in part]
-    names: dict[str, float] = {}
-    exec(code.removeprefix("python"), names)
+    one, several = [part for part in page.split("```") if "import gymnasium" in part]
+    names: dict[str, Any] = {"__name__": "__main__"}
+    exec(one.removeprefix("python"), names)
     assert 0.0 <= names["reward"] <= 1.0
+    exec(several.removeprefix("python"), names)
+    assert names["rewards"].shape == (os.cpu_count(),)
 
 
 def test_what_diverges_ends_with_a_finite_observation() -> None:
