@@ -7,7 +7,6 @@ import numpy as np
 from actuated_characters.render.engine.camera_pose import CameraPose, Size, framing
 from actuated_characters.render.engine.posed_characters import PosedCharacters
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
-from actuated_characters.render.stills import check_size
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from sim_node.physics.world import WorldSettings
@@ -26,10 +25,8 @@ class FollowingCamera:
         """Start the engine; the view is so wide that all of some positions (n,) fit into it.
 
         Raises:
-            ConfigurationError: the size is not sensible.
             CharacterError: a file of the character or of the terrain cannot be drawn.
         """
-        check_size(size, 1)
         self._size = size
         self._posed = PosedCharacters([character])
         self._first = np.array(positions[:1])

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import gymnasium
 import numpy as np
@@ -20,7 +20,6 @@ from actuated_characters.environments.actions import (
     check_action,
 )
 from actuated_characters.environments.assessment import Assessment
-from actuated_characters.environments.camera import FollowingCamera
 from actuated_characters.environments.motion import EpisodeMotion
 from actuated_characters.environments.options import controller_values, with_shared
 from actuated_characters.render.engine.camera_pose import Size
@@ -36,6 +35,9 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import collides, placed
+
+if TYPE_CHECKING:
+    from actuated_characters.environments.camera import FollowingCamera
 
 _NONE: Mapping[str, object] = MappingProxyType({})
 _RESET_OPTIONS = ("start",)
@@ -107,10 +109,8 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         """
         check_action(action)
         _check(duration, ticks_per_step, simulator)
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ConfigurationError(
-                one_of("render_mode", render_mode, self.metadata["render_modes"])
-            )
+        if render_mode is not None:
+            _check_drawing(render_mode, render_size)
         simulator, given = with_shared(simulator, controller, reference)
         self._character = placed(load_character(character, collides(simulator)), simulator)
         values = controller_values(self._character, given)
@@ -222,13 +222,14 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         """A picture (h, w, 3), red, green, blue; None, with a warning, without a render mode.
 
         Raises:
-            ConfigurationError: the size is not sensible.
             CharacterError: a file of the character cannot be drawn.
         """
         if self.render_mode is None:
             gymnasium.logger.warn("render has nothing to do: make it with render_mode='rgb_array'")
             return None
         if self._camera is None:
+            from actuated_characters.environments.camera import FollowingCamera
+
             ticks = round(min(self._duration, _TIME_IN_VIEW) * self._simulation.rate_hz)
             shown = np.linspace(0, ticks, _POSES_IN_VIEW).astype(int).tolist()
             self._camera = FollowingCamera(
@@ -287,6 +288,15 @@ def _start_of(options: Mapping[str, Any]) -> float:
     if not 0.0 <= time < math.inf:
         raise ConfigurationError(f"start is {start} s; it must be 0 or later")
     return time
+
+
+def _check_drawing(mode: str, size: Size) -> None:
+    """Raise ConfigurationError if there is no such mode, or the size is not sensible."""
+    from actuated_characters.render.stills import check_size
+
+    if mode not in TrackEnv.metadata["render_modes"]:
+        raise ConfigurationError(one_of("render_mode", mode, TrackEnv.metadata["render_modes"]))
+    check_size(size, 1)
 
 
 def _check(duration: float, ticks_per_step: int, simulator: Mapping[str, object]) -> None:

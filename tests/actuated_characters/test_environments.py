@@ -4,6 +4,7 @@ import math
 import os
 import timeit
 import warnings
+from functools import lru_cache
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -19,6 +20,7 @@ from actuated_characters.environments.track import TrackEnv
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
+from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 from msgs_config.messages.clock import TickClock
@@ -36,17 +38,21 @@ def make(**options: object) -> TrackEnv:
     return environment
 
 
+@lru_cache
+def walk() -> Reference:
+    return ac.Controller(ac.load_character("humanoid"), clip="walk").reference
+
+
 def reference_angles(environment: TrackEnv, ticks: int) -> FloatArray:
     """The reference's joint positions, so many ticks after the present state."""
     time = CLOCK.time_after(environment.simulation.ticks + ticks)
-    reference = ac.Controller(ac.load_character("humanoid"), clip="walk").reference
-    return reference.sample(time).configuration.position[6:]
+    return walk().sample(time).configuration.position[6:]
 
 
 def hash_of_run(ticks: int, **controller: object) -> str:
     """The hash of a run of the walk without assistance, in one process."""
-    walk: dict[str, object] = {"reference": "clip", "clip": "walk"}
-    plan = make_plan("humanoid", ticks / 240, walk, {}, {**UNAIDED, **controller})
+    reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
+    plan = make_plan("humanoid", ticks / 240, reference, {}, {**UNAIDED, **controller})
     states = StateHash()
     for number, tick in enumerate(ticks_in_process(plan)):
         if not number:
@@ -59,9 +65,9 @@ def hash_of_run(ticks: int, **controller: object) -> str:
     "options",
     [
         {"clip": "walk"},
-        {"clip": "run", "render_mode": "rgb_array", "random_start": True},
+        {"clip": "run", "random_start": True, "render_mode": "rgb_array", "render_size": (64, 48)},
         {"character": "lift"},
-        {"character": "franka_panda", "ticks_per_step": 1},
+        {"character": "franka_panda", "ticks_per_step": 1, "render_size": (64, 48)},
     ],
     ids=["humanoid", "drawn", "lift", "arm"],
 )
