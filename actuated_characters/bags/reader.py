@@ -57,9 +57,28 @@ def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator
     Raises:
         RecordingError: There is no complete recording at `path`, or it has none of a topic's name.
     """
+    with _reading(path) as stack:
+        yield from _messages(path, topics, stack)
+
+
+def read_topics(path: Path) -> dict[str, str]:
+    """The type of each topic of a recording by its name, such as `sensor_msgs/msg/JointState`.
+
+    Raises:
+        RecordingError: there is no complete recording at `path`.
+    """
+    with _reading(path) as stack:
+        _, files = _files(path, stack)
+        found = [topic for file in files for topic in file.topics.values()]
+        return {topic.name: topic.type_name for topic in found}
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[ExitStack]:
+    """Close what is opened, and give the errors of libraries the recording's name."""
     with ExitStack() as stack:
         try:
-            yield from _messages(path, topics, stack)
+            yield stack
         except RecordingError:
             raise
         except Exception as error:  # for a damaged file the libraries raise anything
@@ -69,12 +88,19 @@ def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator
             raise RecordingError(text) from error
 
 
+def _files(
+    path: Path, stack: ExitStack
+) -> tuple[metadata.BagMetadata, list[McapFile | SqliteFile]]:
+    """A recording's metadata, and its files, which are open until `stack` is closed."""
+    is_bag = not path.is_file()
+    bag = metadata.read_metadata(path) if is_bag else metadata.BagMetadata((path,), (), "")
+    return bag, [_open(path, file, bag.compression_mode, stack) for file in bag.files]
+
+
 def _messages(
     path: Path, topics: Collection[str] | None, stack: ExitStack
 ) -> Iterator[RecordedMessage]:
-    is_bag = not path.is_file()
-    bag = metadata.read_metadata(path) if is_bag else metadata.BagMetadata((path,), (), "")
-    files = [_open(path, file, bag.compression_mode, stack) for file in bag.files]
+    bag, files = _files(path, stack)
     recorded = {topic.name for file in files for topic in file.topics.values()} | set(bag.topics)
     names = recorded if topics is None else set(topics)
     if unknown := sorted(names - recorded):
@@ -85,7 +111,7 @@ def _messages(
     for message in heapq.merge(*streams, key=lambda each: each.log_time_ns):
         log_time_ns, published_ns, _, topic, stored, _ = message
         packed = bag.compression_mode == metadata.MESSAGE
-        if not is_bag:  # no metadata says it
+        if path.is_file():  # no metadata says it
             packed = stored.startswith(storage.ZSTD_MAGIC)
         try:
             raw = limits.unpack_message(stored, packed=packed)

@@ -11,6 +11,7 @@ from actuated_characters.bags.collecting import collect, naming
 from actuated_characters.bags.format.storage import SUFFIXES
 from actuated_characters.bags.node_parameters import NodeParameters, between, in_force
 from actuated_characters.bags.plans import PlanArrays
+from actuated_characters.bags.reader import read_topics
 from actuated_characters.bags.rebuilding import RecordedWorld
 from actuated_characters.bags.tracks import (
     CONFIGURATION,
@@ -40,6 +41,8 @@ __all__ = [
     "read_recording",
     "read_recordings",
 ]
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
 
 Wrenches: TypeAlias = tuple[WrenchArrays | None, ...]
 _T = TypeVar("_T")
@@ -177,13 +180,25 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
     known = [timeline for timeline in characters if timeline.rebuilt is not None]
     if not known:
         raise RecordingError(
-            f"recording {bag} has nothing on '{CONFIGURATION}', which says what its states mean"
+            f"bag {bag} is not of this project's simulator: it has nothing on '{CONFIGURATION}', "
+            f"which says what its states mean; {_what_it_is(read_topics(bag))}"
         )
     recordings = []
     for timeline in known:
         with naming(bag, timeline):
             recordings.append(_make_recording(timeline, worlds))
     return tuple(sorted(recordings, key=_place))
+
+
+def _what_it_is(types: Mapping[str, str]) -> str:
+    """What can be done with a bag whose topics are of these types."""
+    found = sorted(name for name, kind in types.items() if kind == JOINT_STATE)
+    if not found:
+        return f"it has no {JOINT_STATE} either; its topics: {', '.join(sorted(types)) or 'none'}"
+    return (
+        f"it has joint states on {', '.join(found)}: `view`, `render`, `report` and "
+        "`motion export` take it with --character ROBOT.urdf --topic TOPIC"
+    )
 
 
 def find_bag(path: Path) -> Path:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuated_characters.commands.common.progress import progress_bar
+from actuated_characters.commands.common.settings import add_robot, print_remarks, robot_source
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # they take a second to import
@@ -30,14 +31,15 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         description="Draw a recorded run as pictures side by side, in one PNG file; with --video "
         "or an --output that ends in .mp4, as a movie. Arrows are pushes since the last picture.",
         epilog="examples: actuated_characters render runs/demo --times 0,0.5,1 --ghost over; "
-        "actuated_characters render runs/demo --video --speed 0.25 --from 1 --to 3",
+        "actuated_characters render runs/demo --video --speed 0.25 --from 1 --to 3; "
+        "actuated_characters render BAG --character robot.urdf --topic /joint_states",
     )
     render.set_defaults(command=_render)
     add = render.add_argument
     add("run", type=Path, metavar="RUN", help="a run's directory, or a bag")
     add("--video", action="store_true", help="a movie (RUN/video.mp4)")
     add("--output", type=Path, metavar="FILE", help="where to write it (RUN/strip.png)")
-    add("--character", metavar="NAME", help="draw this one alone of several, such as left")
+    add_robot(render, "draw this one alone of several, such as left")
     add("--from", type=float, metavar="S", dest="start", help="begin there, s (0)")
     add("--to", type=float, metavar="S", dest="end", help="end there, s (the last state)")
     add(
@@ -147,11 +149,11 @@ def _render_movie(options: argparse.Namespace) -> None:
 
 def _read(options: argparse.Namespace) -> "tuple[Recording, ...]":
     """The characters to be drawn."""
-    from actuated_characters.bags.recording import read_recording, read_recordings
+    from actuated_characters.bags.robots.reading import read_any
 
-    if options.character is None:
-        return read_recordings(options.run)
-    return (read_recording(options.run, options.character),)
+    recordings = read_any(options.run, robot_source(options))
+    print_remarks(recordings)
+    return recordings
 
 
 def _times(text: str) -> list[float]:

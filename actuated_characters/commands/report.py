@@ -4,7 +4,14 @@ import argparse
 from pathlib import Path
 
 from actuated_characters.commands.common.progress import progress_bar
-from actuated_characters.commands.common.settings import Commands, add_bag, add_command
+from actuated_characters.commands.common.settings import (
+    Commands,
+    add_bag,
+    add_command,
+    add_robot,
+    print_remarks,
+    robot_source,
+)
 from msgs_config.errors import ConfigurationError
 
 _STILLS = 8
@@ -22,9 +29,10 @@ def add_report(commands: "Commands[argparse.ArgumentParser]") -> None:
         "against the reference, contacts, and tick times, with pushes, resets and changed "
         "parameters marked: an HTML page that needs nothing beside itself, and its pictures as PNG "
         "files.",
-        ["report runs/demo"],
+        ["report runs/demo", "report BAG --character robot.urdf --topic /joint_states"],
     )
     add_bag(report)
+    add_robot(report, "report on this one alone of several")
     report.add_argument(
         "--output",
         type=Path,
@@ -50,5 +58,12 @@ def _report(options: argparse.Namespace) -> None:
         def progress(done: int, total: int) -> None:
             bar.update(bar.task_ids[0], completed=done, total=total)
 
-        page = write_report(options.bag, options.output, stills=options.stills, progress=progress)
+        page = write_report(
+            options.bag,
+            options.output,
+            stills=options.stills,
+            progress=progress,
+            source=robot_source(options),
+            told=print_remarks,
+        )
     print(page)

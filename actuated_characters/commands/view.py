@@ -6,7 +6,13 @@ import re
 import sys
 from pathlib import Path
 
-from actuated_characters.commands.common.settings import Commands, add_command
+from actuated_characters.commands.common.settings import (
+    Commands,
+    add_command,
+    add_robot,
+    print_remarks,
+    robot_source,
+)
 from actuated_characters.viewer.extra import check_viser
 from actuated_characters.viewer.parameters import PARAMETERS as SERVER_PARAMETERS
 from msgs_config.errors import ConfigurationError
@@ -27,7 +33,12 @@ def add_view(commands: "Commands[argparse.ArgumentParser]") -> None:
         "Without RUN, show all characters of the simulators in the present ROS_DOMAIN_ID: drag a "
         "body to push it, click on it with Shift to throw a ball at it. With RUN, play a recorded "
         "run with a time line, plots, export and forks. Ctrl-C ends it. Needs the extra 'view'.",
-        ["view", "view runs/demo", "view runs/demo runs/demo-fork"],
+        [
+            "view",
+            "view runs/demo",
+            "view runs/demo runs/demo-fork",
+            "view BAG --character robot.urdf --topic /joint_states",
+        ],
     )
     view.add_argument(
         "run", nargs="?", type=Path, metavar="RUN", help="a run's directory, or a bag"
@@ -38,6 +49,7 @@ def add_view(commands: "Commands[argparse.ArgumentParser]") -> None:
     view.add_argument(
         "--namespace", metavar="NAME", help="without RUN: of the simulators to show (all)"
     )
+    add_robot(view, "with RUN: show this one alone of several")
     add_server(view)
 
 
@@ -71,6 +83,9 @@ def _view(options: argparse.Namespace) -> None:
     if options.run is not None:
         _view_recorded(options)
         return
+    for name in ("character", "topic", "base"):
+        if getattr(options, name) is not None:
+            raise ConfigurationError(f"--{name} is of a recorded RUN; name one")
     namespace = options.namespace or "/"
     if not _NAMESPACE.fullmatch(namespace):
         raise ConfigurationError(
@@ -95,6 +110,8 @@ def _view_recorded(options: argparse.Namespace) -> None:
     show_recorded(
         options.run,
         options.others,
+        robot_source(options),
+        print_remarks,
         host=values.text("host"),
         port=values.integer("port") or None,
         fps=values.number("fps"),

@@ -62,9 +62,9 @@ def push_spans(recording: Recording) -> list[PushSpan]:
             for link, wrench in zip(wrenches.links, wrenches.wrenches, strict=True):
                 by_tick = forces.setdefault(link, {})
                 by_tick[tick] = by_tick.get(tick, np.zeros(3)) + wrench[:3]
-    period = 1.0 / int(recording.parameters["rate"])
     spans = []
     for link, by_tick in forces.items():
+        period = 1.0 / int(recording.parameters["rate"])
         ticks, applied = np.array(list(by_tick)), np.array(list(by_tick.values()))
         begins = np.flatnonzero(np.diff(ticks, prepend=-2) > 1)
         for begin, end in zip(begins, np.append(begins[1:], len(ticks)), strict=True):

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAMES = ("strip", "errors", "root", "efforts", "contacts", "ground", "plans", "histogram", "ticks")
-"""Names of the pictures."""
+"""Names of the pictures of a run."""
 
 STILLS = 8
 """Default number of poses in the picture of the character."""
@@ -57,7 +57,7 @@ class CharacterReport:
         self._names = recording.character.vector_names
         self._limits = recording.character.effort_limits()
         self._errors = tracking_errors(recording)
-        self._metrics, _ = measure_recording(recording)
+        self._metrics = self._measured()
         reacts = any(span.mode != TRACK for span in facts.modes)
         self._modes = facts.modes if reacts else []
         times = recording.published_ns if recording.has_wall_times else recording.published_ns[:0]
@@ -72,6 +72,10 @@ class CharacterReport:
             modes=[(span.start, span.duration, span.label) for span in self._modes],
         )
         self._timeline = charts.Timeline(recording.times, breaks, marks)
+
+    def _measured(self) -> dict[str, object]:
+        """The figures of the recording, by name."""
+        return measure_recording(self._recording)[0]
 
     @property
     def title(self) -> str:

@@ -4,7 +4,8 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from actuated_characters.bags.recording import Recording, find_bag, read_recordings
+from actuated_characters.bags.recording import Recording, find_bag
+from actuated_characters.bags.robots.reading import RobotRecording, RobotSource, read_any
 from actuated_characters.report.contents import Contents, read_contents
 from actuated_characters.report.page import (
     GENERATOR,
@@ -14,6 +15,7 @@ from actuated_characters.report.page import (
     Table,
     render_page,
 )
+from actuated_characters.report.robot_sections import POSITIONS, RobotReport
 from actuated_characters.report.sections import NAMES, STILLS, CharacterReport
 from actuated_characters.runs.run_directory import REPORT
 from actuated_characters.whole_files import write_whole
@@ -21,7 +23,7 @@ from msgs_config.errors import RecordingError
 
 PAGE = "index.html"
 
-_PICTURE = re.compile(rf"([0-9]+-[A-Za-z0-9_]*-)?({'|'.join(NAMES)})\.png")
+_PICTURE = re.compile(rf"([0-9]+-[A-Za-z0-9_]*-)?({'|'.join((*NAMES, POSITIONS))})\.png")
 _UNFIT = re.compile("[^A-Za-z0-9_]+")  # for the name of a file
 
 Progress = Callable[[int, int], None]
@@ -34,6 +36,8 @@ def write_report(
     *,
     stills: int = STILLS,
     progress: Progress = lambda done, total: None,
+    source: RobotSource | None = None,
+    told: Callable[[Sequence[Recording]], None] = lambda recordings: None,
 ) -> Path:
     """Report on a run's directory, or on a bag; returns the page.
 
@@ -43,6 +47,8 @@ def write_report(
             A report that is there is replaced once the new one is made.
         stills: Number of poses in the picture of each character.
         progress: Called after the bag is read, and after each section.
+        source: Whose a bag of another robot is; of several characters the one.
+        told: Called with what was read.
 
     Raises:
         RecordingError: there is no whole recording, or the directory has other files in it, or
@@ -51,7 +57,8 @@ def write_report(
     """
     directory = output or default_directory(path)
     old = _old_files(directory)
-    recordings, contents = read_recordings(path), read_contents(path)
+    recordings, contents = read_any(path, source or RobotSource()), read_contents(path)
+    told(recordings)
     reports = _plan_reports(recordings, stills)
     done, total = 0, sum(len(report.makers) for report in reports)
     progress(done, total)
@@ -75,7 +82,8 @@ def _plan_reports(recordings: Sequence[Recording], stills: int) -> list[Characte
     reports = []
     for number, recording in enumerate(recordings, start=1):
         prefix = f"{number}-{_UNFIT.sub('_', recording.name)}-" if len(recordings) > 1 else ""
-        reports.append(CharacterReport(recording, prefix, stills))
+        kind = RobotReport if isinstance(recording, RobotRecording) else CharacterReport
+        reports.append(kind(recording, prefix, stills))
     return reports
 
 

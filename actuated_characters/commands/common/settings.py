@@ -1,6 +1,7 @@
 """Commands and options that several commands have, and what `--set NODE.NAME:=VALUE` sets."""
 
 import argparse
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +10,8 @@ from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
 
 if TYPE_CHECKING:  # it takes a while to import
+    from actuated_characters.bags.recording import Recording
+    from actuated_characters.bags.robots.reading import RobotSource
     from controller_node.references.files.reconstructed import FoundWith
     from msgs_config.character.model import Character
     from msgs_config.parameters import Parameter
@@ -38,6 +41,41 @@ def add_command(
 def add_bag(command: argparse.ArgumentParser) -> None:
     """Add the positional argument that names a recording."""
     command.add_argument("bag", type=Path, metavar="BAG", help="a run's directory, or a bag")
+
+
+def add_robot(command: argparse._ActionsContainer, of_run: str) -> None:
+    """Add the options that say whose a bag of any robot is; `of_run` is said of runs."""
+    command.add_argument(
+        "--character",
+        metavar="NAME",
+        help=f"{of_run}; of a bag of any other ROS 2 robot: its .urdf or .yaml file, or a shipped "
+        "character's name (what is on robot_description)",
+    )
+    command.add_argument(
+        "--topic",
+        metavar="TOPIC",
+        help="of a bag of any robot: its sensor_msgs/JointState (/joint_states, or the only one)",
+    )
+    command.add_argument(
+        "--base",
+        metavar="TOPIC",
+        help="of a bag of any robot: where its base is, tf, an odometry or poses; none: at rest "
+        "(what there is, in this order)",
+    )
+
+
+def robot_source(options: argparse.Namespace) -> "RobotSource":
+    """What the options of `add_robot` say."""
+    from actuated_characters.bags.robots.reading import RobotSource
+
+    return RobotSource(options.character, options.topic, options.base)
+
+
+def print_remarks(recordings: "Sequence[Recording]") -> None:
+    """Print what a bag of a robot lacks, and what was taken from it, to the standard error."""
+    for recording in recordings:
+        for remark in getattr(recording, "remarks", ()):
+            print(f"note: {remark}", file=sys.stderr)
 
 
 def add_character(command: argparse.ArgumentParser) -> None:

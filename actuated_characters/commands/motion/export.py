@@ -6,7 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuated_characters.commands.common.progress import progress_bar
-from actuated_characters.commands.common.settings import Commands, add_command
+from actuated_characters.commands.common.settings import (
+    Commands,
+    add_command,
+    add_robot,
+    print_remarks,
+    robot_source,
+)
 from actuated_characters.whole_files import write_whole
 from msgs_config.errors import ConfigurationError
 
@@ -36,6 +42,7 @@ def add_motion_export(commands: "Commands[argparse.ArgumentParser]") -> None:
         [
             "motion export runs/demo --output demo.glb",
             "motion export walk --output walk.bvh --units cm",
+            "motion export BAG --character robot.urdf --topic /joint_states --output robot.glb",
         ],
     )
     export.add_argument(
@@ -46,10 +53,9 @@ def add_motion_export(commands: "Commands[argparse.ArgumentParser]") -> None:
     export.add_argument(
         "--output", type=Path, required=True, metavar="FILE", help="a .bvh, .glb or .gltf file"
     )
-    export.add_argument(
-        "--character",
-        metavar="NAME",
-        help="of a recording: which, where there are several; of a clip: whose it is (humanoid)",
+    add_robot(
+        export,
+        "of a recording: which, where there are several; of a clip: whose it is (humanoid)",
     )
     export.add_argument(
         "--from", dest="start", type=float, default=0.0, metavar="S", help="start, s (0)"
@@ -81,7 +87,7 @@ def _export(options: argparse.Namespace) -> None:
     from actuated_characters.report.joint_table import check_output
 
     check_output(options.output, overwrite=options.overwrite)
-    motion = read_source(options.source, options.character)
+    motion = read_source(options.source, robot_source(options), print_remarks)
     times = motion.sample_times(options.start, options.end, options.fps)
     if suffix == _BVH and len(motion.characters) > 1:
         names = ", ".join(each.name for each in motion.characters)

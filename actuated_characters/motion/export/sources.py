@@ -1,6 +1,6 @@
 """Where motion comes from: a run's directory, a bag, or a clip."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from math import ceil
 from pathlib import Path
@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from actuated_characters.bags.format.storage import SUFFIXES
-from actuated_characters.bags.recording import Recording, read_recording, read_recordings
+from actuated_characters.bags.recording import Recording
+from actuated_characters.bags.robots.reading import RobotSource, read_any
 from actuated_characters.motion.export.trajectories import (
     BallTrajectory,
     CharacterTrajectory,
@@ -19,7 +20,7 @@ from controller_node.references.files.clip import read_clip
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
-from msgs_config.errors import ClipError
+from msgs_config.errors import ClipError, ConfigurationError
 
 _CHARACTER = "humanoid"
 _CLIP_SUFFIXES = (".txt", ".json")
@@ -28,25 +29,32 @@ _UNEQUAL = 0.05  # part of a frame's duration by which another may differ
 _AWAY = 1000.0  # m: a ball farther away has been taken out of the way
 
 
-def read_source(source: str, character: str | None = None) -> Trajectories:
+def read_source(
+    source: str,
+    robot: RobotSource | None = None,
+    told: Callable[[Sequence[Recording]], None] = lambda recordings: None,
+) -> Trajectories:
     """What moves in a run, a bag or a clip.
 
     Args:
         source: A run's directory, a bag, or a clip by its name or as a .txt or .json file.
-        character: Of a recording the name of the one that is wanted, None for all in its world; of
-            a clip the character whose it is, None for the humanoid.
+        robot: Whose it is. Its `character` is, of a run, the name of the one that is wanted, None
+            for all in its world; of a bag of another robot, and of a clip, the character whose it
+            is, of a clip by default the humanoid.
+        told: Called with the recordings that were read.
 
     Raises:
         ActuatedCharactersError: there is no such source, or it cannot be read.
     """
-    path = Path(source)
+    path, robot = Path(source), robot or RobotSource()
     if path.is_dir() or {*path.suffixes} & {*SUFFIXES.values()}:
-        recordings = (
-            read_recordings(path) if character is None else (read_recording(path, character),)
-        )
+        recordings = read_any(path, robot)
+        told(recordings)
         return of_recordings(recordings)
+    if robot.topic is not None or robot.base is not None:
+        raise ConfigurationError(f"--topic and --base are of a bag; {source} is none")
     try:
-        return of_clip(load_character(character or _CHARACTER), source)
+        return of_clip(load_character(robot.character or _CHARACTER), source)
     except ClipError as error:
         if path.suffix in _CLIP_SUFFIXES:
             raise

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from actuated_characters.bags.recording import Recording, read_recordings
+from actuated_characters.bags.recording import Recording
+from actuated_characters.bags.robots.reading import RobotSource, read_any
 from actuated_characters.render.scene import Scene, make_scene
 from actuated_characters.viewer.latest import CharacterSample
 from actuated_characters.viewer.recorded.timeline import row_at
@@ -71,13 +72,13 @@ class RecordedRun:
         return states, self.scene.ball_radii(row, count)
 
 
-def read_run(path: Path) -> RecordedRun:
-    """Read a run's directory or a bag.
+def read_run(path: Path, source: RobotSource | None = None) -> RecordedRun:
+    """Read a run's directory or a bag; `source` says whose a bag of another robot is.
 
     Raises:
         RecordingError: there is no recording of a world, or none that can be read.
     """
-    return RecordedRun(path, make_scene(read_recordings(path)))
+    return RecordedRun(path, make_scene(read_any(path, source or RobotSource())))
 
 
 def check_comparable(run: RecordedRun, other: RecordedRun) -> None:
