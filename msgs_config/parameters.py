@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.mappings import show_value
+from msgs_config.plain_values import as_plain
 
 Scalar: TypeAlias = bool | int | float | str
 Value: TypeAlias = Scalar | list[str] | list[float]
@@ -40,17 +42,18 @@ class Parameter:
         return "live" if self.live else "next reset" if self.at_reset else ""
 
     def checked(self, value: object) -> Value:
-        """The value in the parameter's type; an integer is a fine float.
+        """The value in the parameter's type; an integer is a fine float, an array a list.
 
         Raises:
             ConfigurationError: wrong type, out of bounds, or none of the choices.
         """
+        value = as_plain(value)
         if isinstance(self.default, list):
             return self._checked_list(value, self.default)
         return self._checked_scalar(value, self.default)
 
     def _checked_list(self, value: object, default: list[str] | list[float]) -> Value:
-        if not isinstance(value, (list, tuple)):
+        if not isinstance(value, list):
             raise self._wrong(value, "a list")
         if self.texts or (default and isinstance(default[0], str)):
             return [str(self._checked_scalar(item, "")) for item in value]
@@ -74,7 +77,9 @@ class Parameter:
         return value
 
     def _wrong(self, value: object, right: str) -> ConfigurationError:
-        return ConfigurationError(f"parameter '{self.name}' is {value!r}; it must be {right}")
+        return ConfigurationError(
+            f"parameter '{self.name}' is {show_value(value)}; it must be {right}"
+        )
 
 
 RENAMED = {"balance": "balance.enabled"}
