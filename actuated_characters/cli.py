@@ -33,7 +33,7 @@ from actuated_characters.commands.run import add_run
 from actuated_characters.commands.study import add_study
 from actuated_characters.commands.view import add_view
 from msgs_config.errors import ActuatedCharactersError
-from msgs_config.runtime.process import EXIT_ERROR, limit_threads
+from msgs_config.runtime.process import EXIT_ERROR, limit_threads, open_missing_streams
 from msgs_config.runtime.ros_environment import check_domain_id
 
 _EXIT_INTERRUPTED = 130
@@ -42,6 +42,7 @@ _RUN = "run"  # without a word of what to run
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
+    open_missing_streams()
     limit_threads()
     raise_at_signals()
     try:

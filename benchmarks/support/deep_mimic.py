@@ -12,7 +12,8 @@ import pybullet_data
 
 from actuated_characters.metrics.run_metrics import Tick
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import captured_output, pybullet
+from msgs_config.character.bullet import pybullet
+from msgs_config.character.c_library import captured_output
 from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations

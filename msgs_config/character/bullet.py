@@ -1,52 +1,59 @@
 """PyBullet without its output: the import, a private engine, and a URDF loaded into it.
 
 PyBullet prints on import and while it reads a URDF, from C, past Python's streams. The output is
-kept and shown only with the error that it explains.
+kept and shown only with the error that it explains. It reads numbers by the C library's locale,
+which therefore is "C" wherever it reads a file.
 """
 
-import os
-import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import weakref
 from pathlib import Path
-from typing import IO
+from typing import NoReturn
 
+from msgs_config.character.c_library import c_numbers, captured_output
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf.engine_text import write_engine_urdf
-from msgs_config.errors import CharacterError
+from msgs_config.errors import CharacterError, SimulationError
 
-
-@contextmanager
-def captured_output() -> Iterator[IO[bytes]]:
-    """Divert the process' standard output and error into a file."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    saved = os.dup(1), os.dup(2)
-    with tempfile.TemporaryFile() as sink:
-        os.dup2(sink.fileno(), 1)
-        os.dup2(sink.fileno(), 2)
-        try:
-            yield sink
-        finally:
-            os.dup2(saved[0], 1)
-            os.dup2(saved[1], 2)
-            os.close(saved[0])
-            os.close(saved[1])
-
-
-with captured_output():
+with captured_output("stdout", "stderr"):
     import pybullet
 
-__all__ = ["connect", "load_urdf", "pybullet"]
+__all__ = ["Engine", "load_urdf", "pybullet"]
 
 
-def connect() -> int:
-    """Start a private engine without a window; returns its client number."""
-    return int(pybullet.connect(pybullet.DIRECT))
+class Engine:
+    """A private engine without a window, which PyBullet's calls take as their `physicsClientId`.
+
+    PyBullet gives the number of an engine that has ended to the next one. So the number is asked
+    for at each call, and a closed engine refuses it. One that nothing refers to is closed.
+    """
+
+    def __init__(self) -> None:
+        number = int(pybullet.connect(pybullet.DIRECT))
+        self._number: int | None = number
+        self._disconnect = weakref.finalize(self, pybullet.disconnect, number)
+        self._disconnect.atexit = False  # the process takes its engines with it
+
+    def __index__(self) -> int:
+        """PyBullet's number of it.
+
+        Raises:
+            SimulationError: it is closed.
+        """
+        if self._number is None:
+            raise SimulationError("it is closed: its engine has ended; make a new one")
+        return self._number
+
+    def __reduce__(self) -> NoReturn:
+        raise SimulationError("an engine, and what is in it, can be neither copied nor pickled")
+
+    def close(self) -> None:
+        """End it; a closed one stays so."""
+        self._number = None
+        self._disconnect()
 
 
-def load_urdf(client: int, loading: UrdfOptions) -> int:
+def load_urdf(client: Engine, loading: UrdfOptions) -> int:
     """Load a URDF, each link after its parent; returns the body's number.
 
     Raises:
@@ -59,23 +66,23 @@ def load_urdf(client: int, loading: UrdfOptions) -> int:
         flags |= pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS
     if loading.inertia_from_file:
         flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
-    with tempfile.TemporaryDirectory() as directory, captured_output() as output:
+    with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory) / "model.urdf"
         copy.write_text(write_engine_urdf(loading, Path(directory)), encoding="utf-8")
         # an engine that caches files would read an old version of a file that was edited
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
-        try:
-            return int(
-                pybullet.loadURDF(
-                    str(copy),
-                    useFixedBase=loading.fixed_base,
-                    globalScaling=loading.scale,
-                    flags=flags,
-                    physicsClientId=client,
+        with captured_output() as printed, c_numbers():
+            try:
+                return int(
+                    pybullet.loadURDF(
+                        str(copy),
+                        useFixedBase=loading.fixed_base,
+                        globalScaling=loading.scale,
+                        flags=flags,
+                        physicsClientId=client,
+                    )
                 )
-            )
-        except pybullet.error as error:
-            output.seek(0)
-            lines = output.read().decode(errors="replace").strip().splitlines()
-            reason = f": {lines[-1]}" if lines else ""
-            raise CharacterError(f"{loading.urdf_path}: not a usable URDF{reason}") from error
+            except pybullet.error as error:
+                lines = printed().strip().splitlines()
+                reason = f": {lines[-1]}" if lines else ""
+                raise CharacterError(f"{loading.urdf_path}: not a usable URDF{reason}") from error

@@ -5,6 +5,7 @@ the controller's model of the dynamics are built from the same ones.
 """
 
 import math
+import os
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from msgs_config.character.bullet import connect, load_urdf, pybullet
+from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
 from msgs_config.character.file_defaults import add_defaults
 from msgs_config.character.layout import ROOT, JointLayout, JointType
@@ -33,6 +34,8 @@ from msgs_config.character.urdf.comparison import check_links
 from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.geometry import rotations
+from msgs_config.mappings import show_value
+from msgs_config.plain_values import as_plain
 
 _JOINT_TYPES = {
     pybullet.JOINT_REVOLUTE: JointType.REVOLUTE,
@@ -42,7 +45,7 @@ _JOINT_TYPES = {
 }
 
 
-def load_character(name_or_path: str, collides: bool = True) -> Character:
+def load_character(name_or_path: str | os.PathLike[str], collides: bool = True) -> Character:
     """Load a shipped character by name, or any by the path of its YAML file or of its URDF alone.
 
     Without `collides` nothing of it collides, as `collision: none` in its file has it.
@@ -50,7 +53,10 @@ def load_character(name_or_path: str, collides: bool = True) -> Character:
     Raises:
         CharacterError: no such character, or its file or URDF cannot be used; says why.
     """
-    return build_character(read_character_file(name_or_path), collides)
+    name = as_plain(name_or_path)
+    if not isinstance(name, str):
+        raise CharacterError(f"a character is {show_value(name)}; it must be a name or a path")
+    return build_character(read_character_file(name), collides)
 
 
 def build_character(file: CharacterFile, collides: bool = True) -> Character:
@@ -94,11 +100,11 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
 def _load_links(robot: ElementTree.Element, file: CharacterFile) -> list[Link]:
     """The links of a repaired URDF as the engine has them, each subtree in a row, with shapes."""
     shapes = read_shapes(robot, file.loading)
-    client = connect()
+    client = Engine()
     try:
         links = _read_links(client, load_urdf(client, file.loading), file)
     finally:
-        pybullet.disconnect(client)
+        client.close()
     _check_links(file.loading.urdf_path, links)
     check_links(links, robot, file.loading)
     return [
@@ -107,7 +113,7 @@ def _load_links(robot: ElementTree.Element, file: CharacterFile) -> list[Link]:
     ]
 
 
-def _read_links(client: int, body: int, file: CharacterFile) -> list[Link]:
+def _read_links(client: Engine, body: int, file: CharacterFile) -> list[Link]:
     """The links in the engine's order, each after its parent, the base first."""
     base_type = JointType.FIXED if file.loading.fixed_base else JointType.FLOATING
     base_name = pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()
@@ -144,7 +150,7 @@ def _apply_file(joint: Joint, file: CharacterFile) -> Joint:
     )
 
 
-def _read_link(client: int, body: int, index: int, name: str, parent: int, joint: Joint) -> Link:
+def _read_link(client: Engine, body: int, index: int, name: str, parent: int, joint: Joint) -> Link:
     dynamics = pybullet.getDynamicsInfo(body, index, physicsClientId=client)
     pose = Pose(position=dynamics[3], orientation_xyzw=dynamics[4])
     return Link(name, parent, joint, dynamics[0], dynamics[2], pose)

@@ -50,6 +50,21 @@ def limit_threads() -> None:
         os.environ.setdefault(name, "1")
 
 
+def open_missing_streams() -> None:
+    """Open those standard streams, to nowhere, that the process was started without.
+
+    Otherwise the next file to be opened would become the standard output, or the error output.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # the lowest that is free
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+
+
 def use_batch_scheduling() -> None:
     """Let this process' threads wait until others leave a processor, rather than interrupt them.
 
@@ -112,6 +127,7 @@ def run_node(load: Callable[[], Callable[[], RunnableNode]], about: str = "") ->
         load: Imports the node's modules, and returns its constructor.
         about: What `--help` says before it says how parameters are set.
     """
+    open_missing_streams()
     stop = StopSignal()
     node, code = None, EXIT_ERROR
     try:

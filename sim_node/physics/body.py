@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.bullet import load_urdf, pybullet
+from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Pose
 from msgs_config.geometry import fixed_order, frames, rotations
@@ -35,7 +35,7 @@ class Body:
     """
 
     def __init__(
-        self, client: int, character: Character, friction: float, speed_bound: float
+        self, client: Engine, character: Character, friction: float, speed_bound: float
     ) -> None:
         """Load the character.
 

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from msgs_config.character.bullet import pybullet
+from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.geometry import rotations
 
 UNLIMITED_SPEED = 1e9
 """A bound that nothing sound reaches, rad/s or m/s; at Bullet's 100 no divergence would be seen."""
 
 
-def set_link_dynamics(client: int, body: int, friction: float, speed_bound: float) -> None:
+def set_link_dynamics(client: Engine, body: int, friction: float, speed_bound: float) -> None:
     """Switch off the damping of a body's links and joints, and set every link's friction.
 
     `speed_bound` in rad/s and m/s is that of every degree of freedom, the base's too.
@@ -26,7 +26,7 @@ def set_link_dynamics(client: int, body: int, friction: float, speed_bound: floa
             pybullet.changeDynamics(body, link, **setting, physicsClientId=client)
 
 
-def remove_motors(client: int, body: int, joints: Sequence[int], balls: Sequence[int]) -> None:
+def remove_motors(client: Engine, body: int, joints: Sequence[int], balls: Sequence[int]) -> None:
     """Switch off the motors that hold joints, by the engine's numbers; `balls` are among them."""
     for index in joints:
         pybullet.setJointMotorControl2(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import pybullet
+from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.messages.throw import ProjectileThrow
 
 _AWAY = 10_000.0  # m along x
@@ -14,7 +14,7 @@ _AWAY = 10_000.0  # m along x
 class Projectiles:
     """The balls of a world, in the order in which they were thrown."""
 
-    def __init__(self, client: int, friction: float) -> None:
+    def __init__(self, client: Engine, friction: float) -> None:
         self._client = client
         self._friction = friction
         self.numbers: list[int] = []  # the engine's

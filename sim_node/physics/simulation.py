@@ -81,6 +81,7 @@ class Simulation:
         self.watches_contacts = False
         self.throws: tuple[ProjectileThrow, ...] = ()  # at the beginning of the last tick
         self._thrown_at: tuple[int, ...] = ()
+        self._is_closed = False
         self._world = self._fresh_world()
 
     def __enter__(self) -> "Simulation":
@@ -90,10 +91,21 @@ class Simulation:
         self.close()
 
     def close(self) -> None:
-        """End the engine; what the last tick has led to can be read after that."""
+        """End the engine; what the last tick has led to can be read after that.
+
+        A closed simulation stays closed.
+        """
+        if self._is_closed:
+            return
         for character in self.characters:
             character.find_contacts()
+        self._is_closed = True
         self._world.close()
+
+    def check_open(self) -> None:
+        """Raise SimulationError if it is closed."""
+        if self._is_closed:
+            raise SimulationError("the simulation is closed; make a new one")
 
     @property
     def stamp_ns(self) -> int:
@@ -121,8 +133,9 @@ class Simulation:
 
         Raises:
             SimulationError: a next state is not finite or faster than the speed limit; it names
-                the degree of freedom.
+                the degree of freedom. Or the simulation is closed.
         """
+        self.check_open()
         pushes = pushes or [()] * len(self.characters)
         for character, effort, own in zip(self.characters, efforts, pushes, strict=True):
             character.begin_tick(effort, own, self.watches_contacts)
@@ -167,7 +180,11 @@ class Simulation:
         All that follows is what would follow in a fresh simulation, to the bit. This and all later
         episodes are in a world of other settings, and begin in other states, by the characters'
         names, where they are given; the engine's step stays.
+
+        Raises:
+            SimulationError: the simulation is closed.
         """
+        self.check_open()
         if world is not None:
             assert world.step_s == self.settings.world.step_s
             self.settings = replace(self.settings, world=world)
@@ -180,7 +197,11 @@ class Simulation:
         """Begin this and all later episodes in other states, by the characters' names.
 
         To be called before the first step.
+
+        Raises:
+            SimulationError: the simulation is closed.
         """
+        self.check_open()
         for character in self.characters:
             if (state := states.get(character.setup.name)) is not None:
                 character.begin_in(state.position, state.velocity)
@@ -188,7 +209,12 @@ class Simulation:
         self._world = self._fresh_world()
 
     def snapshot(self) -> Snapshot:
-        """The present state, for this simulation or one in another process."""
+        """The present state, for this simulation or one in another process.
+
+        Raises:
+            SimulationError: the simulation is closed.
+        """
+        self.check_open()
         return Snapshot(
             self.settings,
             self.tick,
@@ -201,7 +227,12 @@ class Simulation:
         )
 
     def load_snapshot(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot: what follows is what followed it, to the bit."""
+        """Go on from a snapshot: what follows is what followed it, to the bit.
+
+        Raises:
+            SimulationError: the simulation is closed.
+        """
+        self.check_open()
         each = list(zip(self.characters, snapshot.characters, strict=True))
         # in a world without a step yet the engine has not found out what touches: only a fresh one
         # is like that

@@ -10,9 +10,10 @@ from typing import ClassVar
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import connect, load_urdf, pybullet
+from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.messages.throw import ProjectileThrow
+from msgs_config.runtime.fork_safe import fork_safe_lock
 from sim_node.physics.body import Body
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
 from sim_node.physics.projectiles import Projectiles
@@ -47,6 +48,7 @@ class World:
 
     # in force; the engine has one for all worlds of a process
     _breaking_threshold: ClassVar[float] = WorldSettings.contact_breaking_threshold
+    _stepping: ClassVar = fork_safe_lock()  # worlds may step in several threads
 
     def __init__(self, settings: WorldSettings) -> None:
         """Start the engine.
@@ -54,7 +56,15 @@ class World:
         Raises:
             CharacterError: the terrain cannot be loaded.
         """
-        self._client = connect()
+        self._client = Engine()
+        try:
+            self._furnish(settings)
+        except BaseException:
+            self.close()
+            raise
+
+    def _furnish(self, settings: WorldSettings) -> None:
+        """Put all into the world that is there before the characters."""
         self._link_friction = settings.link_friction
         self._own_breaking_threshold = settings.contact_breaking_threshold
         self.set_gravity(settings.gravity)
@@ -84,8 +94,8 @@ class World:
         self.close()
 
     def close(self) -> None:
-        """End the engine; the world cannot be used any more."""
-        pybullet.disconnect(self._client)
+        """End the engine; the world cannot be used any more, nor what was added to it."""
+        self._client.close()
 
     def add(self, character: Character, speed_bound: float = UNLIMITED_SPEED) -> Body:
         """Put a character into the world, at the pose of its URDF.
@@ -100,14 +110,15 @@ class World:
 
     def step(self) -> None:
         """Advance by one engine step; efforts last one step and are to be applied again."""
-        if World._breaking_threshold != self._own_breaking_threshold:
-            World._breaking_threshold = self._own_breaking_threshold
-            pybullet.setPhysicsEngineParameter(
-                contactBreakingThreshold=self._own_breaking_threshold,
-                physicsClientId=self._client,
-            )
         self._touched = None
-        pybullet.stepSimulation(physicsClientId=self._client)
+        with World._stepping:
+            if World._breaking_threshold != self._own_breaking_threshold:
+                World._breaking_threshold = self._own_breaking_threshold
+                pybullet.setPhysicsEngineParameter(
+                    contactBreakingThreshold=self._own_breaking_threshold,
+                    physicsClientId=self._client,
+                )
+            pybullet.stepSimulation(physicsClientId=self._client)
 
     def touched_links(self) -> TouchedLinks:
         """The contacts of the last engine step, each on both bodies, in opposite directions.

@@ -20,7 +20,7 @@ from urdf_parser_py import urdf
 from actuated_characters.render.engine.camera_pose import CameraPose, Size
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.bullet import connect, pybullet
+from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
@@ -41,7 +41,7 @@ def draw_description(
 
     `frames` are homogeneous matrices (4, 4) of the links in the world, by name.
     """
-    client = connect()
+    client = Engine()
     try:
         for link in robot.links:
             for visual in link.visuals:
@@ -50,10 +50,10 @@ def draw_description(
                 _place(client, robot, visual, frames[link.name] @ origin_matrix(visual.origin))
         return _take(client, view, size)
     finally:
-        pybullet.disconnect(client)
+        client.close()
 
 
-def _place(client: int, robot: urdf.Robot, visual: urdf.Visual, pose: FloatArray) -> None:
+def _place(client: Engine, robot: urdf.Robot, visual: urdf.Visual, pose: FloatArray) -> None:
     """Put one shape where it is, in its colour."""
     colors = {material.name: material.color for material in robot.materials}
     material = visual.material
@@ -103,7 +103,7 @@ def _rotation_vector(matrix: FloatArray) -> FloatArray:
     return scaled
 
 
-def _take(client: int, view: CameraPose, size: Size) -> tuple[Picture, BoolArray]:
+def _take(client: Engine, view: CameraPose, size: Size) -> tuple[Picture, BoolArray]:
     right_up_back = view.axes()
     eye = np.array(view.target) + view.distance * right_up_back[2]
     width, height = size

@@ -15,7 +15,8 @@ from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.posed_characters import Frames
 from actuated_characters.render.engine.surfaces import Surface, arrow_surface, round_surface
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
+from msgs_config.character.bullet import Engine, load_urdf, pybullet
+from msgs_config.character.c_library import c_numbers, captured_output
 from msgs_config.character.meshes.triangles import file_for_engine
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import CharacterError
@@ -50,7 +51,7 @@ class RenderScene:
         Raises:
             CharacterError: the engine refuses a shape or the terrain's URDF.
         """
-        self._client = connect()
+        self._client = Engine()
         self._links: list[tuple[int, int, Quadruple]] = []  # row of the link, body, colour
         self._balls: list[tuple[float, int]] = []  # radius, body
         self._arrows: list[int] = []  # bodies
@@ -58,18 +59,15 @@ class RenderScene:
         try:
             if terrain is not None:
                 self._add_terrain(terrain)
-            with captured_output():
-                for row, shapes in enumerate(links):
-                    self._links += [
-                        (row, self._add_shape(shape), shape.color_rgba) for shape in shapes
-                    ]
+            for row, shapes in enumerate(links):
+                self._links += [(row, self._add_shape(shape), shape.color_rgba) for shape in shapes]
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """End the engine."""
-        pybullet.disconnect(self._client)
+        self._client.close()
 
     def clear(self) -> None:
         """Show nothing."""
@@ -180,10 +178,11 @@ class RenderScene:
 
     def _add_body(self, color: Quadruple, **measures: object) -> int:
         kind = pybullet.GEOM_BOX if "halfExtents" in measures else pybullet.GEOM_MESH
-        seen = pybullet.createVisualShape(
-            kind, rgbaColor=color, **measures, physicsClientId=self._client
-        )
-        return int(pybullet.createMultiBody(0.0, -1, seen, physicsClientId=self._client))
+        with captured_output(), c_numbers():  # a mesh is a file, which it reads with the body
+            seen = pybullet.createVisualShape(
+                kind, rgbaColor=color, **measures, physicsClientId=self._client
+            )
+            return int(pybullet.createMultiBody(0.0, -1, seen, physicsClientId=self._client))
 
     def _put(
         self,

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import captured_output, connect, pybullet
+from msgs_config.character.bullet import Engine, pybullet
+from msgs_config.character.c_library import captured_output
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Pose, Shape, ShapeType
 from msgs_config.character.urdf.robot_description import robot_description
@@ -50,7 +51,7 @@ class EngineShape:
 
 def engine_shapes(path: str, scale: float) -> dict[str, list[EngineShape]]:
     """The visual shapes of each link by its name, from the engine's own reading of the file."""
-    client = connect()
+    client = Engine()
     with captured_output():
         body = pybullet.loadURDF(path, globalScaling=scale, physicsClientId=client)
     names = {-1: pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()}
@@ -68,7 +69,7 @@ def engine_shapes(path: str, scale: float) -> dict[str, list[EngineShape]]:
             color,
         )
         shapes[names[link]].append(shape)
-    pybullet.disconnect(client)
+    client.close()
     return shapes
 
 

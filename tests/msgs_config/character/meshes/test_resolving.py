@@ -10,7 +10,8 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from msgs_config.character.bullet import captured_output, connect, load_urdf, pybullet
+from msgs_config.character.bullet import Engine, load_urdf, pybullet
+from msgs_config.character.c_library import captured_output
 from msgs_config.character.file import read_character_file, shipped_characters
 from msgs_config.character.loading import load_character
 from msgs_config.character.meshes import resolving as meshes
@@ -46,13 +47,13 @@ def put(source: Path, target: Path) -> Path:
 
 def mesh_in_the_engine(urdf: Path) -> list[Path]:
     """The mesh files that the engine has loaded to collide with."""
-    client = connect()
+    client = Engine()
     try:
         body = load_urdf(client, read_character_file(str(urdf)).loading)
         shapes = pybullet.getCollisionShapeData(body, -1, physicsClientId=client)
         return [Path(shape[4].decode()) for shape in shapes]
     finally:
-        pybullet.disconnect(client)
+        client.close()
 
 
 PLACES = {  # how a mesh is named, and where it lies below the folder of `robot/`
@@ -177,10 +178,10 @@ def test_without_collisions_a_mesh_may_be_missing(tmp_path: Path, part: str) -> 
     assert (body.mass, body.inertia_diagonal) == (1.0, (1.0, 1.0, 1.0))
     assert body.collision_shapes == ()
     assert {shape.type.value for shape in body.shapes} == {"sphere"}
-    client = connect()
+    client = Engine()
     engine_body = load_urdf(client, read_character_file(str(path)).loading)
     assert not pybullet.getCollisionShapeData(engine_body, -1, physicsClientId=client)
-    pybullet.disconnect(client)
+    client.close()
 
 
 def test_a_mesh_that_is_too_large_is_refused(
@@ -256,7 +257,7 @@ def test_a_mesh_that_is_only_seen_may_be_of_any_type(write: WriteRobot, tmp_path
 # What the engine is given is the URDF
 
 
-def load_file(client: int, loading: UrdfOptions) -> int:
+def load_file(client: Engine, loading: UrdfOptions) -> int:
     """Let the engine read the URDF's file by itself; the body's number."""
     flags = pybullet.URDF_USE_INERTIA_FROM_FILE if loading.inertia_from_file else 0
     with captured_output():
@@ -271,7 +272,7 @@ def load_file(client: int, loading: UrdfOptions) -> int:
         )
 
 
-def numbers_of(client: int, body: int) -> list[object]:
+def numbers_of(client: Engine, body: int) -> list[object]:
     """All numbers that the engine has of a body's links and joints."""
     joints = range(pybullet.getNumJoints(body, physicsClientId=client))
     return [
@@ -292,12 +293,12 @@ def numbers_of(client: int, body: int) -> list[object]:
 def test_the_engine_makes_the_same_body_of_our_text_as_of_the_file(name: str) -> None:
     """To the last bit; laikago has other bounds than its file."""
     loading = read_character_file(name).loading
-    client = connect()
+    client = Engine()
 
     ours, theirs = load_urdf(client, loading), load_file(client, loading)
 
     assert numbers_of(client, ours) == numbers_of(client, theirs)
-    pybullet.disconnect(client)
+    client.close()
 
 
 def test_numbers_may_be_parted_by_tabs_and_lines_be_long(tmp_path: Path) -> None:

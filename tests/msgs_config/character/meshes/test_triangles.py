@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from msgs_config.character.bullet import connect, load_urdf, pybullet
+from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.file import read_character_file
 from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.errors import CharacterError
@@ -73,7 +73,7 @@ def test_the_engine_collides_with_it(tmp_path: Path, name: str) -> None:
     """A ray along each axis hits the hull of the wedge where geometry says, scale and all."""
     mesh = write_mesh(tmp_path / name)
     hull = trimesh.load_scene(mesh).to_geometry().apply_scale((0.5, 1.0, 2.0))
-    client = connect()
+    client = Engine()
     try:
         loading = read_character_file(str(write_robot(tmp_path, name, "0.5 1 2"))).loading
         body = load_urdf(client, loading)
@@ -85,7 +85,7 @@ def test_the_engine_collides_with_it(tmp_path: Path, name: str) -> None:
             assert distance[0] < 0.002  # the engine's margin about a hull is 1 mm
         assert body == 0
     finally:
-        pybullet.disconnect(client)
+        client.close()
 
 
 def test_a_file_that_was_written_again_is_read_again(tmp_path: Path) -> None:
