@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
+from actuated_characters.given_arrays import finite_state, has_arrays, is_same_first, real_array
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.runs.execution import run_in_process, run_over_topics
 from actuated_characters.runs.plan import choose_reference, make_plan
@@ -17,9 +19,10 @@ from controller_node.references.base import Reference
 from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import CommandError, ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.parameters import resolve
+from msgs_config.plain_values import finite_numbers, plain_parameters
 from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import as_values
@@ -50,7 +53,7 @@ class Controller:
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
         """
-        given = {**parameters, **more}
+        given = plain_parameters(parameters, more)
         given = {**choose_reference(given), **given}
         self.character = placed(character, given)
         declared = controller_parameters.PARAMETERS
@@ -63,7 +66,8 @@ class Controller:
         self._controller = controller_parameters.make_controller(
             self.character, motion.reference, self._values
         )
-        self._episode_ns: int | None = None
+        self._last: StampedState | None = None  # that was answered
+        self._episode_ns = 0
         joints = controller_parameters.commanded_joints(self.character, self._values)
         self._commanded = self.character.layout.mask(joints)
         self._drives_all = bool(self._commanded.all())
@@ -76,7 +80,8 @@ class Controller:
     def compute_effort(self, state: StampedState, contacts: FloatArray | None = None) -> FloatArray:
         """The effort (n,) for a state, N and N m; zero where it commands nothing.
 
-        An episode begins with a state without effort. Frames: docs/topics.md.
+        An episode begins with a state without effort, unless it is the last state once more; all
+        that the controller keeps is of the episode. Frames: docs/topics.md.
 
         Args:
             state: Of the present tick.
@@ -92,12 +97,26 @@ class Controller:
         self, state: StampedState, contacts: FloatArray | None = None
     ) -> tuple[FloatArray, StampedReference]:
         """As `compute_effort`, and the desired state at the state's stamp."""
-        if state.effort is None or self._episode_ns is None:
+        if not has_arrays(state, self.character.layout.size):
+            state = finite_state(state, self.character.layout.size)
+        if contacts is not None and self.needs_contacts:
+            contacts = self._checked_contacts(contacts)
+        last = self._last
+        if last is None or (state.effort is None and not is_same_first(state, last)):
+            self._controller.begin_episode(state.stamp_ns)
             self._episode_ns = state.stamp_ns
         effort, reference = self._controller.compute_effort(state, self._episode_ns, contacts)
+        self._last = state
         if self._drives_all:  # a copy: the effort may be a row of the series that the law applies
             return effort.copy(), reference
         return np.where(self._commanded, effort, 0.0), reference
+
+    def _checked_contacts(self, contacts: FloatArray) -> FloatArray:
+        contacts = real_array("contacts", contacts)
+        shape = (len(self.character.links), 6)
+        if contacts.shape != shape:
+            raise ConfigurationError(f"contacts have shape {contacts.shape}; it must be {shape}")
+        return contacts
 
     def compute_command(self, message: "JointState") -> "JointState":
         """The message for `joint_torques` that answers one of `joint_states`.
@@ -148,10 +167,12 @@ class Simulation:
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
         """
-        given = {**parameters, **more}
+        given = plain_parameters(parameters, more)
         character = placed(character, given)
         own = simulator_parameters.character_parameters(character)
-        begins: Mapping[str, object] = _NONE if start is None else as_values(start)
+        begins: Mapping[str, object] = _NONE
+        if start is not None:
+            begins = as_values(finite_state(start, character.layout.size))
         everything = {"commanded_joints": _drivable(character), **begins, **given}
         self._values = resolve(simulator_parameters.PARAMETERS + own, everything)
         self.character = character
@@ -170,13 +191,24 @@ class Simulation:
     def __exit__(self, *error: object) -> None:
         self.close()
 
+    def __reduce__(self) -> NoReturn:
+        raise SimulationError(
+            "a Simulation can be neither copied nor pickled; make another one of the same "
+            "character, start and parameters where it is needed"
+        )
+
     def close(self) -> None:
-        """End the engine."""
+        """End the engine; a closed simulation stays closed, and all that needs it is an error."""
         self._simulation.close()
 
     @property
     def state(self) -> StampedState:
-        """The present state; without effort if it is an episode's first."""
+        """The present state; without effort if it is an episode's first.
+
+        Raises:
+            SimulationError: the simulation is closed.
+        """
+        self._simulation.check_open()
         return self._simulation.characters[0].state
 
     @property
@@ -205,7 +237,9 @@ class Simulation:
 
         Raises:
             ConfigurationError: the simulation does not watch contacts.
+            SimulationError: it is closed.
         """
+        self._simulation.check_open()
         if not self._simulation.watches_contacts:
             raise ConfigurationError("contacts are not watched; make it with watch_contacts=True")
         contacts = self._simulation.characters[0].contacts
@@ -232,23 +266,32 @@ class Simulation:
             torque: N m, world axes.
 
         Raises:
-            CommandError: no such link, or a number is not finite.
+            CommandError: no such link, or force or torque is not three finite numbers.
+            SimulationError: the simulation is closed.
         """
+        self._simulation.check_open()
+        wrench = [
+            finite_numbers(f"the {what} on '{link}'", vector, 3, CommandError)
+            for what, vector in (("force", force), ("torque", torque))
+        ]
         self._pushes.add(
             [link],
-            np.array([[*force, *torque]], dtype=float),
+            np.concatenate(wrench)[np.newaxis],
             np.zeros((0, 3)),
             first_tick=self._simulation.tick,
             ticks=make_node_settings(self._values).push_ticks,
         )
 
-    def step(self, effort: FloatArray) -> StampedState:
+    def step(self, effort: FloatArray | Sequence[float]) -> StampedState:
         """Apply an effort (n,) for one tick, clipped to its limits; the state that follows.
 
         Raises:
-            ConfigurationError: the effort has another shape.
-            SimulationError: the state has diverged; the message names the degree of freedom.
+            ConfigurationError: the effort has another shape, or is not of numbers.
+            SimulationError: the state has diverged; the message names the degree of freedom. Or
+                the simulation is closed.
         """
+        self._simulation.check_open()
+        effort = real_array("an effort", effort)
         if np.shape(effort) != (self.character.layout.size,):
             raise ConfigurationError(
                 f"an effort has shape {np.shape(effort)}; it must be "
@@ -269,12 +312,16 @@ class Simulation:
         """Begin a new episode, which equals a fresh world to the bit; its first state.
 
         `start` is where it begins, from now on; None: where the last one did.
+
+        Raises:
+            ConfigurationError: `start` has not one finite number a degree of freedom.
+            SimulationError: the simulation is closed.
         """
+        size = self.character.layout.size
+        states = {} if start is None else {"": finite_state(start, size)}
+        self._simulation.reset(states=states)
         self._pushes.clear()
-        self._simulation.reset()
         self._first_tick = self._simulation.tick
-        if start is not None:
-            self._simulation.begin_in({"": start})
         return self.state
 
     @property
@@ -314,10 +361,10 @@ class Simulation:
 
 
 def run(
-    character: str = "humanoid",
+    character: str | PathLike[str] = "humanoid",
     duration: float = 10.0,
     *,
-    output: str | Path,
+    output: str | PathLike[str],
     in_process: bool = False,
     composed: bool = False,
     overwrite: bool = False,

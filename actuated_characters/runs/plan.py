@@ -1,5 +1,6 @@
 """The plan of a run: character, reference and parameters, checked before anything starts."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -16,7 +17,9 @@ from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
+from msgs_config.mappings import show_value
 from msgs_config.parameters import Values, resolve
+from msgs_config.plain_values import as_plain, plain_parameters
 from msgs_config.shared_parameters import collides, placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, as_values, describe_start
@@ -57,7 +60,7 @@ class RunPlan:
 
 
 def make_plan(
-    character_name: str,
+    character_name: str | os.PathLike[str],
     duration: float,
     reference: Mapping[str, object],
     simulator_settings: Mapping[str, object],
@@ -78,9 +81,12 @@ def make_plan(
     Raises:
         ActuatedCharactersError: a name or value is wrong; names it and the valid ones.
     """
-    simulator_given, controller_given = _shared(simulator_settings, controller_settings)
-    simulator_given["character"] = character_name
-    controller_given = {**_with_reference(reference, controller_given), "character": character_name}
+    simulator_given, controller_given = _shared(
+        plain_parameters(simulator_settings), plain_parameters(controller_settings)
+    )
+    simulator_given["character"] = as_plain(character_name)
+    controller_given = _with_reference(plain_parameters(reference), controller_given)
+    controller_given["character"] = simulator_given["character"]
     character = loaded or load_character(character_name, collides(simulator_given))
     character = placed(character, simulator_given)
     _keep_assistance_in_step(character, simulator_given, controller_given)
@@ -198,9 +204,14 @@ def _listed(names: set[str]) -> str:
 
 def count_ticks(duration: float, rate_hz: int) -> int:
     """The ticks of a duration in s; raises ConfigurationError if it is less than one, or huge."""
-    if not 1.0 / rate_hz <= duration <= _LARGEST_DURATION:
+    seconds, least = as_plain(duration), 1.0 / rate_hz
+    if (
+        not isinstance(seconds, (int, float))
+        or isinstance(seconds, bool)
+        or not least <= seconds <= _LARGEST_DURATION
+    ):
         raise ConfigurationError(
-            f"duration is {duration} s; it must be {1.0 / rate_hz:g} s (one tick) to "
+            f"duration is {show_value(seconds)} s; it must be {least:g} s (one tick) to "
             f"{_LARGEST_DURATION:g} s"
         )
-    return round(duration * rate_hz)
+    return round(seconds * rate_hz)

@@ -32,6 +32,9 @@ class ProjectileThrow:
     velocity: tuple[float, float, float]  # m/s, world
 
     def __post_init__(self) -> None:
+        for what, vector in (("position", self.position), ("velocity", self.velocity)):
+            if len(vector) != len(POSITION):
+                raise CommandError(f"the {what} is {vector}; it must be three numbers")
         for name, value in zip(NUMBERS, self.numbers().tolist(), strict=True):
             if not isfinite(value):
                 raise CommandError(f"{name} is {value}; it must be finite")

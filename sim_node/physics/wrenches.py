@@ -84,13 +84,15 @@ class WrenchQueue:
         if not names:
             raise CommandError("an empty push")
         for name in names:
-            if name not in self._rows:
+            if not isinstance(name, str) or name not in self._rows:
                 raise CommandError(one_of("link", name, list(self._rows)))
         if len(wrenches) != len(names):
             raise CommandError(f"{len(names)} links but {len(wrenches)} wrenches")
         if len(points) not in (0, len(names)):
             raise CommandError(f"{len(names)} links but {len(points)} transforms")
-        for what, rows in (("wrench", wrenches), ("point", points)):
+        for what, rows, size in (("wrench", wrenches, 6), ("point", points, 3)):
+            if rows.shape[1:] != (size,):
+                raise CommandError(f"a {what} has shape {rows.shape[1:]}; it must be ({size},)")
             finite = np.isfinite(rows).all(axis=1)
             if not finite.all():
                 name = names[int(np.argmin(finite))]

@@ -170,7 +170,7 @@ class StateMachine:
         state = self._state
         if state.tracks:
             return at.body.root[2] - self._ground(at)
-        share = smooth_step(time / state.blend) if time < state.blend else 1.0
+        share = smooth_step(time / state.blend) if 0.0 <= time < state.blend else 1.0
         start = self._before[1]
         return start + share * (state.root.height - start)
 
@@ -178,7 +178,7 @@ class StateMachine:
         """The targets of all joints."""
         kit, state = self._kit, self._state
         pose = kit.poses.free(state, at)
-        if time < state.blend:
+        if 0.0 <= time < state.blend:  # an earlier state than the last one may be asked about
             share = smooth_step(time / state.blend)
             pose.position = kit.poses.between(self._before[0], pose.position, share)
             pose.position[:6] = at.body.position[:6]
