@@ -1,5 +1,7 @@
 """The behaviours that react to hits, as the parameters' values say."""
 
+from functools import partial
+
 import numpy as np
 
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
@@ -20,7 +22,7 @@ _LYING = 0.5  # the part of a get-up clip in which it may begin
 @BEHAVIOURS.register("reactive")
 def _reaction(character: Character, values: Values) -> BehaviourChoice:
     kit = _make_kit(character, values)
-    return BehaviourChoice(lambda: Reaction(kit), needs_contacts=True)
+    return BehaviourChoice(partial(Reaction, kit), needs_contacts=True)
 
 
 @BEHAVIOURS.register("pursuit", *PURSUIT_PARAMETERS)
@@ -30,7 +32,7 @@ def _pursuit(character: Character, values: Values) -> BehaviourChoice:
     if settings.strikes:
         strikes = MotionLibrary(character, settings.strikes, lasting=0.0)
     return BehaviourChoice(
-        lambda: Pursuit(kit, settings, strikes), needs_contacts=True, opponent=settings.opponent
+        partial(Pursuit, kit, settings, strikes), needs_contacts=True, opponent=settings.opponent
     )
 
 

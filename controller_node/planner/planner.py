@@ -13,6 +13,7 @@ by samples); Howell et al. 2022, "Predictive Sampling: Real-time Behaviour Synth
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -55,6 +56,17 @@ class PendingPlan:
     plan: Future[Plan]
 
 
+class _FoundPlan(Future[Plan]):
+    """A plan that was sought elsewhere, and has been found; it can be copied."""
+
+    def __init__(self, plan: Plan) -> None:
+        super().__init__()
+        self.set_result(plan)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _FoundPlan, (self.result(),)
+
+
 class PredictivePlanner:
     """Plans for one character. It remembers its last plan, until an episode begins.
 
@@ -69,6 +81,7 @@ class PredictivePlanner:
 
         The first time on a machine the rollouts are compiled, which takes half a minute.
         """
+        self._made_of = (character, settings, rate_hz, gravity)
         self.settings = settings
         self._model = ContactModel(
             character, period_s=1.0 / rate_hz, gravity=gravity, friction=settings.friction
@@ -81,7 +94,7 @@ class PredictivePlanner:
         self._search = PlanSearch(self._rollouts, self._residual_model, settings, rate_hz)
         self._reference = SampledReference(self._model, self._rollouts, settings)
         self._thread = ThreadPoolExecutor(1)
-        self._act: Callable[[], None] = lambda: None
+        self._act: Callable[[], object] = int  # it does nothing
         self._rate_hz = rate_hz
         self._seed = settings.seed
         self._episode = 0
@@ -89,6 +102,15 @@ class PredictivePlanner:
         self._coming: PendingPlan | None = None
         self._anchor = Anchor()
         self._compile(character)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """For a copy, in this process or another: it goes on alike, with threads of its own."""
+        coming = self._coming
+        if coming is not None:
+            coming = replace(coming, plan=_FoundPlan(coming.plan.result()))
+        sent = {} if self.in_flight is None else self.in_flight.sent()
+        state = (self._seed, self._episode, self._plan, coming, self._anchor, sent)
+        return _copy_of, (self._made_of, state)
 
     @property
     def outlook(self) -> Outlook | None:
@@ -273,3 +295,13 @@ class PredictivePlanner:
         self, position: FloatArray, velocity: FloatArray, features: FloatArray
     ) -> PlanarState:
         return planar_state(position, velocity, *self._residual_model.balance(features))
+
+
+def _copy_of(made_of: tuple[Character, PlannerSettings, int, float], state: Any) -> object:
+    """The copy of a planner that was made of these, in its state."""
+    character, settings, rate_hz, gravity = made_of
+    copy = PredictivePlanner(character, settings, rate_hz=rate_hz, gravity=gravity)
+    copy._seed, copy._episode, copy._plan, copy._coming, copy._anchor, sent = state
+    if copy.in_flight is not None:
+        copy.in_flight.restore(sent)
+    return copy

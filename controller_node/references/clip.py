@@ -3,7 +3,7 @@
 import cmath
 from bisect import bisect_right
 from collections.abc import Sequence
-from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from msgs_config.parameters import Parameter, Values
 _BLEND_TIME = 0.15  # s before the wrap, over which the gap to the first frame is closed
 
 _STRAIGHT = 1e-9  # rad a cycle; below it the geometric series is its limit
+_CycleMotion: TypeAlias = tuple[complex, complex, complex, FloatArray]
 
 
 class ClipReference:
@@ -46,7 +47,7 @@ class ClipReference:
         self._velocities = self._segment_velocities()
         self._no_acceleration = np.zeros(layout.size)
         self._last = self._at_end()
-        self._cycle_motion = lru_cache(maxsize=2)(self._motion_of)  # this cycle's and the next's
+        self._cycle_motions: dict[int, _CycleMotion] = {}  # of this cycle and the next
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the clip's first frame."""
@@ -139,7 +140,11 @@ class ClipReference:
         `z = exp(i turn)`; n of them shift by `d (1 + z + ... + z^(n-1))`. The products are written
         out: numpy's own of complex numbers depend on the processor.
         """
-        start, shift, turn, turn_xyzw = self._cycle_motion(cycle)
+        motions = self._cycle_motions
+        if cycle not in motions:
+            motions.pop(min(motions, default=cycle) if len(motions) > 1 else cycle, None)
+            motions[cycle] = self._motion_of(cycle)
+        start, shift, turn, turn_xyzw = motions[cycle]
         x, y = positions[:, 0] - start.real, positions[:, 1] - start.imag
         begin = start + shift
         positions[:, 0] = begin.real + (turn.real * x - turn.imag * y)
@@ -149,7 +154,7 @@ class ClipReference:
         velocities[:, 1] = turn.real * y + turn.imag * x
         orientations[:, 0] = rotations.multiply(turn_xyzw, orientations[:, 0])
 
-    def _motion_of(self, cycle: int) -> tuple[complex, complex, complex, FloatArray]:
+    def _motion_of(self, cycle: int) -> _CycleMotion:
         """Start, shift, turn, and the turn's quaternion, that `cycle` cycles add up to."""
         start = complex(*self._positions[0, :2])
         displacement = complex(*self._positions[-1, :2]) - start

@@ -31,7 +31,7 @@ class DynamicsModel:
         self._layout = character.layout
         self._model = _compile(character, gravity)
         self._data = mujoco.MjData(self._model)
-        self._qpos, self._qvel, self._mass = self._data.qpos, self._data.qvel, self._data.M  # views
+        self._find_views()
         self._mass_matrix = np.zeros((self._layout.size, self._layout.size))
         self._damping = character.passive_damping()
         self._is_damped = bool(self._damping.any())
@@ -41,6 +41,13 @@ class DynamicsModel:
         self._identity = np.zeros(self._model.nq)
         self._identity[quaternion_starts(self._model)] = 1.0
         self._start, self._desired = self._identity.copy(), self._identity.copy()
+
+    def __setstate__(self, attributes: dict[str, object]) -> None:
+        self.__dict__ |= attributes
+        self._find_views()  # a copy's are of the data copied
+
+    def _find_views(self) -> None:
+        self._qpos, self._qvel, self._mass = self._data.qpos, self._data.qvel, self._data.M
 
     def update(self, position: FloatArray, velocity: FloatArray) -> None:
         """Take over a state: position (n,), message form, and velocity (n,)."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from msgs_config.geometry import fixed_order, rotations
 
 ROOT = "root"
 """Name of the floating base's joint to the world."""
+_MAX_LISTS = 16  # of names, whose indices are remembered
 
 
 class JointType(Enum):
@@ -102,8 +103,7 @@ class JointLayout:
         self.size = start
         self._index = {name: index for index, name in enumerate(self.dof_names)}
         self._joint = {joint.name: joint for joint in placed}
-        # the same few lists of names come with every message
-        self._cached_indices = lru_cache(maxsize=16)(self._find_indices)
+        self._found: dict[tuple[str, ...], IntArray] = {}  # the indices of lists of names
         if len(self._index) < start or len(self._joint) < len(placed):
             raise LayoutError("two joints or degrees of freedom have the same name")
 
@@ -145,7 +145,12 @@ class JointLayout:
         Raises:
             LayoutError: a name is unknown or repeated, or a part of a ball joint is missing.
         """
-        return self._cached_indices(dof_names)
+        found = self._found.get(dof_names)
+        if found is None:
+            if len(self._found) >= _MAX_LISTS:  # the same few come with every message
+                self._found.clear()
+            found = self._found[dof_names] = self._find_indices(dof_names)
+        return found
 
     def _find_indices(self, dof_names: tuple[str, ...]) -> IntArray:
         for name in dof_names:

@@ -1,5 +1,7 @@
 """The behaviour `state_machine`, as the parameters' values say."""
 
+from functools import partial
+
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.state_machine.body import BodyReader
 from controller_node.behaviours.state_machine.check import check_machine
@@ -26,7 +28,7 @@ STATE_MACHINE = "state_machine"
 def _state_machine(character: Character, values: Values) -> BehaviourChoice:
     _check(character, values)
     kit = make_kit(character, values)
-    return BehaviourChoice(lambda: StateMachine(kit), needs_contacts=True, makes_effort=True)
+    return BehaviourChoice(partial(StateMachine, kit), needs_contacts=True, makes_effort=True)
 
 
 def make_kit(character: Character, values: Values) -> MachineKit:
