@@ -11,6 +11,7 @@ from controller_node.references.files.reconstructed import ReconstructedClip
 from controller_node.references.offsets import RecordedPlan
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
+from msgs_config.extras import installation_of
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import COMMAND_DELAY
 
@@ -94,5 +95,5 @@ def saying_what_it_needs(planner: str) -> Iterator[None]:
         if (error.name or "").partition(".")[0] not in ("numba", "llvmlite"):
             raise
         raise ConfigurationError(
-            f"planner '{planner}' needs numba ({error}): pip install 'actuated_characters[plan]'"
+            f"planner '{planner}' needs numba ({error}): {installation_of('plan')}"
         ) from error

@@ -10,6 +10,7 @@ from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.character.model import Shape, ShapeType
 from msgs_config.errors import CharacterError
+from msgs_config.extras import installation_of
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 _SIDES = np.array(  # corners of each, counterclockwise from outside
@@ -69,7 +70,7 @@ def _read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
         import trimesh
     except ImportError as error:
         raise CharacterError(
-            f"mesh {path} is an .obj, which takes trimesh to draw: pip install trimesh"
+            f"mesh {path} is an .obj, which takes trimesh to draw: {installation_of('meshes')}"
         ) from error
     try:
         mesh = trimesh.load_mesh(path, process=False, skip_materials=True)

@@ -18,6 +18,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.meshes.check import check_mesh, is_stl_of_text
 from msgs_config.errors import CharacterError
+from msgs_config.extras import installation_of
 from msgs_config.geometry import fixed_order
 
 _MAX_TRIANGLES = 2_000_000
@@ -153,7 +154,8 @@ def _read_by_trimesh(path: Path, raw: bytes) -> FloatArray:
         import trimesh
     except ImportError as error:
         raise CharacterError(
-            f"mesh {path} is a {path.suffix}, which takes trimesh to read: pip install trimesh"
+            f"mesh {path} is a {path.suffix}, which takes trimesh to read: "
+            f"{installation_of('meshes')}"
         ) from error
     scene = trimesh.load_scene(io.BytesIO(raw), file_type=path.suffix[1:].lower())
     if sum(len(each.faces) for each in scene.geometry.values()) > _MAX_TRIANGLES:

@@ -135,6 +135,18 @@ def test_without_the_library_one_line_says_how_to_get_it(
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".ply"])
+def test_without_trimesh_one_line_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    path = tmp_path / f"wedge{suffix}"
+    WEDGE.export(path)
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+
+    with pytest.raises(CharacterError, match=r"pip install -e '\.\[meshes\]'"):
+        read_vertices(path)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".ply"])
 def test_other_formats_are_read_with_the_poses_of_their_parts(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"wedge{suffix}"
     scene = trimesh.Scene()
