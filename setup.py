@@ -82,6 +82,8 @@ setup(
         "robots": ["pin>=3.7,<5"],
         # Meshes of .glb and .ply files to collide with (4.8 MB, MIT, pure Python).
         "meshes": ["trimesh>=4.5,<6"],
+        # Characters in .xacro files (76 kB, BSD-3, pure Python); a ROS install has it.
+        "xacro": ["xacro>=2.0,<3"],
         # `colcon test` chooses pytest because this extra, of this name, lists it.
         # The linters are held to one minor version: a new one may have new rules.
         "test": [
@@ -105,6 +107,7 @@ setup(
             "types-PyYAML>=6.0.12",
             "urdfdom-py>=1.2.1.post1,<2",
             "viser>=1.1,<1.2",
+            "xacro>=2.0,<3",
         ],
     },
     entry_points={

@@ -1,13 +1,15 @@
 """Files from outside: found by name, read as data with a limit on size, never evaluated."""
 
+import codecs
 import importlib.util
 import re
 from contextlib import suppress
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import yaml
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
@@ -19,6 +21,21 @@ MAX_YAML_CHARACTERS = 128 * 1024  # PyYAML is slow: a second for as much
 MAX_XML_CHARACTERS = 2 * 1024 * 1024
 MAX_XML_NESTING = 64
 _PACKAGE = "package://"
+_LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+_LFS_POINTER_BYTES = 1024  # a pointer is smaller than that, by its specification
+_BYTE_ORDER_MARKS = (  # UTF-32's little-endian one begins as UTF-16's does
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+    (b"<\0", "utf-16-le"),
+    (b"\0<", "utf-16-be"),
+)
+LFS_REASON = (
+    "is a Git LFS pointer, not the file itself; 'git lfs pull' in its repository gets the file"
+)
+_DECLARED_ENCODING = re.compile(rb"""\s*<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._:-]+)["']""")
 
 
 def resolve(path: str, relative_to: Path, error: type[ActuatedCharactersError]) -> Path:
@@ -49,18 +66,83 @@ def read_text(path: Path, error: type[ActuatedCharactersError], most: int | None
     """The text of a file of so many bytes at most, by default `MAX_FILE_BYTES`.
 
     Raises:
-        error: it is missing, unreadable, too large or no text.
+        error: it is missing, unreadable, too large, a Git LFS pointer or no text in UTF-8.
     """
+    try:
+        return _universal_newlines(_read_bytes(path, error, most).decode("utf-8"))
+    except UnicodeDecodeError as cause:
+        raise error(f"{path}: not a text file") from cause
+
+
+def _read_bytes(path: Path, error: type[ActuatedCharactersError], most: int | None) -> bytes:
     most = MAX_FILE_BYTES if most is None else most
     try:
         if path.exists() and not path.is_file():
             raise error(f"{path}: not a file")
         if path.stat().st_size > most:
             raise error(f"{path}: larger than {most >> 20} MiB")
-        return path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as cause:  # ValueError: no UTF-8, or a NUL in the path
+        raw = path.read_bytes()
+    except (OSError, ValueError) as cause:  # ValueError: a NUL in the path
         reason = cause.strerror if isinstance(cause, OSError) else "not a text file"
         raise error(f"{path}: {reason}") from cause
+    if raw.startswith(_LFS_POINTER):
+        raise error(f"{path} {LFS_REASON}")
+    return raw
+
+
+def is_lfs_pointer(path: Path) -> bool:
+    """Whether a file is the pointer that Git has in place of one of Git LFS.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    if path.stat().st_size > _LFS_POINTER_BYTES:
+        return False
+    with path.open("rb") as file:
+        return file.read(len(_LFS_POINTER)) == _LFS_POINTER
+
+
+class XmlText(NamedTuple):
+    """The text of an XML file."""
+
+    text: str
+    misread: str
+    """Says so if the file is not in the encoding that it declares; else empty."""
+
+
+def read_xml(path: Path, error: type[ActuatedCharactersError]) -> XmlText:
+    """The text of an XML file, in whatever encoding its byte order mark or declaration names.
+
+    One that is not in its encoding, as files with comments in another language are, is read byte
+    by byte (ISO-8859-1): all that XML itself and its numbers are written with is ASCII.
+
+    Raises:
+        error: it is missing, unreadable, too large, a Git LFS pointer or no text.
+    """
+    raw = _read_bytes(path, error, None)
+    text, misread = _decode_xml(path, raw)
+    text = text.rstrip("\0")  # in which PyBullet's own files end
+    if "\0" in text:
+        raise error(f"{path}: not a text file")
+    return XmlText(_universal_newlines(text), misread)
+
+
+def _decode_xml(path: Path, raw: bytes) -> tuple[str, str]:
+    """The text of an XML file's bytes, and a line if they are not in the encoding that it names."""
+    mark = next((name for mark, name in _BYTE_ORDER_MARKS if raw.startswith(mark)), None)
+    declared = _DECLARED_ENCODING.match(raw)
+    encoding = mark or ("utf-8" if declared is None else declared[1].decode())
+    if mark is None and encoding.lower().startswith(("utf-16", "utf-32", "ucs")):
+        encoding = "utf-8"  # a declaration that can be read byte by byte is wrong
+    for each in (encoding, "utf-8"):
+        with suppress(LookupError, ValueError):  # LookupError: there is no such encoding
+            return raw.decode(each), ""
+    reason = f"{path.name} is not {encoding}: it is read byte by byte (ISO-8859-1)"
+    return raw.decode("latin-1"), reason
+
+
+def _universal_newlines(text: str) -> str:
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def parse_yaml_mapping(
@@ -143,6 +225,9 @@ _PlainLoader.add_constructor(f"{_TAG}int", lambda _, node: int(node.value))
 def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> ElementTree.Element:
     """The root element of an XML file's text, which may end in a NUL as PyBullet's own do.
 
+    Names stay as they are written, prefix and all: as robots' readers have it, a prefix that is not
+    declared is no error, and a default name space alters nothing.
+
     Raises:
         error: the text is no XML, declares a document type, or is too deep or too large.
     """
@@ -150,7 +235,7 @@ def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> El
         raise error(f"{path}: larger than {MAX_XML_CHARACTERS >> 20} MiB")
     try:
         root = deepcopy(_parse_xml(text))
-    except (ElementTree.ParseError, ValueError) as cause:  # ValueError: an unknown encoding
+    except (expat.ExpatError, ValueError) as cause:  # ValueError: a lone surrogate
         raise error(f"{path}: not valid XML: {str(cause)[:200]}") from cause
     level = [root]
     for _ in range(MAX_XML_NESTING):
@@ -162,15 +247,17 @@ def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> El
 
 @lru_cache(maxsize=4)  # a node's start reads its character's URDF several times
 def _parse_xml(text: str) -> ElementTree.Element:
-    parser = ElementTree.XMLParser(target=_TreeBuilder())
-    parser.feed(text.strip("\0 \t\r\n"))
-    root: ElementTree.Element = parser.close()
-    return root
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = _refuse_document_type
+    parser.Parse(text.strip("\ufeff\0 \t\r\n"), True)
+    return builder.close()
 
 
-class _TreeBuilder(ElementTree.TreeBuilder):
-    """Elements without a document type, by whose entities a small text becomes a large one."""
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        # it comes before the entities that it declares
-        raise ElementTree.ParseError("a document type (DOCTYPE) is not allowed")
+def _refuse_document_type(name: str, *_: object) -> None:
+    """By the entities of a document type a small text becomes a large one; it comes before them."""
+    page = ": it is a web page, not the file itself" if name.lower() == "html" else ""
+    raise ValueError(f"a document type (DOCTYPE) is not allowed{page}")

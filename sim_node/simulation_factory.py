@@ -8,6 +8,7 @@ from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.character.urdf.check import check_urdf
+from msgs_config.character.urdf.source import read_urdf_text
 from msgs_config.errors import CharacterError
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
@@ -94,6 +95,6 @@ def change_world(world: WorldSettings, values: Values) -> WorldSettings:
 
 def _read_terrain(path: str) -> UrdfOptions:
     urdf = files.resolve(path, Path.cwd(), CharacterError)
-    text = files.read_text(urdf, CharacterError)
+    text = read_urdf_text(urdf).text
     check_urdf(urdf, text)
     return UrdfOptions(urdf, text, fixed_base=True)

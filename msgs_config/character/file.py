@@ -10,7 +10,14 @@ from msgs_config.character.joint_bounds import write_bounds
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
 from msgs_config.character.sensors import Sensor, read_sensors
 from msgs_config.character.urdf.check import check_urdf
+from msgs_config.character.urdf.formats import (
+    URDF_SUFFIXES,
+    YAML_SUFFIXES,
+    check_suffix,
+    is_urdf,
+)
 from msgs_config.character.urdf.frames import has_massless_base
+from msgs_config.character.urdf.source import read_urdf_text
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.mappings import LARGEST, MappingReader
 
@@ -25,8 +32,18 @@ _GAIN_KEYS = ("stiffness", "damping", "integral")
 _JOINT_KEYS = (*_GAIN_KEYS, "effort_limit", "lower", "upper", "passive_damping", "soft_limit")
 _CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets")
 _URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision", "collision")
+_SOURCE_KEYS = ("xacro", "left_out")
 _POSE_KEYS = ("joint_damping", "rest_pose", "on_ground", "joints", "automatic_gains")
-_KEYS = (*_URDF_KEYS, *_POSE_KEYS, "root_assistance", "clips", "feet", "planner", "sensors")
+_KEYS = (
+    *_URDF_KEYS,
+    *_SOURCE_KEYS,
+    *_POSE_KEYS,
+    "root_assistance",
+    "clips",
+    "feet",
+    "planner",
+    "sensors",
+)
 ALONE: dict[str, Any] = {
     "inertia": "filled",
     "on_ground": True,
@@ -57,6 +74,10 @@ class CharacterFile:
     feet: tuple[str, ...]
     planning: Planning
     sensors: tuple[Sensor, ...]
+    left_out: frozenset[
+        str
+    ]  # kinds of what does not count in the URDF, of which no line is printed
+    misread: tuple[str, ...]  # the line that says so if the URDF is not in its encoding
 
 
 def shipped_characters() -> list[str]:
@@ -65,20 +86,22 @@ def shipped_characters() -> list[str]:
 
 
 def character_path(name_or_path: str) -> Path:
-    """The file of a shipped character, or the one of a path that ends in `.yaml` or `.urdf`.
+    """The file of a shipped character, or that of a path to a YAML file or a URDF.
 
-    A path may be relative to the working directory, absolute, or `package://NAME/...`.
+    A path may be relative to the working directory, absolute, or `package://NAME/...`; its suffix
+    is `.yaml`, `.urdf`, `.xacro` or `.xml`, in capitals or not.
 
     Raises:
-        CharacterError: there is no such character or package.
+        CharacterError: there is no such character or package, or the file is of another format.
     """
-    if name_or_path.endswith((".yaml", ".yml", ".urdf")):
+    if name_or_path.lower().endswith((*YAML_SUFFIXES, *URDF_SUFFIXES)):
         path = files.resolve(name_or_path, Path.cwd(), CharacterError)
     elif name_or_path in shipped_characters():
         path = CHARACTERS_DIRECTORY / f"{name_or_path}.yaml"
     else:
+        check_suffix(Path(name_or_path))
         sentence = one_of("character", name_or_path, shipped_characters())
-        raise CharacterError(f"{sentence}, or the path of a .yaml or .urdf file")
+        raise CharacterError(f"{sentence}, or the path of a .yaml, .urdf or .xacro file")
     return path
 
 
@@ -89,8 +112,7 @@ def read_character_file(name_or_path: str) -> CharacterFile:
         CharacterError: names the file, the key and what would be right.
     """
     path = character_path(name_or_path)
-    alone = path.suffix == ".urdf"
-    return _parse(path, "" if alone else files.read_text(path, CharacterError), None)
+    return _parse(path, "" if is_urdf(path) else files.read_text(path, CharacterError), None)
 
 
 def read_character_texts(path: Path, text: str, urdf: Path, urdf_text: str) -> CharacterFile:
@@ -107,7 +129,7 @@ def read_character_texts(path: Path, text: str, urdf: Path, urdf_text: str) -> C
 
 def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFile:
     content: dict[str, Any] = {"urdf": path.name, **ALONE}
-    if text or path.suffix != ".urdf":
+    if text or not is_urdf(path):
         content = files.parse_yaml_mapping(path, text, CharacterError)
     reader = MappingReader(path, content, CharacterError)
     reader.check_keys(_KEYS)
@@ -115,11 +137,12 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
     reader.part("root_assistance").check_keys(["force", "torque"])
     assistance = reader.parts("root_assistance", _GAIN_KEYS)
     rest_pose = reader.part("rest_pose")
+    loading, misread = _read_urdf(path, reader, joints, urdf)
     return CharacterFile(
-        name=path.stem,
+        name=_name(path),
         path=path,
         text=text,
-        loading=_read_urdf(path, reader, joints, urdf),
+        loading=loading,
         up_axis=reader.choice("up_axis", ["z", "y"]),
         rest_pose={name: rest_pose.number(name) for name in rest_pose.content},
         on_ground=reader.flag("on_ground"),
@@ -138,7 +161,14 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
         feet=reader.names("feet", "links", default=[]),
         planning=_read_planning(reader.part("planner"), joints),
         sensors=read_sensors(reader.part("sensors")),
+        left_out=frozenset(reader.names("left_out", "elements and attributes", default=[])),
+        misread=misread,
     )
+
+
+def _name(path: Path) -> str:
+    """The name of a file's character: that of `robot.urdf.xacro` is `robot`."""
+    return Path(path.stem).stem if Path(path.stem).suffix.lower() == ".urdf" else path.stem
 
 
 def _read_urdf(
@@ -146,14 +176,17 @@ def _read_urdf(
     reader: MappingReader,
     joints: dict[str, MappingReader],
     known: tuple[Path, str] | None,
-) -> UrdfOptions:
-    """How the URDF is to be read; `known` are its path and its text, bounds and all."""
+) -> tuple[UrdfOptions, tuple[str, ...]]:
+    """How the URDF is to be read, and lines about its text.
+
+    `known` are its path and its text, bounds and all.
+    """
+    misread = ""
     if known is None:
         urdf = _resolve(path, reader, "urdf")
-        text = files.read_text(urdf, CharacterError)
+        text, misread = read_urdf_text(urdf, _read_arguments(reader.part("xacro")))
     else:
         urdf, text = known
-    robot = check_urdf(urdf, text)
     scale = reader.number("scale", default=1.0, minimum=1e-6)
     inertia = reader.choice("inertia", ["file", "shapes", "filled"])
     bounds = {
@@ -161,9 +194,13 @@ def _read_urdf(
         for name, joint in joints.items()
         if "lower" in joint.content or "upper" in joint.content
     }
-    return UrdfOptions(
+    if bounds and known is None:
+        check_urdf(urdf, text, limits=False)
+        text = write_bounds(files.parse_xml(urdf, text, CharacterError), bounds, scale, path)
+    robot = check_urdf(urdf, text)
+    loading = UrdfOptions(
         urdf_path=urdf,
-        urdf_text=text if known or not bounds else write_bounds(robot, bounds, scale, path),
+        urdf_text=text,
         scale=scale,
         fixed_base=reader.flag("fixed_base", default=has_massless_base(robot)),
         inertia_from_file=inertia != "shapes",
@@ -171,6 +208,17 @@ def _read_urdf(
         self_collision=reader.flag("self_collision"),
         collisions=reader.choice("collision", ["file", "none"]) == "file",
     )
+    return loading, (misread,) if misread else ()
+
+
+def _read_arguments(xacro: MappingReader) -> dict[str, str]:
+    """The arguments of a xacro, as its texts have them."""
+    texts = {}
+    for name, value in xacro.content.items():
+        if not isinstance(value, str | int | float):
+            raise xacro.wrong(name, value, "a text, a number, true or false")
+        texts[name] = str(value).lower() if isinstance(value, bool) else str(value)
+    return texts
 
 
 def _read_bound(joint: MappingReader, key: str) -> float | None:

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree
 
+from msgs_config.character.urdf.joints import read_bounds
 from msgs_config.errors import CharacterError
 
 Bounds = tuple[float | None, float | None]
@@ -56,6 +57,7 @@ def _set_bounds(joint: ElementTree.Element, given: Bounds, unit: float) -> None:
 
 
 def _own_bounds(kind: str, limit: ElementTree.Element) -> tuple[float, float]:
-    """The URDF's bounds; infinite where the engine takes the joint for unlimited."""
-    lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "-1"))
-    return (-math.inf, math.inf) if kind == "continuous" or lower > upper else (lower, upper)
+    """The URDF's bounds; infinite where it has none, or none that can be."""
+    lower, upper = read_bounds(limit)
+    bounded = kind != "continuous" and bool({"lower", "upper"} & set(limit.attrib))
+    return (lower, upper) if bounded and lower <= upper else (-math.inf, math.inf)

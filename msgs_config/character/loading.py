@@ -74,7 +74,7 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         layout = JointLayout((link.joint.name, link.joint.type) for link in links)
     except LayoutError as error:
         raise CharacterError(f"{file.loading.urdf_path}: {error}") from error
-    _check_names(file, layout)
+    _check_names(file, layout, repairs.fixed)
     _check_rest_pose(file, links)
     has_shapes = {link.name: bool(link.collision_shapes) for link in links}
     check_sensors(file.path, file.sensors, has_shapes)
@@ -89,7 +89,12 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         clips=file.clips,
         feet=file.feet,
         planning=file.planning,
-        warnings=(*_collect_warnings(file, layout, links), *missing, *repairs.warnings),
+        warnings=(
+            *_collect_warnings(file, layout, links),
+            *missing,
+            *repairs.warnings,
+            *(each.line for each in file.loading.remarks if each.kind not in file.left_out),
+        ),
         sensors=file.sensors,
         up_axis=file.up_axis,
         frames=repairs.frames,
@@ -201,8 +206,11 @@ def _check_links(urdf: Path, links: list[Link]) -> None:
             )
 
 
-def _check_names(file: CharacterFile, layout: JointLayout) -> None:
-    """Check that the file names joints and degrees of freedom that there are."""
+def _check_names(file: CharacterFile, layout: JointLayout, fixed: frozenset[str]) -> None:
+    """Check that the file names joints and degrees of freedom that there are.
+
+    Of a joint that became a fixed one (`fixed`) gains and bounds are no mistake.
+    """
 
     def check(key: str, names: Iterable[str], what: str, known: list[str]) -> None:
         for name in names:
@@ -210,7 +218,7 @@ def _check_names(file: CharacterFile, layout: JointLayout) -> None:
                 raise CharacterError(f"{file.path}: {key}: {one_of(what, name, known)}")
 
     joints, clips = layout.actuated_joint_names, file.clips
-    check("joints", file.gains, "joint", joints)
+    check("joints", [name for name in file.gains if name not in fixed], "joint", joints)
     check("clips.joints", clips.joints, "joint", joints)
     check("planner.sigma", file.planning.sigma, "joint", joints)
     check("planner.gains", file.planning.gains, "joint", joints)
@@ -245,7 +253,7 @@ def _collect_warnings(
     file: CharacterFile, layout: JointLayout, links: list[Link]
 ) -> tuple[str, ...]:
     limp = [name for name in layout.actuated_joint_names if name not in file.gains]
-    warnings = []
+    warnings = list(file.misread)
     if limp and not file.automatic_gains:
         warnings.append(f"joints without gains in {file.path.name} are limp: {', '.join(limp)}")
     if file.loading.fixed_base and "fixed_base" not in file.text and links[0].name != "world":

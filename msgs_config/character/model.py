@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.sensors import Sensor
-from msgs_config.errors import CharacterError
+from msgs_config.character.urdf.reading import ReadUrdf, read_robot
+from msgs_config.character.urdf.vocabulary import LeftOut
 from msgs_config.geometry import rotations
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 
@@ -185,9 +185,18 @@ class UrdfOptions:
     collisions: bool = True  # else nothing of it collides, and meshes may be missing
 
     @cached_property
+    def _read(self) -> ReadUrdf:
+        return read_robot(self.urdf_path, self.urdf_text)
+
+    @property
     def robot(self) -> ElementTree.Element:
-        """The root of the URDF's text, parsed once; to be copied before it is changed."""
-        return files.parse_xml(self.urdf_path, self.urdf_text, CharacterError)
+        """The root of what counts in the URDF; to be copied before it is changed."""
+        return self._read.robot
+
+    @property
+    def remarks(self) -> tuple[LeftOut, ...]:
+        """A line for each kind of what does not count in the URDF, or counts otherwise."""
+        return self._read.remarks
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ _SEED = 1
 _ROOT_ENTRIES = 6
 _TURN = 0.3  # rad or m that entries are away from the rest pose, at the most
 _SPEED = 1.0  # rad/s or m/s, at the most
+_DAMPED = 1e-3  # of a speed: what damping may take of it in an instant, and be a derivative
 _ACCELERATION = 10.0  # rad/s^2 or m/s^2 that one effort alone leads to, at the most
 
 
@@ -47,8 +48,8 @@ def probe_engine(character: Character, gravity: float) -> tuple[DynamicsSample, 
     """What the engine makes of a character: a dynamics sample, and the inverse mass matrix (n, n).
 
     The sample's state is off the rest pose and within all limits; it moves in every degree of
-    freedom. Each effort is such as to accelerate its own one by about as much as gravity does, so
-    that none hides another.
+    freedom but those that passive damping would stop within an instant. Each effort is such as to
+    accelerate its own one by about as much as gravity does, so that none hides another.
 
     Args:
         character: The character.
@@ -66,6 +67,8 @@ def probe_engine(character: Character, gravity: float) -> tuple[DynamicsSample, 
         inverse_mass = _inverse_mass_matrix(world, body, character)
         _check_inverse_mass(character, np.diag(inverse_mass))
         effort = rng.uniform(-_ACCELERATION, _ACCELERATION, layout.size) / np.diag(inverse_mass)
+        rate = character.passive_damping() * np.diag(inverse_mass)
+        velocity[rate * INSTANT > _DAMPED] = 0.0
         passive = PassiveForces(character, INSTANT, inverse_mass)
         world.set_gravity(gravity)
         body.set_state(position, velocity)
@@ -127,7 +130,6 @@ def _check_inverse_mass(character: Character, inverse_mass_diagonal: FloatArray)
     if sound.all():
         return
     worst = int(np.argmin(sound))
-    lower, upper = character.position_bounds()
     base_mass = character.links[0].mass
     if character.layout.has_floating_base and worst < _ROOT_ENTRIES and base_mass:
         reason = (
@@ -136,8 +138,6 @@ def _check_inverse_mass(character: Character, inverse_mass_diagonal: FloatArray)
         )
     elif character.layout.has_floating_base and worst < _ROOT_ENTRIES:
         reason = "the base link has no mass, so the engine holds it; 'fixed_base: true' says so too"
-    elif lower[worst] == upper[worst]:
-        reason = f"'{character.layout.dof_names[worst]}' has no room between its limits"
     else:
         reason = f"nothing with mass or inertia moves at '{character.layout.dof_names[worst]}'"
     raise CharacterError(f"{character.file}: {reason}")

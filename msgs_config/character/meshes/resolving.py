@@ -33,8 +33,8 @@ def resolve_meshes(loading: UrdfOptions) -> ResolvedMeshes:
     Where nothing collides that goes for all shapes.
 
     Raises:
-        CharacterError: a mesh to collide with does not exist or is too large; names the file, link
-            and path.
+        CharacterError: a mesh to collide with does not exist, is too large or a Git LFS pointer;
+            names the file, link and path.
     """
     robot, urdf = deepcopy(loading.robot), loading.urdf_path
     missing: list[str] = []
@@ -103,6 +103,8 @@ def _find(name: str, urdf: Path) -> Path:
             if path.is_file():
                 if path.stat().st_size > MAX_MESH_BYTES:
                     raise CharacterError(f"mesh {path} is larger than {MAX_MESH_BYTES >> 20} MiB")
+                if files.is_lfs_pointer(path):
+                    raise CharacterError(f"mesh {path} {files.LFS_REASON}")
                 return path.absolute()
         except OSError:  # such as a name that is too long
             continue

@@ -6,16 +6,19 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from msgs_config import files
+from msgs_config.character.urdf.formats import check_root
 from msgs_config.character.urdf.frames import MAX_JOINTS, find_frames, joint_end
 from msgs_config.character.urdf.inertia import LEAST_MOMENT, ROUNDING
+from msgs_config.character.urdf.joints import WITH_BOUNDS, read_bounds
+from msgs_config.character.urdf.reading import WITH_AXIS, read_axis
+from msgs_config.character.urdf.vocabulary import leave_out_unknown
 from msgs_config.errors import CharacterError
 
 MAX_LINKS = 2000
 MAX_POSITION_ENTRIES = 128  # beyond them PyBullet reads states as empty, without an error
 MAX_NAME_BYTES = 255
 
-_WITH_AXIS = ("revolute", "continuous", "prismatic")
-_TYPES = (*_WITH_AXIS, "spherical", "fixed")
+_TYPES = (*WITH_AXIS, "spherical", "fixed")
 _LARGEST = 1e30  # the engine's single precision ends at 3e38
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _ANY, _POSITIVE = -_LARGEST, 0.0
@@ -54,17 +57,21 @@ NUMBERS = {  # by element and attribute: how many, and the least that they may b
 }
 
 
-def check_urdf(path: Path, text: str) -> ElementTree.Element:
-    """Parse a URDF and check all of it that the engine takes for granted; returns its root.
+def check_urdf(path: Path, text: str, limits: bool = True) -> ElementTree.Element:
+    """Parse a URDF and check all that the engine takes for granted; returns what counts of it.
 
     Names are unique, the joints make one tree of all links that is not too large for the engine,
-    and what should be a number is one.
+    bounds are in order, which `limits` leaves out, and what should be a number is one.
 
     Raises:
         CharacterError: it is not so; names the file and the link or joint.
     """
     robot = files.parse_xml(path, text, CharacterError)
+    check_root(path, robot)
+    leave_out_unknown(robot)
     links, joints = robot.findall("link"), robot.findall("joint")
+    if not links:
+        raise CharacterError(f"{path}: it has no links")
     names = [link.get("name", "") for link in links]
     ends = [(joint_end(joint, "parent"), joint_end(joint, "child")) for joint in joints]
     for element in links + joints:
@@ -80,6 +87,10 @@ def check_urdf(path: Path, text: str) -> ElementTree.Element:
     _check_tree(path, names, ends)
     for element in [*links, *joints, *robot.findall("material")]:
         _check_numbers(path, element)
+    for joint in joints:
+        _check_direction(path, joint)
+        if limits:
+            _check_limits(path, joint)
     return robot
 
 
@@ -131,9 +142,34 @@ def _check_numbers(path: Path, part: ElementTree.Element) -> None:
                 )
     for inertial in part.findall("inertial") if part.tag == "link" else ():
         _check_inertial(path, part, inertial)
-    axis = part.find("axis") if part.get("type") in _WITH_AXIS else None
-    if axis is not None and not any(float(number) for number in axis.get("xyz", "1").split()):
-        raise CharacterError(f"{path}: joint {part.get('name')!r} has an axis of length zero")
+
+
+def _check_direction(path: Path, joint: ElementTree.Element) -> None:
+    axis = joint.find("axis") if joint.get("type") in WITH_AXIS else None
+    if axis is not None and not any(read_axis(axis)):
+        raise CharacterError(
+            f"{path}: joint {joint.get('name')!r} has an axis of length zero; it must have a "
+            "direction, such as '1 0 0'"
+        )
+
+
+def _check_limits(path: Path, joint: ElementTree.Element) -> None:
+    """Check that bounds are in order, and that an effort or a velocity can be below its limit."""
+    limit = joint.find("limit") if joint.get("type") != "fixed" else None
+    if limit is None:
+        return
+    place = f"{path}: joint {joint.get('name')!r}"
+    for name in ("effort", "velocity"):
+        if float(limit.get(name, "0")) < 0.0:
+            raise CharacterError(
+                f"{place}: {name} of <limit> is {limit.get(name)}; it must be at least 0"
+            )
+    lower, upper = read_bounds(limit)
+    if joint.get("type") in WITH_BOUNDS and lower > upper:
+        raise CharacterError(
+            f"{place}: lower of <limit> is {lower:g}, upper is {upper:g} (0 where it is not "
+            "given); lower must not be above upper, and a hinge without bounds is 'continuous'"
+        )
 
 
 def _check_inertial(path: Path, link: ElementTree.Element, inertial: ElementTree.Element) -> None:

@@ -7,6 +7,7 @@ from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.meshes.triangles import file_for_engine
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf.check import NUMBERS
+from msgs_config.character.urdf.joints import WITH_BOUNDS
 from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError
 
@@ -35,10 +36,7 @@ def write_engine_urdf(loading: UrdfOptions, directory: Path) -> str:
             if attribute in element.attrib:
                 element.set(attribute, " ".join(element.attrib[attribute].split()))
     _convert_meshes(robot, loading.urdf_path, directory)
-    for joint in robot.findall("joint[@type='continuous']"):
-        for limit in joint.findall("limit"):  # has no bounds, but the engine would report some
-            limit.attrib.pop("lower", None)
-            limit.attrib.pop("upper", None)
+    _write_defaults(robot)
     ElementTree.indent(robot)
     text = ElementTree.tostring(robot, encoding="unicode")
     if any(len(line.encode()) > MAX_LINE_BYTES for line in text.splitlines()):
@@ -47,6 +45,17 @@ def write_engine_urdf(loading: UrdfOptions, directory: Path) -> str:
             "the engine cannot read it"
         )
     return text
+
+
+def _write_defaults(robot: ElementTree.Element) -> None:
+    """Give each joint what ROS has for a number that is not there, where the engine differs."""
+    for joint in robot.findall("joint"):
+        for limit in joint.findall("limit"):
+            lower, upper = limit.attrib.pop("lower", "0"), limit.attrib.pop("upper", "0")
+            if joint.get("type") in WITH_BOUNDS:
+                limit.attrib.update(lower=lower, upper=upper)
+        for dynamics in joint.findall("dynamics"):
+            dynamics.attrib.setdefault("damping", "0")
 
 
 def _convert_meshes(robot: ElementTree.Element, urdf: Path, directory: Path) -> None:

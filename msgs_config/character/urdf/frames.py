@@ -78,17 +78,6 @@ class LinkTree:
                 fixed.append(joint.get("name", ""))
         return fixed
 
-    def fix_locked_joints(self) -> list[str]:
-        """Fix hinges and sliders whose limits leave nothing but 0; returns their names."""
-        fixed = []
-        for joint in self._joints:
-            limit = joint.find("limit") if joint.get("type") in ("revolute", "prismatic") else None
-            ends = [] if limit is None else [limit.get("lower", "0"), limit.get("upper", "0")]
-            if ends and not any(map(float, ends)):
-                joint.set("type", "fixed")
-                fixed.append(joint.get("name", ""))
-        return fixed
-
     def merge_frames(self) -> dict[str, str]:
         """Merge all frames; returns the name of each, with that of the link it is merged into."""
         for joint in find_frames(self._robot):

@@ -20,6 +20,8 @@ ROUNDING = 1e-9
 """Of the largest moment of inertia: what a file's digits may leave of a zero."""
 LEAST_MOMENT = 1e-15
 """Moments of inertia, kg m^2, that are rounding whatever the others are."""
+LEAST_MASS = 1e-15
+"""Masses, kg, that count as none: the engines divide by no smaller ones."""
 
 _DIAGONAL, _BESIDE = ("ixx", "iyy", "izz"), (("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2))
 ENTRIES = (*_DIAGONAL, *(name for name, _, _ in _BESIDE))
@@ -61,8 +63,9 @@ def read_inertial(link: ElementTree.Element) -> Inertial:
         for name, row, column in _BESIDE:
             tensor[row, column] = tensor[column, row] = float(inertia.get(name, "0"))
     rows = [(x, y, z) for x, y, z in tensor.tolist()]
+    value = 0.0 if mass is None else float(mass.get("value", "0"))
     return Inertial(
-        0.0 if mass is None else float(mass.get("value", "0")),
+        value if value > LEAST_MASS else 0.0,
         read_origin(inertial),
         (rows[0], rows[1], rows[2]),
     )

@@ -8,9 +8,10 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Frame, UrdfOptions
-from msgs_config.character.urdf.frames import LinkTree
+from msgs_config.character.urdf.frames import LinkTree, joint_end
 from msgs_config.character.urdf.inertia import (
     ENTRIES,
+    LEAST_MASS,
     LEAST_MOMENT,
     Inertial,
     ball_moment,
@@ -20,11 +21,12 @@ from msgs_config.character.urdf.inertia import (
     write_inertial,
     write_moments,
 )
+from msgs_config.character.urdf.joints import fix_locked_joints
 from msgs_config.character.urdf.origin import write_origin
+from msgs_config.character.urdf.vocabulary import listed
 from msgs_config.geometry import fixed_order, rotations
 
 _CHANGED = 1e-6  # of the largest moment of inertia: what is more than a file's last digits
-_NAMED = 5  # names in a warning
 
 
 class Repairs(NamedTuple):
@@ -32,6 +34,8 @@ class Repairs(NamedTuple):
 
     frames: tuple[Frame, ...]
     """The links that were merged into others; a frame that others are in comes first."""
+    fixed: frozenset[str]
+    """The names of the hinges and sliders that became fixed joints."""
     warnings: tuple[str, ...]
     """One of each kind of change."""
 
@@ -39,34 +43,36 @@ class Repairs(NamedTuple):
 def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
     """Change a URDF's root to what it means.
 
-    Joints that move no mass are fixed. Links without `<inertial>` that are fixed to others are
-    merged into those; others have no mass. A floating base without mass takes that of a link which
-    is fixed to it. With `inertia_from_file` each inertia is given about its principal axes, and
-    where no body can have it, it is the nearest that one can. With `fill_inertia` a link that has
-    a mass but no inertia, as files have for whatever they do not know, has that of a ball of water;
-    where no link has a mass, each with a shape has 1 kg.
+    Joints that move no mass are fixed, and those whose limits leave one position, in that. Links
+    without `<inertial>` that are fixed to others are merged into those; others have no mass. A
+    floating base without mass takes that of a link which is fixed to it. With `inertia_from_file`
+    each inertia is given about its principal axes, and where no body can have it, it is the nearest
+    that one can. With `fill_inertia` a link that has a mass but no inertia, as files have for
+    whatever they do not know, has that of a ball of water; where no link has a mass, each with a
+    shape has 1 kg.
     """
-    filled = _fill_masses(robot) if loading.fill_inertia else []
+    warnings = _fill_masses(robot, loading) if loading.fill_inertia else []
+    locked = fix_locked_joints(robot)
+    if locked:
+        places = [f"{name} at {position:.4g}" for name, position in locked.items()]
+        warnings.append(f"joints whose limits leave no room are fixed: {listed(places)}")
     tree = LinkTree(robot)
-    merged = _merge_links(tree, loading)
-    changed = _repair_links(robot, loading)
-    frames = [replace(each, pose=each.pose.scaled(loading.scale)) for each in tree.frames]
-    return Repairs(tuple(reversed(frames)), (*filled, *merged, *changed))
+    empty = tree.fix_empty_joints()
+    if empty:
+        warnings.append(f"joints that move no mass are fixed at 0: {listed(empty)}")
+    warnings += _merge_links(tree, loading)
+    warnings += _repair_links(robot, loading)
+    frames = [replace(each, pose=each.pose.scaled(loading.scale)) for each in reversed(tree.frames)]
+    return Repairs(tuple(frames), frozenset((*locked, *empty)), tuple(warnings))
 
 
 def _merge_links(tree: LinkTree, loading: UrdfOptions) -> list[str]:
-    """Fix joints that cannot move, and merge links without mass; a warning of each kind."""
+    """Merge links without mass into others; a warning of each kind."""
     warnings = []
-    locked = tree.fix_locked_joints()
-    if locked:
-        warnings.append(f"joints whose limits leave no room are fixed at 0: {_listed(locked)}")
-    fixed = tree.fix_empty_joints()
-    if fixed:
-        warnings.append(f"joints that move no mass are fixed at 0: {_listed(fixed)}")
     frames = tree.merge_frames()
     if frames:
         pairs = [f"{name} of {link}" for name, link in frames.items()]
-        warnings.append(f"links without <inertial> are frames of others: {_listed(pairs)}")
+        warnings.append(f"links without <inertial> are frames of others: {listed(pairs)}")
     merged = [] if loading.fixed_base else tree.give_base_mass()
     if merged:
         base = tree.base().get("name")
@@ -76,12 +82,16 @@ def _merge_links(tree: LinkTree, loading: UrdfOptions) -> list[str]:
 
 def _repair_links(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]:
     """Give each link an inertia that a body can have; a warning of each kind of change."""
-    changed, scaled, filled = list[str](), list[str](), list[str]()
+    changed, scaled, filled, tiny = list[str](), list[str](), list[str](), list[str]()
     for link in robot.findall("link"):
         inertial = link.find("inertial")
         if inertial is None:
             write_inertial(link, 0.0, 0.0)  # for which the engine would assume 1 kg and 1 kg m^2
             continue
+        mass = inertial.find("mass")
+        if mass is not None and read_inertial(link).mass == 0.0 != float(mass.get("value", "0")):
+            tiny.append(f"{link.get('name')} ({mass.get('value')})")
+            mass.set("value", "0")
         if inertial.find("inertia") is None:  # which the engine would refuse
             write_moments(ElementTree.SubElement(inertial, "inertia"), (0.0, 0.0, 0.0))
         if loading.inertia_from_file:
@@ -89,12 +99,14 @@ def _repair_links(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]
             changed += _repair_inertia(link)
             filled += _fill_inertia(link) if loading.fill_inertia else []
     warnings = []
+    if tiny:
+        warnings.append(f"masses of at most {LEAST_MASS:g} kg count as none: {listed(tiny)}")
     if scaled:
-        warnings.append(f"<inertia_scaling>, which is Bullet's own, multiplies: {_listed(scaled)}")
+        warnings.append(f"<inertia_scaling>, which is Bullet's own, multiplies: {listed(scaled)}")
     if filled:
         warnings.append(
             "links with a mass but no inertia, or none about an axis, with that of a ball of water "
-            f"(kg m^2): {_listed(filled)}"
+            f"(kg m^2): {listed(filled)}"
         )
     if changed:
         warnings.append(
@@ -104,26 +116,29 @@ def _repair_links(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]
     return warnings
 
 
-def _listed(names: list[str]) -> str:
-    more = len(names) - _NAMED
-    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+def _fill_masses(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]:
+    """Give links 1 kg each if none has a mass and some joint moves; a warning if so.
 
-
-def _fill_masses(robot: ElementTree.Element) -> list[str]:
-    """Give each link with a shape 1 kg if none has a mass and some joint moves; a warning if so."""
+    They are those with a shape, also with one whose mesh is missing; where there are no shapes,
+    those that a joint moves.
+    """
     links = robot.findall("link")
-    has_mass = any(read_inertial(link).mass for link in links)
-    if has_mass or all(joint.get("type") == "fixed" for joint in robot.findall("joint")):
+    moving = [joint for joint in robot.findall("joint") if joint.get("type") != "fixed"]
+    if not moving or any(read_inertial(link).mass for link in links):
         return []
-    filled = []
-    for link in links:
-        if link.find("visual") is None and link.find("collision") is None:
-            continue
+    names = {link.get("name") for link in loading.robot.findall("link") if _has_shape(link)}
+    names = names or {joint_end(joint, "child") for joint in moving}
+    filled = [link for link in links if link.get("name") in names]
+    for link in filled:
         for inertial in link.findall("inertial"):
             link.remove(inertial)
         write_inertial(link, 1.0, ball_moment(1.0))
-        filled.append(link.get("name", ""))
-    return [f"no link has a mass; these have 1 kg each: {_listed(filled)}"] if filled else []
+    named = listed(link.get("name", "") for link in filled)
+    return [f"no link has a mass; these have 1 kg each: {named}"]
+
+
+def _has_shape(link: ElementTree.Element) -> bool:
+    return link.find("visual") is not None or link.find("collision") is not None
 
 
 def _fill_inertia(link: ElementTree.Element) -> list[str]:

@@ -11,6 +11,7 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import Character, Link, Pose, Quadruple, Shape, ShapeType
 from msgs_config.character.urdf.described_joints import DescribedJoint, DescribedJoints
+from msgs_config.character.urdf.joints import fix_locked_joints
 from msgs_config.character.urdf.origin import write_numbers, write_origin
 from msgs_config.frame_names import BASE_FRAME
 from msgs_config.geometry import rotations
@@ -30,6 +31,7 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
     joints = DescribedJoints(character, base_frame)
     if character.loading.scale == 1.0 and _is_legal(character.loading.robot):
         robot = resolve_meshes(character.loading).robot
+        fix_locked_joints(robot)
         for mesh in robot.iterfind("link//mesh"):
             mesh.set("filename", Path(mesh.get("filename", "")).as_uri())
         fixed = {joint.name for joint in joints.fixed}  # also what moves no mass

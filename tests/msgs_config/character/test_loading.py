@@ -39,7 +39,10 @@ def test_joints_without_gains_in_a_file_are_limp_and_named(tmp_path: Path) -> No
 
     assert named.gains["hinge"] == Gains()
     assert not np.any(named.rest_position)
-    assert named.warnings == ("joints without gains in robot.yaml are limp: hinge",)
+    assert named.warnings == (
+        "joints without gains in robot.yaml are limp: hinge",
+        "left out: velocity limits, which nothing keeps (1): hinge",
+    )
 
 
 @pytest.mark.parametrize(
@@ -85,7 +88,8 @@ def test_it_may_lie_in_a_package() -> None:
         ("package://no_such_package/x.urdf", "'no_such_package'"),
         ("a\0.urdf", "must be a path"),
         ("a\0.yaml", "not a text file"),
-        ("arm.xacro", "or the path of a .yaml or .urdf file"),
+        ("arm.xacro", "No such file"),
+        ("arm.txt", "or the path of a .yaml, .urdf or .xacro file"),
     ],
 )
 def test_one_that_is_not_there_is_refused(name: str, words: str) -> None:
@@ -122,6 +126,7 @@ def test_joints_that_move_no_mass_are_named(tmp_path: Path) -> None:
         "base link 'base' has no mass, so that it is fixed",
         "joints that move no mass are fixed at 0: elbow",
         "links without <inertial> are frames of others: lower of upper",
+        "left out: velocity limits, which nothing keeps (2): shoulder, elbow",
     )
 
 
