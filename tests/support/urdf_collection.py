@@ -1,10 +1,12 @@
 """Tries the URDF files of packages of other makers: which hold, which are refused, and why.
 
-`make robots` gets the packages (850 MB in build/robots) and Pinocchio, and runs this module. Each
-file is tried in a process to itself: the engine can take its process down.
+`make robots` gets the packages (850 MB in build/robots) and Pinocchio, and runs this module; with a
+folder, such as one of cloned repositories, it tries the files in that one. Each file is tried in a
+process to itself: the engine can take its process down.
 """
 
 import argparse
+import hashlib
 import json
 import multiprocessing
 import tempfile
@@ -44,6 +46,25 @@ def find_urdfs(downloaded: Path) -> dict[str, list[Path]]:
         files = sorted(folder.rglob("*.urdf"))
         found[name] = [file for file in files if _is_one_of_few(file)]
     return found
+
+
+def find_urdfs_of(folder: Path, most: int) -> dict[str, list[Path]]:
+    """The URDF files in a folder by the folder in it, so many of each at most, each text once."""
+    texts, found = set[bytes](), dict[str, list[Path]]()
+    for file in sorted(folder.rglob("*")):
+        if file.suffix.lower() == ".urdf" and file.is_file():
+            digest = hashlib.sha256(file.read_bytes()).digest()
+            if digest not in texts:
+                texts.add(digest)
+                found.setdefault(file.relative_to(folder).parts[0], []).append(file)
+    return {name: _spread(files, most) for name, files in found.items()}
+
+
+def _spread(files: list[Path], most: int) -> list[Path]:
+    """So many files at most, from all over a list."""
+    if len(files) <= most:
+        return files
+    return [files[number * len(files) // most] for number in range(most)]
 
 
 def _is_one_of_few(file: Path) -> bool:
@@ -132,16 +153,21 @@ def describe(result: TrialResult) -> str:
 def main() -> None:
     """Print the result of each file, and of each package how many there were of each kind."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, help="of other files")
+    parser.add_argument("--most", type=int, default=1000, help="files of each folder in it")
     parser.add_argument("--downloaded", type=Path, default=DOWNLOADED)
     parser.add_argument("--match", default="", help="only files with this in their path")
-    parser.add_argument("--duration", type=float, default=2.0, help="of each trial, simulated s")
-    parser.add_argument("--timeout", type=float, default=120.0, help="of each trial, s")
+    parser.add_argument("--duration", type=float, default=5.0, help="held and limp, simulated s")
+    parser.add_argument("--timeout", type=float, default=300.0, help="of each trial, s")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--without-shapes", action="store_true", help="try them without meshes")
     parser.add_argument("--json", type=Path, help="write all results to this file")
     options = parser.parse_args()
     counts, agreed, results = dict[str, Counter[str]](), Counter[bool](), {}
-    for package, files in find_urdfs(options.downloaded).items():
+    found = find_urdfs(options.downloaded)
+    if options.folder is not None:
+        found = find_urdfs_of(options.folder, options.most)
+    for package, files in found.items():
         matching = [file for file in files if options.match in str(file)]
         counts[package] = Counter()
         for file, result in try_all(matching, options):
@@ -151,9 +177,9 @@ def main() -> None:
             results[str(file)] = asdict(result)
             print(f"{package}\t{file.name}\t{describe(result)}", flush=True)
     print()
-    for package, found in [*counts.items(), ("all", sum(counts.values(), Counter[str]()))]:
-        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(found.items()))
-        print(f"{package}: {found.total()} files: {kinds}")
+    for package, count in [*counts.items(), ("all", sum(counts.values(), Counter[str]()))]:
+        kinds = ", ".join(f"{number} {kind}" for kind, number in sorted(count.items()))
+        print(f"{package}: {count.total()} files: {kinds}")
     print(
         f"compared with Pinocchio: {agreed[True]} agree to {_AGREEMENT:g}, {agreed[False]} do not"
     )

@@ -1,9 +1,15 @@
-"""One URDF of other makers: its character held for some seconds, its dynamics compared."""
+"""One URDF of other makers: its character held and let fall, its dynamics compared.
 
+And each element of its file, read here by a parser of another kind, either counts or is in a line.
+"""
+
+from collections import Counter
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from xml.dom import minidom
 from xml.etree import ElementTree
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 
@@ -26,6 +32,8 @@ _ALTERED = (
     "joints that move no mass",
     "joints whose limits leave no room",
     "<inertia_scaling>",
+    "axes of another length",
+    "masses of at most",
 )
 _REMEDY = "'collision: none' does without"  # of what refuses a missing mesh
 _STATES = 5  # in which the dynamics are compared
@@ -35,7 +43,9 @@ _STATES = 5  # in which the dynamics are compared
 class TrialResult:
     """What became of a URDF."""
 
-    kind: str  # ran, refused or diverged (without collisions or not); traceback, crashed, too slow
+    kind: str
+    """ran, refused, diverged or diverged limp (without collisions or not); lost an element;
+    traceback, crashed, too slow."""
     reason: str = ""
     size: int = 0  # degrees of freedom
     mass: float = 0.0  # kg
@@ -51,7 +61,7 @@ class TrialResult:
 
 
 def try_urdf(path: Path, duration: float) -> TrialResult:
-    """Hold the character of a URDF alone; an error that is not ours is raised.
+    """Hold the character of a URDF alone, then let it fall; an error that is not ours is raised.
 
     One that lacks meshes is tried again without collisions, as its refusal says.
     """
@@ -64,20 +74,19 @@ def try_urdf(path: Path, duration: float) -> TrialResult:
 
 def _try(path: Path, duration: float, *, collides: bool) -> TrialResult:
     character, drift = None, 0.0
-    settings = {"collision": FROM_FILE if collides else NO_COLLISIONS}
     try:
         character = load_character(str(path), collides)
-        plan = make_plan(str(path), duration, {"reference": "hold"}, settings, {}, loaded=character)
-        rest = np.array(character.rest_position)
-        for tick in ticks_in_process(plan):
-            drift = float(np.abs(tick.following.position - rest).max(initial=0.0))
+        drift = _drift(character, path, duration, collides)
     except ActuatedCharactersError as error:
         kind = "diverged" if isinstance(error, SimulationError) else "refused"
         result = TrialResult(kind, str(error))
     else:
-        result = TrialResult("ran")
+        result = _let_fall(character, path, duration, collides)
     if character is None:
         return result
+    silent = lost_without_a_line(path, character)
+    if silent and result.kind == "ran":
+        result = TrialResult("lost an element", f"no line names {', '.join(silent)}")
     return replace(
         result,
         size=character.layout.size,
@@ -86,6 +95,49 @@ def _try(path: Path, duration: float, *, collides: bool) -> TrialResult:
         warnings=character.warnings,
         differences=compare_with_pinocchio(character),
     )
+
+
+def _drift(
+    character: Character, path: Path, duration: float, collides: bool, strength: float = 1.0
+) -> float:
+    """How far a character ends from its rest pose, rad or m, that is held with some strength."""
+    settings = {"collision": FROM_FILE if collides else NO_COLLISIONS}
+    strengths = {f"strength.{name}": strength for name in character.layout.actuated_joint_names}
+    hold = {"reference": "hold"}
+    plan = make_plan(str(path), duration, hold, settings, strengths, loaded=character)
+    rest, drift = np.array(character.rest_position), 0.0
+    for tick in ticks_in_process(plan):
+        drift = float(np.abs(tick.following.position - rest).max(initial=0.0))
+    return drift
+
+
+def _let_fall(character: Character, path: Path, duration: float, collides: bool) -> TrialResult:
+    try:
+        _drift(character, path, duration, collides, strength=0.0)
+    except SimulationError as error:
+        return TrialResult("diverged limp", str(error))
+    return TrialResult("ran")
+
+
+def lost_without_a_line(path: Path, character: Character) -> list[str]:
+    """The names of elements of a URDF that neither count nor are in a line of the character's.
+
+    Nothing of a file that the judge, a parser with name spaces, does not read.
+    """
+    try:
+        document = minidom.parseString(path.read_bytes().strip(b"\0 \t\r\n"))
+    except (ExpatError, ValueError, LookupError):
+        return []
+    there, counted = Counter[str](), Counter(each.tag for each in character.loading.robot.iter())
+    pending = [document.documentElement]
+    while pending:
+        element = pending.pop()
+        assert element is not None
+        there[element.tagName] += 1
+        if not any(f"<{element.tagName}>" in line for line in character.warnings):
+            pending += [each for each in element.childNodes if isinstance(each, minidom.Element)]
+    gone = sorted(name for name, count in there.items() if count > counted[name])
+    return [name for name in gone if not any(f"<{name}>" in line for line in character.warnings)]
 
 
 def compare_with_pinocchio(character: Character) -> dict[str, float]:
