@@ -193,8 +193,8 @@ class Simulation:
 
     def __reduce__(self) -> NoReturn:
         raise SimulationError(
-            "a Simulation can be neither copied nor pickled; make another one of the same "
-            "character, start and parameters where it is needed"
+            "a Simulation can be neither copied nor pickled; its snapshot() can, and another one "
+            "of the same character and parameters goes on from that by restore()"
         )
 
     def close(self) -> None:
