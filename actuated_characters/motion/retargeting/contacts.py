@@ -90,16 +90,20 @@ def _still_part(contact: Contact, positions: FloatArray) -> Contact:
 
 def joined(touches: BoolArray, frame_time: float) -> tuple[Contact, ...]:
     """The contacts of frames (f,) that touch; short breaks closed, and short contacts left out."""
-    edges = np.flatnonzero(np.diff(touches.astype(int), prepend=0, append=0))
-    spans = [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     merged: list[tuple[int, int]] = []
-    for first, last in spans:
+    for first, last in ((first, end - 1) for first, end in spans(touches)):
         if merged and (first - merged[-1][1] - 1) * frame_time < _GAP:
             merged[-1] = (merged[-1][0], last)
         else:
             merged.append((first, last))
     least = _least_frames(frame_time)
     return tuple(Contact(first, last) for first, last in merged if last - first + 1 >= least)
+
+
+def spans(chosen: BoolArray) -> list[tuple[int, int]]:
+    """The spans of frames (f,) that are chosen: the first frame of each, and the one after it."""
+    edges = np.flatnonzero(np.diff(chosen.astype(int), prepend=0, append=0)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _least_frames(frame_time: float) -> int:
@@ -122,8 +126,7 @@ def flat_frames(contacts: Mapping[str, tuple[Contact, ...]], side: str, frames: 
 def _with_hysteresis(enters: BoolArray, stays: BoolArray) -> BoolArray:
     """The frames (f,) that lie in a span of frames that stay, of which one enters."""
     touches = np.zeros_like(stays)
-    edges = np.flatnonzero(np.diff(stays.astype(int), prepend=0, append=0))
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
+    for first, end in spans(stays):
         if enters[first:end].any():
             touches[first:end] = True
     return touches

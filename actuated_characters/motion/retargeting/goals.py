@@ -19,6 +19,7 @@ _BONE, _TWIST = 1 / 0.06, 1 / 0.5  # rad, of limbs across and about their bones
 _PELVIS = np.array((1 / 0.03, 1 / 0.03, 1 / 0.03))  # m
 _ANKLE = 1 / 0.03  # m
 _GROUND, _LIMIT = 1 / 0.001, 1 / 0.005  # m below it, rad beyond one
+_OVERLAP = 1 / 0.002  # m
 _ACCELERATION, _ROOT_ACCELERATION = 90.0, 25.0  # rad/s^2 and m/s^2
 MARGIN = 0.001  # m over the ground
 
@@ -48,6 +49,8 @@ def free_goals(body: CapturedBody, target: TargetBody, turns: SegmentTurns) -> G
         surface=target.surface,
         clearance=np.full((body.frames, len(target.surface.links)), MARGIN),
         ground_weight=_GROUND,
+        capsules=target.capsules,
+        overlap_weight=_OVERLAP,
         limit_weight=_LIMIT,
         acceleration=acceleration,
     )

@@ -1,15 +1,16 @@
 """Inverse kinematics of a whole motion: Gauss-Newton on all frames at once.
 
 Each frame has residuals: turns and places of links against what they should be, points below the
-ground, joints beyond their limits. Second differences of the coordinates join the frames, so the
-motion is smooth where the residuals leave it free. Jacobians are MuJoCo's.
+ground, shapes that overlap, joints beyond their limits. Second differences of the coordinates join
+the frames, so the motion is smooth where the residuals leave it free. Jacobians are MuJoCo's.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from actuated_characters.motion.retargeting.capsules import Capsules
 from actuated_characters.motion.retargeting.smooth_least_squares import solve_smooth
 from actuated_characters.motion.retargeting.target_body import SurfacePoints, TargetBody
 from msgs_config.arrays import FloatArray, IntArray
@@ -25,6 +26,8 @@ _LARGEST_STEP = 0.4  # rad or m
 _ENOUGH = 3e-4  # rad or m of the largest step, at which an iteration ends
 _ACTIVE_SETS = 5  # solutions of a step, between which bounds come and go
 _WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and of these solved again
+_NEAR = 0.2  # m between two shapes at first, beyond which a solution does not bring them together
+_NEAREST = 8  # pairs of shapes a frame that are kept apart, the nearest ones
 
 Linear = tuple[FloatArray, FloatArray]
 """Jacobians (f, m, n) of m residuals in f frames, and what is missing (f, m)."""
@@ -47,24 +50,20 @@ class Goals:
     surface: SurfacePoints
     clearance: FloatArray  # (f, s) m, of each ball of the surface over the ground
     ground_weight: float  # 1/m below that
+    capsules: Capsules
+    overlap_weight: float  # 1/m nearer to each other than their margins
     limit_weight: float  # 1/rad beyond a limit
     acceleration: FloatArray  # (n,) m/s^2 or rad/s^2 that count as much as a residual of one
 
     def part(self, frames: slice) -> "Goals":
         """The goals of some frames."""
-        return Goals(
-            self.links,
-            self.turns_xyzw[frames],
-            self.turn_weights[frames],
-            self.point_links,
-            self.point_offsets,
-            self.places[frames],
-            self.place_weights[frames],
-            self.surface,
-            self.clearance[frames],
-            self.ground_weight,
-            self.limit_weight,
-            self.acceleration,
+        return replace(
+            self,
+            turns_xyzw=self.turns_xyzw[frames],
+            turn_weights=self.turn_weights[frames],
+            places=self.places[frames],
+            place_weights=self.place_weights[frames],
+            clearance=self.clearance[frames],
         )
 
 
@@ -72,7 +71,7 @@ class InverseKinematics:
     """Finds the motion of a character that does best what some goals say."""
 
     def __init__(self, target: TargetBody, frame_time: float, iterations: int = 25) -> None:
-        self._layout = target.character.layout
+        self._layout, self._link_count = target.character.layout, len(target.character.links)
         self._bounds = target.bounds
         self._hard = target.character.position_bounds()
         self._model = DynamicsModel(target.character)
@@ -103,6 +102,7 @@ class InverseKinematics:
         self, guess: GeneralizedPosition, goals: Goals, fixed: int
     ) -> GeneralizedPosition:
         """The motion of a window, the first frames of which are fixed (Levenberg-Marquardt)."""
+        goals = replace(goals, capsules=self._near_capsules(guess, goals.capsules))
         spring = 1.0 / (goals.acceleration * self._frame_time**2)
         weights = self._frame_time / _USUAL_FRAME * spring**2
         damping, now = _DAMPING, self._linearised(guess, goals, weights)
@@ -151,20 +151,19 @@ class InverseKinematics:
         self, now: GeneralizedPosition, goals: Goals, weights: FloatArray
     ) -> "_Linearised":
         """A motion with its residuals; accelerations have weights (n,)."""
-        used, index = np.unique(
-            np.concatenate((goals.links, goals.point_links, goals.surface.links)),
-            return_inverse=True,
-        )
+        of_each = goals.links, goals.point_links, goals.surface.links, goals.capsules.links
+        used, index = np.unique(np.concatenate(of_each), return_inverse=True)
         origins, axes, jacobians = self._kinematics(now.position, used)
-        turned, placed, touching = np.split(
-            index, np.cumsum((len(goals.links), len(goals.point_links)))
-        )
+        ends = np.cumsum([len(links) for links in of_each[:-1]])
+        turned, placed, touching, shaped = np.split(index, ends)
+        capsules = replace(goals.capsules, links=shaped)
         wanted = (
             self._turns(goals, axes[:, turned], jacobians[:, turned]),
             self._places(goals, origins[:, placed], axes[:, placed], jacobians[:, placed]),
         )
         bounded = (
             self._ground(goals, origins[:, touching], axes[:, touching], jacobians[:, touching]),
+            _apart(capsules, goals.overlap_weight, origins, axes, jacobians),
             *self._limits(goals, now),
         )
         share = float(np.sqrt(self._frame_time / _USUAL_FRAME))
@@ -192,6 +191,17 @@ class InverseKinematics:
             for row, link in enumerate(links.tolist()):
                 jacobians[frame, row] = self._model.point_jacobian(link, origins[frame, row])
         return origins, axes, jacobians
+
+    def _near_capsules(self, motion: GeneralizedPosition, capsules: Capsules) -> Capsules:
+        """The capsules with those pairs alone that come near to each other in a motion."""
+        links = np.arange(self._link_count)
+        frames, still = len(motion.position), np.zeros(self._layout.size)
+        origins, axes = np.empty((frames, len(links), 3)), np.empty((frames, len(links), 3, 3))
+        for frame, position in enumerate(motion.position):
+            self._model.update(position, still)
+            origins[frame], axes[frame] = self._model.link_frames(links)
+        distance = capsules.nearest(origins, axes).distance
+        return capsules.of_pairs(np.flatnonzero((distance < _NEAR).any(axis=0)))
 
     def _turns(
         self, goals: Goals, axes: FloatArray, jacobians: FloatArray
@@ -259,6 +269,29 @@ def _normal_equations(jacobian: FloatArray, missing: FloatArray) -> Linear:
 
 def _rows(motion: GeneralizedPosition, rows: slice) -> GeneralizedPosition:
     return GeneralizedPosition(motion.position[rows], motion.orientations_xyzw[rows])
+
+
+def _apart(
+    capsules: Capsules,
+    weight: float,
+    origins: FloatArray,
+    axes: FloatArray,
+    jacobians: FloatArray,
+) -> Linear:
+    """How the nearest pairs of shapes go from each other, and by how much they must."""
+    near = capsules.nearest(origins, axes)
+    missing = capsules.margins - near.distance
+    count = min(_NEAREST, missing.shape[1])
+    rows = np.arange(len(missing))[:, np.newaxis]
+    pairs = np.argsort(-missing, axis=1, kind="stable")[:, :count]
+    direction = near.direction[rows, pairs]
+    leaving = np.zeros((*pairs.shape, jacobians.shape[-1]))
+    for side, points, sign in ((0, near.first, 1.0), (1, near.second, -1.0)):
+        links = capsules.links[capsules.pairs[pairs, side]]
+        moment = fixed_order.cross(points[rows, pairs] - origins[rows, links], direction)
+        wrench = sign * np.concatenate((direction, moment), axis=-1)
+        leaving += np.matmul(wrench[..., np.newaxis, :], jacobians[rows, links])[..., 0, :]
+    return weight * leaving, weight * missing[rows, pairs]
 
 
 def _point_jacobians(jacobians: FloatArray, arms: FloatArray) -> FloatArray:

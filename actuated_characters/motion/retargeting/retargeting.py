@@ -129,7 +129,8 @@ def retarget(
         goals = free_goals(body, target, turns)
         guess = first_guess(body, target, turns)
         loose = solver.solve(guess, goals, _share(progress, 0, body.frames))
-        goals = with_stances(goals, target, loose, contacts, body.frame_time)
+        clearance = foot_clearance(body)
+        goals = with_stances(goals, target, loose, contacts, clearance, body.frame_time)
         shown = solver.solve(loose, goals, _share(progress, body.frames, body.frames))
     else:  # nothing is to be altered, not even where it stands
         rows = slice(conventions.first_frame, None)
@@ -180,6 +181,20 @@ def body_contacts(body: CapturedBody) -> dict[str, tuple[Contact, ...]]:
             else ()
         )
     return contacts
+
+
+def foot_clearance(body: CapturedBody) -> dict[str, FloatArray]:
+    """How far (f,) the lower of heel and toes is over where it is on the ground, by side, m."""
+    clearance: dict[str, FloatArray] = {}
+    for role in ("ankle", "toe"):
+        heights = {
+            side: smoothed(_foot_point(body, side, role), body.frame_time)[:, 2] for side in SIDES
+        }
+        ground = ground_height(np.concatenate([*heights.values()]))
+        for side, height in heights.items():
+            above = np.maximum(height - ground, 0.0)
+            clearance[side] = np.minimum(clearance.get(side, above), above)
+    return clearance
 
 
 def _foot_point(body: CapturedBody, side: str, role: str) -> FloatArray:

@@ -2,7 +2,7 @@
 
 Toes or a heel that stand have one place on the ground, the mean of their time there, or that which
 the other part of the foot, where it stands, leaves them. While no part of a foot stands, its sole
-is lifted as far as it can be in the time since it stood, so that it neither scuffs nor slides.
+is lifted, so that it neither scuffs nor slides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuated_characters.motion.retargeting.contacts import Contact, mask
+from actuated_characters.motion.retargeting.contacts import Contact, mask, spans
 from actuated_characters.motion.retargeting.goals import MARGIN, link_motion
 from actuated_characters.motion.retargeting.inverse_kinematics import Goals
 from actuated_characters.motion.retargeting.skeleton_map import SIDES
@@ -23,7 +23,9 @@ _STANDING, _HAND = 1 / 0.001, 1 / 0.01  # 1/m, of points of soles and hands
 _BLEND, _BLENDED = 0.06, 0.05  # s before and after it in which a stance takes hold, and how far
 _FLAT = 0.7  # cosine of the tilt of a sole that is put flat on the ground
 _ALONG = np.array((1.0, 1.0, 0.0))  # one that is not is held along the ground alone
-_LIFT, _LIFT_SPEED = 0.02, 0.25  # m and m/s by which a foot that swings is clear of the ground
+_RAISED = 0.02  # m that a foot in the middle of its swing is lifted over the captured one
+_LEAST_LIFT, _USUAL_LIFT, _MOST_LIFT = 0.02, 0.03, 0.08  # m; the second one where it can be
+_LIFT_SPEED = 0.4  # m/s
 
 
 @dataclass
@@ -41,6 +43,7 @@ def with_stances(
     target: TargetBody,
     loose: GeneralizedPosition,
     contacts: Mapping[str, Sequence[Contact]],
+    clearance: Mapping[str, FloatArray],
     frame_time: float,
 ) -> Goals:
     """The goals with feet and hands that stand still while they touch the ground.
@@ -50,17 +53,18 @@ def with_stances(
         target: The character.
         loose: Its motion for those goals (f, n), which says where it stands.
         contacts: Of `left_heel`, `left_toe`, `left_hand` and their like.
+        clearance: By side, how far (f,) the lower of heel and toes is over the ground, m.
         frame_time: s.
     """
     frames = len(loose.position)
-    points, clearance = _Points([], [], [], []), goals.clearance.copy()
+    points, lifted = _Points([], [], [], []), goals.clearance.copy()
     for side in SIDES:
         parts = [contacts[f"{side}_{part}"] for part in ("toe", "heel")]
         touching = [mask(tuple(each), frames) for each in parts]
         _hold_foot(points, target, loose, f"{side}_ankle", parts, frame_time)
-        lift = _swing_clearance(touching[0] | touching[1], frame_time)
+        lift = _swing_clearance(touching[0] | touching[1], clearance[side], frame_time)
         foot = goals.surface.links == target.map[f"{side}_ankle"]
-        clearance[:, foot] += lift[:, np.newaxis]
+        lifted[:, foot] += lift[:, np.newaxis]
         if contacts[f"{side}_hand"] and f"{side}_wrist" in target.map:
             _hold_hand(points, target, loose, f"{side}_wrist", contacts[f"{side}_hand"], frame_time)
     places, weights = np.stack(points.places, axis=1), np.stack(points.weights, axis=1)
@@ -71,7 +75,7 @@ def with_stances(
         point_offsets=np.concatenate((goals.point_offsets, np.array(points.offsets))),
         places=np.concatenate((goals.places, places), axis=1),
         place_weights=np.concatenate((goals.place_weights, weights), axis=1),
-        clearance=clearance,
+        clearance=lifted,
     )
 
 
@@ -181,9 +185,22 @@ def _hold(touches: BoolArray, frame_time: float) -> FloatArray:
     return np.where(touches, 1.0, _BLENDED * np.maximum(1.0 - away / _BLEND, 0.0) ** 2)
 
 
-def _swing_clearance(stands: BoolArray, frame_time: float) -> FloatArray:
-    """How far (f,) a sole is over the ground while nothing of the foot stands, m."""
-    return np.minimum(_LIFT, _LIFT_SPEED * _time_from(stands, frame_time))
+def _swing_clearance(stands: BoolArray, captured: FloatArray, frame_time: float) -> FloatArray:
+    """How far (f,) a sole is over the ground at least while nothing of the foot stands, m.
+
+    A body that is tracked hangs lower by some centimetres, so it is what the captured foot (f,)
+    clears in the middle of its swing, and more; but no more than it clears at most, and as far as
+    it can be lifted in the time since it stood.
+    """
+    wanted = np.zeros(len(stands))
+    for first, end in spans(~stands):
+        quarter = (end - first) // 4
+        lowest = captured[first + quarter : end - quarter].min()
+        raised = max(lowest + _RAISED, _USUAL_LIFT)
+        wanted[first:end] = min(raised, captured[first:end].max())
+    in_time = _LIFT_SPEED * _time_from(stands, frame_time)
+    lifted: FloatArray = np.minimum(np.clip(wanted, _LEAST_LIFT, _MOST_LIFT), in_time)
+    return lifted
 
 
 def _time_from(touches: BoolArray, frame_time: float) -> FloatArray:

@@ -1,16 +1,17 @@
 """The body of a character as retargeting sees it: which link is which, bones, soles, limits."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from actuated_characters.motion.retargeting.capsules import Capsules, make_capsules
+from actuated_characters.motion.retargeting.shape_points import balls, corners
 from actuated_characters.motion.retargeting.skeleton_map import SIDES, SkeletonMap, find_map
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.layout import JointType
-from msgs_config.character.model import Character, Shape, ShapeType
+from msgs_config.character.model import Character
 from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
@@ -84,11 +85,11 @@ class TargetBody:
         """
         link = self.map[ankle]
         turn = self.turns_xyzw[link]
-        corners = np.concatenate(
-            [_corners(shape) for shape in self.character.links[link].collision_shapes]
+        points = np.concatenate(
+            [corners(shape) for shape in self.character.links[link].collision_shapes]
             or [np.zeros((1, 3))]
         )
-        upright = rotations.rotate(turn, corners)
+        upright = rotations.rotate(turn, points)
         low, high = upright.min(axis=0), upright.max(axis=0)
         sole = np.array([(x, y, low[2]) for x in (high[0], low[0]) for y in (high[1], low[1])])
         return rotations.rotate(rotations.conjugate(turn), sole)
@@ -100,7 +101,7 @@ class TargetBody:
             (index, point, radius)
             for index, link in enumerate(self.character.links)
             for shape in link.collision_shapes
-            for point, radius in _balls(shape)
+            for point, radius in balls(shape)
         ]
         links, points, radii = zip(*rows, strict=True) if rows else ((), (), ())
         return SurfacePoints(
@@ -108,6 +109,13 @@ class TargetBody:
             np.array(points).reshape(-1, 3),
             np.array(radii, dtype=float),
         )
+
+    @cached_property
+    def capsules(self) -> Capsules:
+        """Capsules for all shapes that collide, and which of them are kept apart."""
+        left, right = (self.map[f"{side}_knee"] for side in SIDES)
+        links = self.character.links
+        return make_capsules(links, self.origins, self.turns_xyzw, (left, right))
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -119,41 +127,3 @@ class TargetBody:
                 lower[entries] = np.array(joint.soft_limit.lower) + _INSIDE
                 upper[entries] = np.array(joint.soft_limit.upper) - _INSIDE
         return lower, upper
-
-
-def _balls(shape: Shape) -> Iterator[tuple[FloatArray, float]]:
-    """Centres (3,) in the link frame and radii of balls that reach as far as a shape, m."""
-    turn, centre = np.array(shape.pose.orientation_xyzw), np.array(shape.pose.position)
-    if shape.type is ShapeType.SPHERE:
-        yield centre, shape.size[0]
-    elif shape.type in (ShapeType.CAPSULE, ShapeType.CYLINDER):
-        radius, length = shape.size
-        half = 0.5 * length
-        if shape.type is ShapeType.CYLINDER:
-            half = max(half - radius, 0.0)
-        for sign in (-1.0, 1.0):
-            yield centre + rotations.rotate(turn, np.array((0.0, 0.0, sign * half))), radius
-    else:
-        for corner in _corners(shape):
-            yield corner, 0.0
-
-
-def _corners(shape: Shape) -> FloatArray:
-    """Corners (8, 3) of a box around a shape, in the link frame, m; of a mesh its origin alone."""
-    size = shape.size
-    match shape.type:
-        case ShapeType.BOX:
-            half = 0.5 * np.array(size)
-        case ShapeType.SPHERE:
-            half = np.full(3, size[0])
-        case ShapeType.CAPSULE:
-            half = np.array((size[0], size[0], 0.5 * size[1] + size[0]))
-        case ShapeType.CYLINDER:
-            half = np.array((size[0], size[0], 0.5 * size[1]))
-        case _:
-            half = np.zeros(3)
-    signs = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1))).reshape(3, -1).T
-    corners: FloatArray = np.array(shape.pose.position) + rotations.rotate(
-        np.array(shape.pose.orientation_xyzw), signs * half
-    )
-    return corners

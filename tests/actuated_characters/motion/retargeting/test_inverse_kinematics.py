@@ -51,6 +51,8 @@ def goals_of(target: TargetBody, motion: GeneralizedPosition) -> Goals:
         surface=target.surface,
         clearance=np.full((shape[0], len(target.surface.links)), -10.0),
         ground_weight=1000.0,
+        capsules=target.capsules,
+        overlap_weight=500.0,
         limit_weight=200.0,
         acceleration=np.full(layout.size, 100.0),
     )
