@@ -55,7 +55,8 @@ class SimNode(ComposableNode):
         self._settings = make_node_settings(loaded.values)
         self._build_simulation(loaded)
         self._given = EpisodeParameters(self, loaded, self._change_parameters)
-        self._session = self._settings.session or make_session(self.get_fully_qualified_name())
+        self.session = self._settings.session or make_session(self.get_fully_qualified_name())
+        """The session of all messages of this simulator."""
         self._once_logger = OnceLogger(self)
         self._open_topics()
         self._watchdog = Watchdog(self._settings.republish_period, self._settings.lockstep_timeout)
@@ -78,7 +79,7 @@ class SimNode(ComposableNode):
         self._initial_states = InitialStates(self, self._simulation.characters, loaded)
 
     def _open_topics(self) -> None:
-        own_session = OwnSession(self._session, self._once_logger.log_once)
+        own_session = OwnSession(self.session, self._once_logger.log_once)
         self._characters = [
             CharacterInterface(
                 self,
@@ -98,7 +99,7 @@ class SimNode(ComposableNode):
         self._diagnostics = DiagnosticsPublisher(self)
         self._conflict_log = ConflictLog(self, self._once_logger)
         self._others = OtherSimulators(
-            self, [each.states for each in self._characters], self._session, self._once_logger
+            self, [each.states for each in self._characters], self.session, self._once_logger
         )
 
     def turns(self, stop: StopSignal, executor: PollingExecutor) -> Turns:
@@ -292,7 +293,7 @@ class SimNode(ComposableNode):
         values: dict[str, object] = {
             "tick": self._simulation.tick,
             "episode": self._simulation.episode,
-            "session": self._session,
+            "session": self.session,
             "paused": self._control.paused,
             "timeouts": self._timeouts,
             UNLOGGED: self._once_logger.unlogged,

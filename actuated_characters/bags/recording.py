@@ -83,6 +83,7 @@ class Recording:
     balls: tuple[BallStates | None, ...] = ()  # (t + 1,): where they are; () if there are none
     throws_sent: int = 0  # messages on `throw`
     skipped_states: int = 0  # of an episode whose first state is not in the bag
+    begins_amid: bool = False  # in the middle of an episode, and no other one begins
     world: RecordedWorld = field(default_factory=RecordedWorld)
 
     @property
@@ -165,7 +166,7 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
     """Read every character's part of the bag in a run's directory, or of a bag itself.
 
     They come in the order in which they are in their world. Messages before the first state of an
-    episode are left out.
+    episode are left out, unless none begins in the bag.
 
     Args:
         path: The directory that a run, a recorder or `ros2 bag record` has left.
@@ -259,6 +260,7 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
         balls=_at(stamp_list, world.balls, None),
         throws_sent=world.throws_sent,
         skipped_states=timeline.skipped_states,
+        begins_amid=timeline.begins_amid,
         world=rebuilt.world,
     )
 

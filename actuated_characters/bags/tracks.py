@@ -145,7 +145,8 @@ class CharacterTimeline:
         self.modes: list[ModeChange] = []
         self.plans: dict[int, PlanArrays] = {}  # by stamp
         self.pushes_sent = 0
-        self.skipped_states = 0  # before the first one of an episode
+        self._amid: list[tuple[bytes, int]] = []  # states before the first one of an episode
+        self.begins_amid = False  # its first state is in the middle of an episode
         self._controller_text = ""
         self._early: list[tuple[str, bytes, int]] = []
         self._early_lost = False
@@ -160,6 +161,11 @@ class CharacterTimeline:
             _MODE: self._take_mode,
             _PLAN: self._take_plan,
         }
+
+    @property
+    def skipped_states(self) -> int:
+        """How many states came before the first one of an episode."""
+        return len(self._amid)
 
     @property
     def rebuilt(self) -> Rebuilt | None:
@@ -189,16 +195,17 @@ class CharacterTimeline:
     def finish(self) -> Rebuilt:
         """Check that there are states of each tick; return their character.
 
+        Where no episode begins they are those of the middle of one, from which nothing follows.
+
         Raises:
-            RecordingError: there are none, or not all of them, or no first one of an episode.
+            RecordingError: there are none, or not all of them.
         """
-        if not self.states.stamps_ns and not self.skipped_states:
+        if not self.states.stamps_ns and not self._amid:
             raise RecordingError(f"no states, nothing on '{topics.JOINT_STATES.name}'")
         if not self.states.stamps_ns:
-            raise RecordingError(
-                "it begins in the middle of an episode, and no other begins in it: there is no "
-                "state from which the rest follows"
-            )
+            self.begins_amid, amid, self._amid = True, self._amid, []
+            for raw, published_ns in amid:
+                self._take_state(raw, published_ns)
         if self._gaps:
             ranges = [f"{a} to {b}" if b > a else f"{a}" for a, b in self._gaps[:_MOST_NAMED]]
             more = len(self._gaps) - _MOST_NAMED
@@ -235,8 +242,8 @@ class CharacterTimeline:
             raise RecordingError(f"the states are not those of {name}: {error}") from error
         tick, states = self._clock.tick(state.stamp_ns), self.states
         if not states.stamps_ns:
-            if state.effort is not None:
-                self.skipped_states += 1
+            if state.effort is not None and not self.begins_amid:
+                self._amid.append((raw, published_ns))
                 return
         elif tick <= self._last_tick:
             self._check_repeated(tick, state.position.tobytes() + state.velocity.tobytes())

@@ -1,8 +1,11 @@
 """The nodes of the executable `composed`: a simulator, and a controller for each character."""
 
+from rclpy.parameter import Parameter
+
 from controller_node.node import ControllerNode
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.messages import topics
+from msgs_config.messages.session import SESSION
 from msgs_config.runtime.composition import ComposableNode, Composition, destroy_nodes, errors_of
 from sim_node.node import SimNode
 from sim_node.parameters import CHARACTERS
@@ -31,12 +34,14 @@ def compose() -> Composition:
 
 
 def _make_controller(simulator: SimNode, character: str) -> ControllerNode:
-    """A controller in a character's namespace, below that of the simulator."""
+    """A controller in a character's namespace, below that of the simulator, and for it alone."""
+    own = [Parameter(SESSION.name, value=simulator.session)]
     if not character:
-        return ControllerNode()
+        return ControllerNode(parameter_overrides=own)
     # a node's own rule precedes a `__ns` for the whole process, which precedes `namespace`
     namespace = f"{simulator.get_namespace().rstrip('/')}/{character}"
-    return ControllerNode(cli_args=["--ros-args", "-r", f"__ns:={namespace}"])
+    arguments = ["--ros-args", "-r", f"__ns:={namespace}"]
+    return ControllerNode(cli_args=arguments, parameter_overrides=own)
 
 
 def _check_names(nodes: list[ComposableNode]) -> None:

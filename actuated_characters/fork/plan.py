@@ -135,7 +135,7 @@ def _repeatable(path: Path) -> Recording:
             f"it has nothing on '{topics.CONTROLLER_NODE}/configuration', so that its controller "
             "cannot be started; one that is not controller_node cannot be repeated"
         )
-    elif first != FIRST_TICK or recording.skipped_states:
+    elif first != FIRST_TICK or recording.skipped_states or recording.begins_amid:
         reason = f"it begins with tick {first}, and what the controller did before is not in it"
     elif len(recording.effort) == 0:
         reason = "it has one state only"

@@ -11,6 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from actuated_characters.bags.format.storage import LOG_TIME, SIMULATED
+from actuated_characters.bags.last_parts import LastPartsWriter
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, MetricsCollector
 from actuated_characters.recorder.log_time import SimulatedLogTime
@@ -41,6 +42,7 @@ _LONGEST_END = 20.0  # s for the messages that are on their way at the stop
 _AT_ONCE = 1000  # messages of a topic, between flushes and answers to services
 _SERVICE_PERIOD = 0.1  # s between turns of the executor, which looks at each of many topics
 _FLUSH_PERIOD = 0.5  # s: messages that are older outlive even a kill of the recorder
+_BYTES_PER_MB = 10**6
 _SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
 
 
@@ -82,15 +84,19 @@ class RecorderNode(Node):
             self._add(recorded, recorded.topic.qos)
         self.get_logger().info(f"recording to {self._directory}")
 
-    def _open_bag(self, values: Values) -> BagWriter | None:
+    def _open_bag(self, values: Values) -> BagWriter | LastPartsWriter | None:
         if not values.flag("write_bag"):
             return None
-        bag = BagWriter(
+        path, options = (
             self._directory / BAG,
-            storage=values.text("storage"),
-            compression=values.text("compression"),
-            log_time=values.text(LOG_TIME),
+            {
+                "storage": values.text("storage"),
+                "compression": values.text("compression"),
+                "log_time": values.text(LOG_TIME),
+            },
         )
+        least = round(values.number("last_megabytes") * _BYTES_PER_MB)
+        bag = LastPartsWriter(path, least, **options) if least else BagWriter(path, **options)
         for name, origin in self._origin.items():
             bag.set_custom_data(name, origin.to_json())
         return bag
@@ -153,7 +159,7 @@ class RecorderNode(Node):
             print(f"flushed {self._last_tick}", flush=True)
         return _FLUSH_PERIOD
 
-    def _to_bag(self, act: Callable[[BagWriter], None]) -> bool:
+    def _to_bag(self, act: Callable[[BagWriter | LastPartsWriter], None]) -> bool:
         """Do something with the bag; where it fails the run goes on, and is measured, without."""
         if self._bag is not None:
             try:
@@ -262,6 +268,8 @@ class RecorderNode(Node):
                 f"session {named(self._filter.bound)}{of_it} was recorded and never answered, "
                 f"while others published states, too; {REMEDY}, or set '{SESSION.name}'"
             )
+        elif collector.last_tick <= FIRST_TICK:
+            self._fail(f"no tick{of_it} was recorded: the simulator's first state had no answer")
         if collector.missing_ticks:
             self._fail(f"{collector.missing_ticks} ticks{of_it} were missed")
 

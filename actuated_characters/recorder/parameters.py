@@ -28,6 +28,12 @@ PARAMETERS = [
         texts=True,
     ),
     Parameter("write_bag", True, "write the bag; without it the recorder only measures"),
+    Parameter(
+        "last_megabytes",
+        0.0,
+        "how much of the last messages the bag keeps at least, and twice that at most; 0: all",
+        unit="MB",
+    ),
     Parameter("storage", MCAP, "how the bag is stored", choices=STORAGES),
     Parameter("compression", NONE, "how the bag is compressed", choices=COMPRESSIONS),
     Parameter(

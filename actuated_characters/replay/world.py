@@ -30,8 +30,14 @@ def worlds(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
     """The recordings of each world; simulators in different namespaces have different ones.
 
     Raises:
-        RecordingError: a world is not complete: a character that was in it was not recorded.
+        RecordingError: a world cannot be repeated: a character that was in it was not recorded, or
+            no episode begins in the recording.
     """
+    if any(recording.begins_amid for recording in recordings):
+        raise RecordingError(
+            "the recording begins in the middle of an episode, and no other begins in it: it can "
+            "be viewed, not repeated; `play --output DIR` keeps a scene from its start"
+        )
     found: dict[tuple[str, ...], list[Recording]] = {}
     for recording in recordings:
         world = recording.world

@@ -14,6 +14,7 @@ from actuated_characters.whole_files import part_of, write_whole, writing
 from msgs_config.errors import RecordingError, RunError
 
 BAG, PARAMETERS, LOGS = "bag", "parameters", "logs"
+EARLIER_BAG = BAG + "-earlier"  # the older part, while a recording of bounded size is made
 DAMAGED = BAG + ".damaged"  # what `recover` leaves beside the bag that it makes
 SUMMARY, SERIES, PLOT = "summary.json", "measurements.csv", "plot.png"
 STRIP, VIDEO = "strip.png", "video.mp4"  # what `render` makes of the bag
@@ -29,7 +30,19 @@ def prepare_directory(directory: Path, *, overwrite: bool, characters: Sequence[
     Raises:
         RunError: there are results and `overwrite` is not set, or files that no run has made.
     """
-    names = (BAG, DAMAGED, PARAMETERS, LOGS, SUMMARY, SERIES, PLOT, STRIP, VIDEO, REPORT)
+    names = (
+        BAG,
+        EARLIER_BAG,
+        DAMAGED,
+        PARAMETERS,
+        LOGS,
+        SUMMARY,
+        SERIES,
+        PLOT,
+        STRIP,
+        VIDEO,
+        REPORT,
+    )
     results = [directory / name for name in (*names, *characters)]
     results += [part_of(path) for path in results]  # of a run that was killed
     try:

@@ -13,6 +13,7 @@ from actuated_characters.runs.plan import RUN_DEFAULTS
 from actuated_characters.runs.processes import Children
 from actuated_characters.scenes.scene import SIMULATOR, Scene
 from msgs_config.errors import RunError
+from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import SESSION, make_session
 
 
@@ -22,18 +23,24 @@ def play_scene(
     ticks: int,
     *,
     viewer: Mapping[str, object] | None,
+    last_megabytes: float = 0.0,
     progress: Progress = lambda ticks: None,
 ) -> int:
     """Run a scene for so many ticks; leaves bag and figures in a directory, which was prepared.
 
     With parameters of a viewer, it is shown in a browser. An interruption ends it in good order.
+    The bag keeps so many MB of the last messages at least, and twice that at most; 0: all of them.
     Returns how many ticks there were, about; none if it was interrupted before the first one.
 
     Raises:
         RunError: one of the processes failed.
     """
     session = ("-p", f"{SESSION.name}:={make_session(f'/{SIMULATOR}')}")
-    recording = {"directory": str(directory), "characters": scene.characters}
+    recording = {
+        "directory": str(directory),
+        "characters": scene.characters,
+        "last_megabytes": last_megabytes,
+    }
     done, interrupted = 0, False
 
     def report(count: int) -> None:
@@ -50,7 +57,9 @@ def play_scene(
             report(ticks)
         except KeyboardInterrupt:
             interrupted = True
-    if recorder.exit_code and (done or not interrupted):
+    if interrupted and done <= FIRST_TICK:
+        return 0
+    if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
     return done
 

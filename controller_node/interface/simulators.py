@@ -63,7 +63,6 @@ class Simulators:
         self._rejected_episodes = 0
         self._now = 0.0
         self._lacks_episode_since: float | None = None
-        self._unusable_since: float | None = None
         self._disagrees_since: float | None = None
         depth = 2 * _MOST_KNOWN  # one of the one must not push out one of the other
         self._episodes = DirectSubscription(node, topics.EPISODE.for_listener(depth))
@@ -91,8 +90,8 @@ class Simulators:
         """Take episodes and configurations of simulators; `now` in s of wall time.
 
         Raises:
-            ActuatedCharactersError: the one that it is bound to, or the only one that there is,
-                simulates something else than this controller was made for.
+            ActuatedCharactersError: the one of the session that is given simulates something else
+                than this controller was made for. Without one it waits for a simulator that fits.
         """
         self._now = now
         self._binding.look(now)
@@ -186,8 +185,7 @@ class Simulators:
             return False
         known = self._known.get(session)
         if self._binding.bound is None and known is not None and known.error is not None:
-            if self._unusable_since is None:  # else this node ends with that error
-                self._once_logger.log_once(f"state ignored: {known.error}")
+            self._pass_over(known.error)
             return False
         return True
 
@@ -222,8 +220,6 @@ class Simulators:
                 self._hear_configuration(configuration.parse(decode(raw, String).data))
             except MessageError as error:
                 self._once_logger.log_once(f"configuration ignored: {error}")
-        if self._binding.bound is None:
-            self._refuse_the_only_one()
 
     def _hear_configuration(self, found: RunConfiguration) -> None:
         if self._binding.bound not in (None, found.session):
@@ -231,12 +227,15 @@ class Simulators:
         known = self._known_of(found.session)
         is_first = known.configuration is None
         known.configuration, known.error = found, self._error_of(found)
+        if self._binding.bound is None and known.error is not None:
+            self._pass_over(known.error)
         if self._binding.bound != found.session:
             return
         if not is_first:
             return  # a reset has changed it; `disagrees` tells
         if known.error is not None and self._binding.release():
-            return  # its first state came before it, and another simulator may be there
+            self._pass_over(known.error)  # its first state came before it
+            return
         self._judge(known)
 
     def _judge(self, known: _KnownSimulator) -> None:
@@ -246,19 +245,9 @@ class Simulators:
         if known.error is not None:
             raise known.error
 
-    def _refuse_the_only_one(self) -> None:
-        """Raise the error of the only simulator that there is, if it can never be bound to.
-
-        A second one may be running for long and only not be discovered yet.
-        """
-        configured = [known for known in self._known.values() if known.configuration is not None]
-        errors = [known.error for known in configured if known.error is not None]
-        if not errors or len(errors) < len(configured) or self._count_publishers() > 1:
-            self._unusable_since = None
-        elif self._unusable_since is None:
-            self._unusable_since = self._now
-        elif self._now > self._unusable_since + _ALONE_AFTER:
-            raise errors[-1]
+    def _pass_over(self, error: ActuatedCharactersError) -> None:
+        """Say why a simulator is not the one that this controller was made for."""
+        self._once_logger.log_once(f"state ignored: {error}; waiting for a simulator that fits")
 
     def _error_of(self, found: RunConfiguration) -> ActuatedCharactersError | None:
         """Why a simulator is not the one that this controller was made for."""

@@ -46,22 +46,31 @@ def describe_publishers(node: Node, topic: Topic) -> str:
 
 
 def publisher_names(node: Node, topic: Topic) -> list[str]:
-    """Full names of the nodes that publish on a topic.
+    """Full names of the nodes that publish on a topic; with GIDs where several have one name.
 
     A publisher is discovered a moment before the name of its node, which is worth a short wait.
     """
     deadline = time.monotonic() + _NAME_PATIENCE
-    while _UNKNOWN_NODE in (names := _names(node, topic)) and time.monotonic() < deadline:
+    while _UNKNOWN_NODE in (found := _found(node, topic)) and time.monotonic() < deadline:
         time.sleep(_NAME_POLL)
-    return sorted(set(names))
+    return _told_apart(found)
 
 
-def _names(node: Node, topic: Topic) -> list[str]:
-    """The full name of each publisher's node, one for each publisher; unknown ones last."""
-    infos = node.get_publishers_info_by_topic(topic.name)
-    names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos]
-    known = sorted(name for name in names if _UNKNOWN not in name)
-    return known + [_UNKNOWN_NODE] * (len(names) - len(known))
+def _found(node: Node, topic: Topic) -> dict[str, list[str]]:
+    """GIDs of the publishers of a topic, by the full names of their nodes."""
+    found: dict[str, list[str]] = {}
+    for info in node.get_publishers_info_by_topic(topic.name):
+        name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+        gid = ".".join(f"{byte:02x}" for byte in info.endpoint_gid)  # as `ros2 topic info -v`
+        found.setdefault(_UNKNOWN_NODE if _UNKNOWN in name else name, []).append(gid)
+    return found
+
+
+def _told_apart(found: dict[str, list[str]]) -> list[str]:
+    return [
+        name if len(gids) == 1 else f"{len(gids)} nodes {name} (GIDs {' and '.join(sorted(gids))})"
+        for name, gids in sorted(found.items())
+    ]
 
 
 def _conflict(joint: str, topic: Topic, senders: Sequence[str]) -> str:
@@ -87,9 +96,9 @@ class ConflictLog:
         """Log the conflicts whose publishers' names are known."""
         for joint, topic in self._topics.items():
             if not self._once_logger.has_logged(joint):
-                senders = _names(self._node, topic)
-                if _UNKNOWN_NODE not in senders:
-                    sentence = _conflict(joint, topic, sorted(set(senders)))
+                found = _found(self._node, topic)
+                if _UNKNOWN_NODE not in found:
+                    sentence = _conflict(joint, topic, _told_apart(found))
                     self._once_logger.log_once(f"{sentence}; the last one counts", kind=joint)
 
 
@@ -113,9 +122,10 @@ class OtherSimulators:
             self._log(topic)
 
     def _log(self, topic: Topic) -> None:
-        own, names = self._node.get_fully_qualified_name(), _names(self._node, topic)
-        if _UNKNOWN_NODE in names or own not in names:  # they are yet to come
+        own, found = self._node.get_fully_qualified_name(), _found(self._node, topic)
+        if _UNKNOWN_NODE in found or own not in found:  # they are yet to come
             return
+        names = sorted(name for name, gids in found.items() for _ in gids)
         names.remove(own)
         if names:
             others = ", ".join(names)

@@ -21,7 +21,7 @@ from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.physics.probe import measure_probe
 from tests.support.physics import EVERY_CHARACTER, character, character_id
-from tests.support.ros import ControllerClient, Processes, joint_state
+from tests.support.ros import ControllerClient, Processes, joint_state, wait_until
 
 GRAVITY = 9.81
 
@@ -234,7 +234,7 @@ REFUSED_SIMULATORS = {
 
 
 @pytest.mark.parametrize("case", REFUSED_SIMULATORS)
-def test_a_controller_ends_with_one_clear_line_at_a_simulator_that_is_another(
+def test_a_controller_says_in_one_line_that_a_simulator_is_another_and_waits_for_one_that_fits(
     processes: Processes, simulator: ControllerClient, case: str
 ) -> None:
     measure, name, given = REFUSED_SIMULATORS[case]
@@ -242,10 +242,16 @@ def test_a_controller_ends_with_one_clear_line_at_a_simulator_that_is_another(
     simulators = simulator.speak(topics.CONFIGURATION.of(topics.SIM_NODE))
 
     simulators.publish(String(data=description(name, measure(), **given)))
+    wait_until(lambda: node.stderr, "a line")
+    simulator.spin_until(simulators.get_subscription_count, "a controller that listens")
+    probe = measure_probe(character("pendulum"), GRAVITY)
+    simulators.publish(String(data=description("pendulum", probe)))
 
-    assert node.wait() == 1
+    simulator.ask(joint_state(4_166_666, ["hinge"], [0.5], [0.0]))  # of tick 1 at 240 Hz
     (line,) = node.stderr.splitlines()
-    assert line.startswith("error: the simulator's ")
+    assert "state ignored: the simulator's " in line
+    assert "waiting for a simulator that fits" in line
+    assert node.exit_code is None
 
 
 @pytest.mark.parametrize("text", ["{}", "no JSON", "without a probe"])

@@ -54,11 +54,12 @@ _OPTIONS = (
 class Browser:
     """One page of a Chromium that ends with `close`."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *options: str) -> None:
+        """Start it with more options of Chromium's; profile and log go into a folder."""
         profile = folder / "chromium"
         with (folder / "chromium.log").open("wb") as log:
             self._process = subprocess.Popen(
-                [CHROMIUM, *_OPTIONS, f"--user-data-dir={profile}", "about:blank"],
+                [CHROMIUM, *_OPTIONS, *options, f"--user-data-dir={profile}", "about:blank"],
                 stdout=log,
                 stderr=log,
                 start_new_session=True,
@@ -181,11 +182,14 @@ class Browser:
 
 
 @contextmanager
-def one_browser(folder: Path) -> Iterator[Browser]:
-    """The only browser of its user on this machine: each draws with all processors."""
+def one_browser(folder: Path, *options: str) -> Iterator[Browser]:
+    """The only browser of its user on this machine: each draws with all processors.
+
+    `options` are more of Chromium's.
+    """
     lock = Path(tempfile.gettempdir()) / f"actuated_characters_browser_{os.getuid()}"
     with lock.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        browser = Browser(folder)
+        browser = Browser(folder, *options)
         yield browser
         browser.close()

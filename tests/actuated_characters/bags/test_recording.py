@@ -15,6 +15,7 @@ from std_msgs.msg import String
 
 from actuated_characters.bags.recording import Recording, read_recording, read_recordings
 from actuated_characters.bags.writer import BagWriter
+from actuated_characters.replay.world import worlds
 from actuated_characters.runs.plan import RunPlan
 from msgs_config.errors import ActuatedCharactersError, MessageError, RecordingError
 from msgs_config.messages import configuration, topics
@@ -296,7 +297,6 @@ def with_a_heavier_text(made: Made) -> list[RawMessage]:
     [
         (lambda made: made.messages()[:1], "no states"),
         (lambda made: raw_states(made.plan, made.states), "sim_node/configuration"),
-        (lambda made: without_rows(made, 0), "in the middle of an episode"),
         (lambda made: without_rows(made, 4, 5), "the states of ticks 5 to 6 are missing"),
         (lambda made: without_rows(made, 1, 3, 5, 7), "ticks 2, 4, 6 and 1 more times are mis"),
         (with_another_first_state, "two states of tick 1; was its simulator restarted?"),
@@ -367,6 +367,19 @@ def test_what_comes_before_an_episode_is_left_out(pendulum: Made, tmp_path: Path
     reference = pendulum.ticks[4].reference
     assert reference is not None
     assert recording.reference_position[0].tobytes() == reference.position.tobytes()
+
+
+def test_a_bag_in_which_no_episode_begins_is_read_and_cannot_be_repeated(
+    pendulum: Made, tmp_path: Path
+) -> None:
+    recording = read_recording(write_bag(tmp_path / "bag", without_rows(pendulum, 0)))
+
+    assert recording.begins_amid
+    assert recording.skipped_states == 0
+    assert recording.stamps_ns.tolist() == [state.stamp_ns for state in pendulum.states[1:]]
+    assert recording.position[0].tobytes() == pendulum.states[1].position.tobytes()
+    with pytest.raises(RecordingError, match="in the middle of an episode"):
+        worlds((recording,))
 
 
 def test_commands_are_there_as_they_were_sent(pendulum: Made, tmp_path: Path) -> None:

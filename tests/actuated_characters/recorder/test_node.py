@@ -99,6 +99,29 @@ def test_a_bag_that_is_there_already_is_never_touched(processes: Processes, tmp_
     assert (tmp_path / "run" / "bag" / "bag.mcap").read_text() == "of years"
 
 
+def test_a_recorder_that_hears_no_simulator_fails_in_a_line(
+    processes: Processes, tmp_path: Path
+) -> None:
+    recorder = processes.node(topics.RECORDER_NODE, directory=str(tmp_path / "run"))
+    wait_until(lambda: "recording to" in recorder.stderr, "the recorder")
+
+    assert recorder.end(signal.SIGINT) == 1
+    assert recorder.stderr.splitlines()[-1] == "error: no simulator was heard"
+
+
+def test_a_recorder_without_a_tick_fails_in_a_line(
+    processes: Processes, client: SimulatorClient, tmp_path: Path
+) -> None:
+    recorder = processes.node(topics.RECORDER_NODE, directory=str(tmp_path / "run"))
+    processes.simulator("pendulum")
+    client.first_state(2)
+
+    assert recorder.end(signal.SIGINT) == 1
+    line = recorder.stderr.splitlines()[-1]
+    assert line == "error: no tick was recorded: the simulator's first state had no answer"
+    assert summary_of(tmp_path / "run")["ticks"] == 0
+
+
 def only_line(process: Process) -> str:
     (line,) = process.stderr.splitlines()
     return line

@@ -1,5 +1,6 @@
 """Senders that are too many or too fast, or that go and come back."""
 
+import re
 import signal
 
 import pytest
@@ -69,6 +70,24 @@ def test_two_controllers_of_one_joint_in_real_time_are_told_once_and_the_last_co
     wait_until(lambda: "two different commands" in simulator.stderr, "the warning")
     assert simulator.stderr.count("two different commands for 'hinge'") == 1
     assert "/intruder" in simulator.stderr and "/test_client" in simulator.stderr
+
+
+def test_two_controllers_of_one_name_are_told_apart(
+    processes: Processes, client: SimulatorClient, join: Join
+) -> None:
+    twin = join("test_client")
+    simulator = processes.simulator(on_fault="abort", wait_for_subscribers=2)
+    state = client.first_state()
+    twin.first_state()
+
+    for effort, sender in enumerate((client, twin), start=1):
+        sender.command(stamp_ns(state), {"hinge": float(effort)})
+
+    assert simulator.wait() == 1
+    (line,) = [each for each in simulator.stderr.splitlines() if "two different" in each]
+    told = re.search(r"2 nodes /test_client \(GIDs ([0-9a-f.]+) and ([0-9a-f.]+)\)", line)
+    assert told is not None, line
+    assert told[1] != told[2]
 
 
 def test_commands_at_ten_times_the_rate_change_nothing_in_lockstep(

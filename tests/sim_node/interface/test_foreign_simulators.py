@@ -16,6 +16,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
+from sim_node.physics.probe import measure_probe
 from tests.controller_node.test_model_check import REFUSED_SIMULATORS, description
 from tests.controller_node.test_node import CLOCK, expected_answer
 from tests.support.physics import character
@@ -26,6 +27,7 @@ from tests.support.ros import (
     SimulatorClient,
     joint_state,
     stamp_ns,
+    tick_of,
     wait_until,
     wrench_message,
 )
@@ -193,12 +195,37 @@ def test_a_configuration_of_another_simulator_does_not_end_a_running_controller(
 
     configurations.publish(in_session(text, OTHER))
 
-    # it is noticed, and the bound simulator's own one does end it
+    # it is noticed, and after the bound simulator's own one that is answered no more
     reported(simulator, reports, foreign_configurations=1)
     assert list(simulator.ask(state(2)).effort) == expected(state(2), 1)
     configurations.publish(in_session(text, OWN))
-    assert node.wait() == 1
-    assert node.stderr.splitlines()[-1].startswith("error: the simulator's ")
+    wait_until(lambda: "state ignored: the simulator's" in node.stderr, "the line")
+    assert "waiting for a simulator that fits" in node.stderr.splitlines()[-1]
+    probe = measure_probe(character("pendulum"), 9.81)
+    configurations.publish(in_session(description("pendulum", probe), OWN))
+    fitting = state(9, first=True)
+    assert list(simulator.ask(fitting).effort) == expected(fitting, 9)
+    assert node.exit_code is None
+
+
+@pytest.mark.parametrize("first", ["lift", "pendulum"])
+def test_of_two_simulators_a_controller_takes_up_the_one_that_fits_whichever_comes_first(
+    processes: Processes, client: SimulatorClient, first: str
+) -> None:
+    second = "lift" if first == "pendulum" else "pendulum"
+    processes.simulator(first)
+    controller = processes.controller("pendulum")
+    if first == "lift":
+        wait_until(lambda: "waiting for a simulator that fits" in controller.stderr, "the line")
+    processes.simulator(second)
+
+    def moves() -> bool:
+        found = [each for each in client.states.messages if list(each.name) == ["hinge"]]
+        return bool(found) and tick_of(found[-1]) > 20
+
+    client.spin_until(moves, "answers to the pendulum's simulator")
+    assert controller.exit_code is None
+    assert "error" not in controller.stderr
 
 
 def test_a_simulator_that_is_not_the_controllers_is_passed_over_where_there_is_another(

@@ -1,0 +1,114 @@
+"""Writes a recording without end into a bag of bounded size: of all that came, the last part.
+
+The bag has at most two files. When the newer one is full, the older one is deleted, and another one
+begins, with the last message of each latched topic, which say what the states mean.
+"""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import yaml
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from actuated_characters.bags.format.metadata import METADATA, load_metadata
+from actuated_characters.bags.writer import BagWriter
+from actuated_characters.runs.run_directory import EARLIER_BAG
+from msgs_config.errors import RecordingError
+
+
+class LastPartsWriter:
+    """A `BagWriter` that keeps at least so many bytes of messages, and at most twice as many."""
+
+    def __init__(self, path: Path, part_bytes: int, **options: str) -> None:
+        """Create the bag at `path`; `options` are those of `BagWriter`, and so are the errors."""
+        self._path, self._part_bytes, self._options = path, part_bytes, options
+        self._earlier = path.with_name(EARLIER_BAG)
+        self._custom_data: dict[str, str] = {}
+        self._topics: dict[str, tuple[type, QoSProfile]] = {}
+        self._latched: dict[str, tuple[bytes, int | None]] = {}
+        self._size = 0  # of the messages in the newer file
+        self._bag = BagWriter(path, **options)
+
+    def set_custom_data(self, name: str, text: str) -> None:
+        """Keep a text in the metadata. Raises as `BagWriter`."""
+        self._custom_data[name] = text
+        self._bag.set_custom_data(name, text)
+
+    def add_topic(self, topic: str, message_type: type, qos: QoSProfile) -> None:
+        """Announce a topic. Raises as `BagWriter`."""
+        self._bag.add_topic(topic, message_type, qos)
+        self._topics[topic] = message_type, qos
+
+    def write(
+        self, topic: str, raw: bytes, log_time_ns: int, published_ns: int | None = None
+    ) -> None:
+        """Append a message. Raises as `BagWriter`."""
+        if self._size > self._part_bytes:
+            self._begin_part(log_time_ns)
+        self._bag.write(topic, raw, log_time_ns, published_ns)
+        self._size += len(raw)
+        if self._topics[topic][1].durability is DurabilityPolicy.TRANSIENT_LOCAL:
+            self._latched[topic] = raw, published_ns
+
+    def flush(self) -> None:
+        """Hand all that was written to the operating system. Raises as `BagWriter`."""
+        self._bag.flush()
+
+    def close(self) -> None:
+        """Complete the recording, as one bag. Raises RecordingError: the disk refuses the data."""
+        self._bag.close()
+        try:
+            if self._earlier.is_dir():
+                _join(self._earlier, self._path)
+        except (OSError, KeyError, TypeError) as error:
+            raise RecordingError(f"recording {self._path} is incomplete: {error}") from error
+
+    def _begin_part(self, log_time_ns: int) -> None:
+        self._bag.close()
+        try:
+            shutil.rmtree(self._earlier, ignore_errors=True)
+            self._path.rename(self._earlier)
+        except OSError as error:
+            raise RecordingError(f"cannot write recording {self._path}: {error}") from error
+        self._bag, self._size = BagWriter(self._path, **self._options), 0
+        for name, text in self._custom_data.items():
+            self._bag.set_custom_data(name, text)
+        for topic, (message_type, qos) in self._topics.items():
+            self._bag.add_topic(topic, message_type, qos)
+        for topic, (raw, published_ns) in self._latched.items():
+            self._bag.write(topic, raw, log_time_ns, published_ns)
+
+
+def _join(earlier: Path, bag: Path) -> None:
+    """Make one bag of two that are complete; `earlier` is gone afterwards."""
+    first, second = load_metadata(earlier), load_metadata(bag)
+    for found in first["files"]:
+        moved = f"{earlier.name}{Path(found['path']).suffix}"
+        (earlier / found["path"]).replace(bag / moved)
+        found["path"] = moved
+    joined = {**second, "files": [*first["files"], *second["files"]]}
+    joined["relative_file_paths"] = [found["path"] for found in joined["files"]]
+    joined["message_count"] = first["message_count"] + second["message_count"]
+    joined["starting_time"] = first["starting_time"]
+    start_ns, last_ns = (
+        each["starting_time"]["nanoseconds_since_epoch"] for each in (first, second)
+    )
+    joined["duration"] = {
+        "nanoseconds": last_ns + second["duration"]["nanoseconds"] - start_ns,
+    }
+    counts = _counts(first)
+    for topic in joined["topics_with_message_count"]:
+        topic["message_count"] += counts.get(topic["topic_metadata"]["name"], 0)
+    scratch = bag / f"{METADATA}.tmp"
+    content = yaml.safe_dump({"rosbag2_bagfile_information": joined}, sort_keys=False)
+    scratch.write_text(content, encoding="utf-8")
+    scratch.replace(bag / METADATA)
+    shutil.rmtree(earlier)
+
+
+def _counts(metadata: dict[str, Any]) -> dict[str, int]:
+    return {
+        each["topic_metadata"]["name"]: each["message_count"]
+        for each in metadata["topics_with_message_count"]
+    }
