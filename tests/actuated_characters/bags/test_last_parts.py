@@ -1,5 +1,6 @@
 """A bag that keeps the last part alone: what is in it, who can read it, and what cannot be done."""
 
+from itertools import zip_longest
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,14 @@ from actuated_characters.render.scene import make_scene
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.run_directory import EARLIER_BAG
 from msgs_config.errors import RecordingError
-from tests.support.bags import Made, RawMessage, make_run
+from tests.support.bags import (
+    Made,
+    RawMessage,
+    make_run,
+    raw_configuration,
+    raw_references,
+    raw_states,
+)
 
 PART = 30_000  # bytes of messages
 START_NS = 1_700_000_000 * 10**9
@@ -22,6 +30,15 @@ START_NS = 1_700_000_000 * 10**9
 @pytest.fixture(scope="module")
 def made() -> Made:
     return make_run("pendulum", 4.0)
+
+
+def in_time(made: Made) -> list[RawMessage]:
+    """What a recorder hears of a run, one state after another with its reference."""
+    states = raw_states(made.plan, made.states)
+    references = [tick.reference for tick in made.ticks]
+    desired = raw_references(made.plan, [each for each in references if each is not None])
+    pairs = zip_longest(states, desired)
+    return [raw_configuration(made.plan), *(each for pair in pairs for each in pair if each)]
 
 
 def write(path: Path, messages: list[RawMessage], part_bytes: int) -> LastPartsWriter:
@@ -34,7 +51,7 @@ def write(path: Path, messages: list[RawMessage], part_bytes: int) -> LastPartsW
 
 
 def test_a_short_recording_is_kept_whole_and_repeated(made: Made, tmp_path: Path) -> None:
-    write(tmp_path / "bag", made.messages(), 10 * PART**2).close()
+    write(tmp_path / "bag", in_time(made), 10 * PART**2).close()
 
     recording = read_recording(tmp_path / "bag")
 
@@ -43,7 +60,7 @@ def test_a_short_recording_is_kept_whole_and_repeated(made: Made, tmp_path: Path
 
 
 def test_of_a_long_one_the_last_states_are_kept_to_the_bit(made: Made, tmp_path: Path) -> None:
-    messages = made.messages()
+    messages = in_time(made)
     total = sum(len(raw) for _, raw in messages)
     write(tmp_path / "bag", messages, PART).close()
 
@@ -67,7 +84,7 @@ def test_of_a_long_one_the_last_states_are_kept_to_the_bit(made: Made, tmp_path:
 
 
 def test_it_can_be_shown_and_says_that_it_cannot_be_repeated(made: Made, tmp_path: Path) -> None:
-    write(tmp_path / "bag", made.messages(), PART).close()
+    write(tmp_path / "bag", in_time(made), PART).close()
     recording = read_recording(tmp_path / "bag")
 
     assert len(make_scene((recording,)).times) == len(recording.stamps_ns)
@@ -78,7 +95,7 @@ def test_it_can_be_shown_and_says_that_it_cannot_be_repeated(made: Made, tmp_pat
 
 def test_its_metadata_is_that_of_all_its_files(made: Made, tmp_path: Path) -> None:
     """As an independent reader has it, and by rosbag2's fields."""
-    write(tmp_path / "bag", made.messages(), PART).close()
+    write(tmp_path / "bag", in_time(made), PART).close()
     text = (tmp_path / "bag" / "metadata.yaml").read_text()
     found = yaml.safe_load(text)["rosbag2_bagfile_information"]
     kept = list(read_messages(tmp_path / "bag"))
@@ -95,7 +112,7 @@ def test_its_metadata_is_that_of_all_its_files(made: Made, tmp_path: Path) -> No
 
 
 def test_after_a_kill_the_part_before_is_a_bag_of_its_own(made: Made, tmp_path: Path) -> None:
-    bag = write(tmp_path / "bag", made.messages(), PART)
+    bag = write(tmp_path / "bag", in_time(made), PART)
     bag.flush()  # and nothing more: its process was killed
 
     assert read_recording(tmp_path / EARLIER_BAG).begins_amid
