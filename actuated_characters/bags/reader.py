@@ -14,6 +14,7 @@ from actuated_characters.bags.format.definitions import find_message_type
 from actuated_characters.bags.format.mcap_file import McapFile
 from actuated_characters.bags.format.sqlite_file import SqliteFile
 from msgs_config.errors import RecordingError, one_of
+from msgs_config.file_kinds import refuse_other_kind
 
 
 class RecordedMessage(NamedTuple):
@@ -125,6 +126,7 @@ def _open(path: Path, file: Path, compression_mode: str, stack: ExitStack) -> Mc
     with _naming(path, file):
         if not file.is_file():
             raise RecordingError(f"cannot read recording {path}: its file {file.name} is missing")
+        refuse_other_kind(file, "a file of a bag", storage.FILE_SUFFIXES, RecordingError)
         if compression_mode == metadata.FILE and file.suffix == storage.ZSTD_SUFFIX:
             copy = Path(stack.enter_context(tempfile.TemporaryDirectory())) / file.stem
             limits.unpack_file(file, copy)

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from actuated_characters.bags.collecting import collect, naming
-from actuated_characters.bags.format.storage import SUFFIXES
+from actuated_characters.bags.format.storage import FILE_SUFFIXES, SUFFIXES
 from actuated_characters.bags.node_parameters import NodeParameters, between, in_force
 from actuated_characters.bags.plans import PlanArrays
 from actuated_characters.bags.reader import read_topics
@@ -26,6 +26,7 @@ from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import RecordingError, one_of
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.projectiles import BallStates
@@ -210,6 +211,7 @@ def find_bag(path: Path) -> Path:
     """
     if not path.exists():
         raise RecordingError(f"no run or recording at {path}")
+    refuse_other_kind(path, "a run or a bag", FILE_SUFFIXES, RecordingError)
     bag = path / BAG if (path / BAG).is_dir() else path
     is_run = path.is_dir() and bag == path
     if is_run and not any({*file.suffixes} & {*SUFFIXES.values()} for file in path.iterdir()):

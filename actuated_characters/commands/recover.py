@@ -10,6 +10,8 @@ from rich.console import Console
 from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.common.tables import make_table
+from msgs_config.errors import RecordingError
+from msgs_config.file_kinds import refuse_other_kind
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.bags.recovery import Recovered
@@ -38,6 +40,7 @@ def add_recover(commands: "Commands[argparse.ArgumentParser]") -> None:
 def _recover(options: argparse.Namespace) -> None:
     from actuated_characters.bags.recovery import recover
 
+    refuse_other_kind(options.bag, "a run or the directory of a bag", (), RecordingError)
     with progress_bar("", 1.0) as bar:
 
         def report(what: str, fraction: float | None) -> None:

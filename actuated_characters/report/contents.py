@@ -12,7 +12,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from std_msgs.msg import String
 
-from actuated_characters.bags.format.metadata import METADATA, load_metadata
+from actuated_characters.bags.format.metadata import METADATA, load_metadata, storage_of
 from actuated_characters.bags.format.storage import MCAP, SUFFIXES
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.recording import find_bag
@@ -154,7 +154,7 @@ def read_contents(path: Path) -> Contents:
     return Contents(
         bag=bag,
         files={file.name: file.stat().st_size for file in inside if file.is_file()},
-        storage=str(metadata.get("storage_identifier", "unknown")),
+        storage=_storage(metadata),
         compression=_compression(inside, metadata),
         version=version if isinstance(version, int) else None,
         ros_distro=str(metadata.get("ros_distro") or "unknown"),
@@ -188,6 +188,14 @@ def _metadata(bag: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError, RecordingError) as error:
         raise RecordingError(f"cannot read {bag / METADATA}") from error
     return content if isinstance(content, dict) else {}
+
+
+def _storage(metadata: dict[str, Any]) -> str:
+    """The storage that the metadata says, or else the suffix of its files."""
+    named = metadata.get("storage_identifier") or storage_of(
+        metadata.get("relative_file_paths") or ()
+    )
+    return str(named)
 
 
 def _forked_from(metadata: dict[str, Any]) -> ForkedFrom | None:

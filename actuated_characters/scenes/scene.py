@@ -7,6 +7,7 @@ from pathlib import Path
 
 from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.file_kinds import refuse_other_kind
 
 SIMULATOR, CONTROLLER = "sim_node", "controller_node"
 _FOLDER = Path(__file__).parent / "data"
@@ -55,7 +56,9 @@ def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> S
     """
     path = Path(name) if name.endswith(_SUFFIX) else _FOLDER / f"{name}{_SUFFIX}"
     if path.parent == _FOLDER and not path.is_file():
+        refuse_other_kind(Path(name), f"a scene ({_SUFFIX})", (), ConfigurationError)
         raise ConfigurationError(one_of("scene", name, scene_names()))
+    refuse_other_kind(path, "a scene", (_SUFFIX,), ConfigurationError)
     text = files.read_text(path, ConfigurationError)
     content = files.parse_yaml_mapping(path, text, ConfigurationError)
     for key, section in content.items():

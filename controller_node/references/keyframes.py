@@ -12,12 +12,14 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import MotionError, one_of
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.parameters import Parameter, Values
 
 KEYFRAMES_DIRECTORY = Path(__file__).parent / "data"
 
 _SHARES = np.linspace(0.0, 1.0, 65)  # of a segment, where its path is compared with the limits
 _NOTICED = 1e-6  # rad or m
+_FILES = (".yaml", ".yml")
 
 
 class KeyframesReference:
@@ -123,7 +125,8 @@ def _keyframes(character: Character, values: Values) -> Motion:
 
 
 def _path(name_or_path: str) -> Path:
-    if name_or_path.endswith((".yaml", ".yml")):
+    refuse_other_kind(Path(name_or_path), "a file of keyframes (.yaml)", _FILES, MotionError)
+    if name_or_path.endswith(_FILES):
         return Path(name_or_path)
     shipped = sorted(path.stem for path in KEYFRAMES_DIRECTORY.glob("*.yaml"))
     if name_or_path not in shipped:

@@ -3,16 +3,18 @@
 Imports neither numpy nor rclpy at the top: the limit on threads must come before numpy loads.
 """
 
+import itertools
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import NoReturn, Protocol
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.runtime.exit_watchdog import exit_after
 from msgs_config.runtime.ros_environment import (
     DISCOVERY_RANGE,
@@ -157,6 +159,13 @@ def _leave(node: RunnableNode | None, code: int) -> None:
     rclpy.try_shutdown()
 
 
+def _parameter_files(arguments: Sequence[str]) -> list[Path]:
+    """The files that follow `--params-file` on a node's command line."""
+    return [
+        Path(value) for option, value in itertools.pairwise(arguments) if option == "--params-file"
+    ]
+
+
 def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
     """The variables with which Fast DDS 2.14, Jazzy's, reads the settings of this package.
 
@@ -188,6 +197,8 @@ def _start_ros(about: str) -> None:
         if others:
             raise ConfigurationError(f"unknown argument {others[0]!r}; {_PARAMETERS_ARE_SET}")
         check_domain_id(os.environ)
+        for file in _parameter_files(sys.argv):  # rcl takes some of them for empty ones
+            refuse_other_kind(file, "a file of parameters", (".yaml", ".yml"), ConfigurationError)
         if is_discovery_off(os.environ):
             print(f"warning: {_HIDDEN}", file=sys.stderr, flush=True)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

@@ -15,6 +15,7 @@ from actuated_characters.bags.format.storage import (
 from actuated_characters.runs.run_directory import BAG
 from msgs_config import files
 from msgs_config.errors import RecordingError, one_of
+from msgs_config.file_kinds import refuse_other_kind
 
 METADATA = "metadata.yaml"
 FILE, MESSAGE = "file", "message"  # that rosbag2 compressed; MCAP's chunks tell themselves
@@ -61,6 +62,7 @@ def load_metadata(bag: Path) -> Any:
         RecordingError: it is no YAML, or too large.
         OSError, UnicodeDecodeError, KeyError, TypeError: it cannot be read, or is something else.
     """
+    refuse_other_kind(bag / METADATA, "the metadata of a bag", (".yaml",), RecordingError)
     with (bag / METADATA).open(encoding="utf-8") as file:
         text = file.read(MOST_OF_METADATA + 1)
     place = f"{METADATA} is damaged"
@@ -74,8 +76,10 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
     others = {topic["serialization_format"] for topic in topics} - {CDR}
     mode = (content.get("compression_mode") or "").lower()  # rosbag2 writes it in capitals
     mode = "" if mode == "none" else mode
+    # `ros2 bag reindex` of Humble leaves it empty; the suffix of each file says it as well
+    named = content["storage_identifier"] or storage_of(paths)
     found: dict[str, tuple[Any, Collection[str]]] = {
-        "storage": (content["storage_identifier"], SUFFIXES),
+        "storage": (named, SUFFIXES),
         "compression mode": (mode, dict.fromkeys(["", FILE, MESSAGE])),
         "compression": (content["compression_format"] if mode else ZSTD, {ZSTD}),
         "serialisation": (max(others, default=CDR), {CDR}),
@@ -86,6 +90,12 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
             raise RecordingError(f"cannot read recording {bag}: {problem}")
     present = tuple(bag / PurePath(path).name for path in paths)  # once relative to `bag`'s parent
     return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode)
+
+
+def storage_of(paths: Collection[str]) -> str:
+    """The storage of a bag's files by the suffix of the first one; empty if that says none."""
+    suffixes = {suffix for path in list(paths)[:1] for suffix in PurePath(path).suffixes}
+    return next((name for name, suffix in SUFFIXES.items() if suffix in suffixes), "")
 
 
 def recover_hint(bag: Path, does: str) -> str:

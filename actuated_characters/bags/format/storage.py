@@ -7,6 +7,7 @@ NONE, ZSTD = "none", "zstd"
 STORAGES, COMPRESSIONS = (MCAP, SQLITE3), (NONE, ZSTD)
 SUFFIXES = {MCAP: ".mcap", SQLITE3: ".db3"}
 ZSTD_SUFFIX = ".zstd"  # of a file that is compressed as a whole
+FILE_SUFFIXES = (*SUFFIXES.values(), ZSTD_SUFFIX)
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # no message begins so: CDR begins with a zero
 CDR = "cdr"  # the only serialisation that ROS 2 has
 MOST_OF_METADATA = 1 << 22  # characters; of a hundred topics it has some 100,000

@@ -32,6 +32,7 @@ from controller_node.behaviours.state_machine.laws import PLACEMENT_LAWS
 from controller_node.behaviours.state_machine.support import Bounds
 from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.mappings import MappingReader
 
 MACHINES_DIRECTORY = Path(__file__).parent / "data"
@@ -43,6 +44,7 @@ _STATE_KEYS = [
     *("feet", "duration", "blend", "root", "pressure", "placement", "targets", "gains"),
     *("efforts", "tracks", "ends"),
 ]
+_FILES = (".yaml", ".yml")
 _NEVER = "never"
 _PARTS = ("hip", "knee", "ankle")  # that every side has
 _DEPTH = 8  # of files that include others
@@ -59,7 +61,8 @@ def machine_path(name: str) -> Path:
     Raises:
         ConfigurationError: there is no shipped machine of that name.
     """
-    if name.endswith((".yaml", ".yml")):
+    refuse_other_kind(Path(name), "a state machine", _FILES, ConfigurationError)
+    if name.endswith(_FILES):
         return Path(name)
     if name not in shipped_machines():
         wrong = one_of("machine", name, shipped_machines())

@@ -7,6 +7,7 @@ from backports import zstd
 from mcap.writer import CompressionType, IndexType
 
 from actuated_characters.bags.reader import read_messages
+from actuated_characters.report.contents import read_contents
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import (
     SENT,
@@ -58,6 +59,30 @@ def test_a_later_version_without_a_field_that_is_needed_is_named(bag: Path) -> N
 
     with pytest.raises(RecordingError, match=r"version 10, later than 9\) lacks a field or has"):
         texts(bag)
+
+
+@pytest.mark.parametrize("suffix", ["mcap", "db3"])
+@pytest.mark.parametrize("storage", ["", None])
+def test_a_bag_that_humble_has_reindexed_is_read_by_the_suffix_of_its_files(
+    bag: Path, storage: str | None, suffix: str
+) -> None:
+    names = [f"bag_{number}.{suffix}" for number in range(2)]
+    for name, part in zip(names, (SENT[:15], SENT[15:]), strict=True):
+        (write_mcap if suffix == "mcap" else write_humble_db3)(bag / name, part)
+    write_metadata(bag, 5, "", names, ["/a", "/b"], storage_identifier=storage)
+
+    assert texts(bag) == SENT
+    assert read_contents(bag).storage == ("mcap" if suffix == "mcap" else "sqlite3")
+
+
+def test_a_reindexed_bag_of_compressed_files_is_read(bag: Path) -> None:
+    file = write_humble_db3(bag / "bag_0.db3", SENT)
+    (bag / "bag_0.db3.zstd").write_bytes(zstd.compress(file.read_bytes()))
+    file.unlink()
+    compression = {"compression_mode": "FILE", "compression_format": "zstd"}
+    write_metadata(bag, 5, "", ["bag_0.db3.zstd"], ["/a", "/b"], **compression)
+
+    assert texts(bag) == SENT
 
 
 # Several files, compressed ones
