@@ -128,7 +128,7 @@ def _report(conversion: Conversion, clip: "MotionClip") -> None:
 def _trim(options: argparse.Namespace, clip: "MotionClip") -> "MotionClip":
     from actuated_characters.motion.clips.editing import trim
 
-    return trim(clip, options.start or 0.0, options.end)
+    return trim(clip, 0.0 if options.start is None else options.start, options.end)
 
 
 def _loop(options: argparse.Namespace, clip: "MotionClip") -> "MotionClip":

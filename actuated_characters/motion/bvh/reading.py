@@ -1,6 +1,8 @@
 """Reader of BVH files (Meredith and Maddock 2001, "Motion Capture File Formats Explained")."""
 
+import codecs
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from actuated_characters.motion.bvh.skeleton import BvhMotion
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClipError
 from msgs_config.files import read_text
+from msgs_config.motion_formats import describe_foreign_motion
 
 MAX_BYTES = 64 * 1024 * 1024
 """Of a file: ten minutes of a body with fingers at 120 Hz."""
@@ -26,11 +29,13 @@ _LONGEST_FRAME_TIME = 10.0  # s; one of more is in other units
 def read_bvh(path: Path) -> BvhMotion:
     """The skeleton and the motion of a BVH file.
 
+    Names that are not in UTF-8 are taken byte by byte (Latin-1).
+
     Raises:
         ClipError: the file is missing, too large or no BVH; says the line, what is there, and what
             must be.
     """
-    lines = read_text(path, ClipError, MAX_BYTES).removeprefix("\ufeff").splitlines()
+    lines = _text(path).splitlines()
     parser = HierarchyParser(path)
     for number, line in enumerate(lines, start=1):
         if not parser.take(number, line):
@@ -50,6 +55,27 @@ def read_bvh(path: Path) -> BvhMotion:
     if len(frames) != count:
         raise ClipError(f"{path}: {len(frames)} lines of frames; 'Frames:' says {int(count)}")
     return BvhMotion(skeleton, frame_time, _values(path, frames, skeleton.channel_count))
+
+
+def _text(path: Path) -> str:
+    """The text of a file, in UTF-8 or in UTF-16 with its mark, or else byte by byte."""
+    foreign = describe_foreign_motion(path)
+    if foreign:
+        raise ClipError(f"{path}: not a BVH file but {foreign}")
+    if path.suffix.lower() == ".json":
+        raise ClipError(f"{path}: not a BVH file; a clip needs no import, 'run --clip' plays it")
+    try:
+        return read_text(path, ClipError, MAX_BYTES).removeprefix("\ufeff")
+    except ClipError as error:
+        if not isinstance(error.__cause__, UnicodeDecodeError):
+            raise
+        content = path.read_bytes()
+        is_wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        with suppress(UnicodeDecodeError):
+            text = content.decode("utf-16" if is_wide else "latin-1")
+            if "\0" not in text:
+                return text.removeprefix("\ufeff")
+        raise
 
 
 def _header(path: Path, rows: Sequence[tuple[int, str]], index: int, keyword: str) -> float:

@@ -24,7 +24,7 @@ def trim(clip: MotionClip, start: float, end: float | None = None) -> MotionClip
     """The frames from a time in s to another one; it then ends where it is cut.
 
     Raises:
-        ClipError: there are fewer than two frames between.
+        ClipError: a time is outside of the clip, or there are fewer than two frames between.
     """
     end = clip.duration if end is None else end
     rows = np.flatnonzero((clip.times >= start - _ROUNDING) & (clip.times <= end + _ROUNDING))
@@ -33,6 +33,7 @@ def trim(clip: MotionClip, start: float, end: float | None = None) -> MotionClip
             f"from {start:g} s to {end:g} s there are {len(rows)} frames of a clip of "
             f"{clip.duration:g} s; there must be two or more"
         )
+    _check_times(clip, start, end)
     how = f"trimmed to {start:g} s to {end:g} s"
     return _part(clip, int(rows[0]), int(rows[-1]), how)
 
@@ -59,8 +60,9 @@ def loop(clip: MotionClip, start: float | None = None, end: float | None = None)
     speed, at least a fifth of a second and a third of the clip apart.
 
     Raises:
-        ClipError: the clip is too short.
+        ClipError: a time is outside of the clip, or the clip is too short.
     """
+    _check_times(clip, start, end)
     first, last = _cycle(clip, start, end)
     part = _part(
         clip, first, last, f"cycle from {clip.times[first]:.3f} s to {clip.times[last]:.3f} s"
@@ -129,6 +131,17 @@ def mirror(clip: MotionClip) -> MotionClip:
 
     contacts = {other_side(point): spans for point, spans in clip.contacts.items()}
     return clip.edited("mirrored", motion=mirrored_motion(clip), contacts=contacts)
+
+
+def _check_times(clip: MotionClip, start: float | None, end: float | None) -> None:
+    """Raise ClipError if a time in s is not within a clip."""
+    latest = clip.duration + 0.5 / clip.rate  # so a duration that was rounded for display will do
+    for time in (start, end):
+        if time is not None and not -_ROUNDING <= time <= latest:
+            goes_on = ", and begins again there" if clip.wraps else ""
+            raise ClipError(
+                f"{time:g} s is not within the clip, which lasts {clip.duration:.3f} s{goes_on}"
+            )
 
 
 def _part(clip: MotionClip, first: int, last: int, how: str) -> MotionClip:

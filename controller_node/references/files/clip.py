@@ -20,6 +20,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import ClipError, one_of
 from msgs_config.files import read_text
 from msgs_config.geometry import fixed_order, rotations
+from msgs_config.motion_formats import describe_no_clip
 
 _SUFFIXES = (".txt", ".json")
 _OF_BEFORE = "Corrections"
@@ -105,13 +106,20 @@ def read_clip(character: Character, name_or_path: str) -> ClipFrames:
 
 def clip_path(character: Character, name_or_path: str) -> Path:
     """The file of a clip given by name or path. Raises ClipError if there is no such clip."""
+    path = Path(name_or_path)
+    is_file = path.suffix.lower() in _SUFFIXES
+    other = "" if is_file else describe_no_clip(path)
+    if other:
+        raise ClipError(f"{path}: not a clip but {other}")
     if not character.clips.pattern:
         raise ClipError(f"character '{character.name}' has no clips: its file has no key 'clips'")
-    if name_or_path.endswith(_SUFFIXES):
-        return Path(name_or_path)
+    if is_file:
+        return path
     clips = available_clips(character)
     if name_or_path not in clips:
-        raise ClipError(f"{one_of('clip', name_or_path, clips)}, or the path of a .txt file")
+        raise ClipError(
+            f"{one_of('clip', name_or_path, clips)}, or the path of a .json or .txt file"
+        )
     return Path(character.clips.pattern.replace("*", name_or_path))
 
 

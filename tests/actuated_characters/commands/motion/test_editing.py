@@ -68,6 +68,7 @@ def test_what_cannot_be_is_one_clear_line(
     for words, message in (
         (f"trim walk --output {output}", "exists already; --overwrite replaces it"),
         (f"trim walk --from 5 --overwrite --output {output}", "there are 0 frames"),
+        (f"trim walk --from 1 --to 4 --overwrite --output {output}", "4 s is not within the clip"),
         ("speed wlk --factor 2", "unknown clip 'wlk'; did you mean 'walk'"),
         ("mirror walk --character kuka", "'kuka' has no clips"),
         (f"blend walk nowhere --output {tmp_path / 'b.json'}", "unknown clip 'nowhere'"),

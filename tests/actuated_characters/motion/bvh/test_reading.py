@@ -184,3 +184,38 @@ def test_files_that_are_no_text_too_large_or_too_deep_end_soon(tmp_path: Path) -
             read_bvh(path)
 
     assert time.monotonic() - start < 5.0
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8", "utf-8-sig", "utf-16"])
+def test_names_in_other_encodings_are_read(tmp_path: Path, encoding: str) -> None:
+    file = tmp_path / "arm.bvh"
+    text = ARM.replace("ORDER", ZXY).replace("arm", "K\xf6rper").replace("hip", "H\xfcfte")
+    file.write_bytes((text + "0 0 0 0 0 0 0 0 0\n" * 2).encode(encoding))
+
+    assert read_bvh(file).skeleton.names == ("H\xfcfte", "K\xf6rper")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.fbx", b"Kaydara FBX Binary  \x00", "an FBX scene; convert it to BVH, with Blender"),
+        ("a.bvh", b"Kaydara FBX Binary  \x00", "an FBX scene; convert it to BVH, with Blender"),
+        ("A.FBX", b"; FBX 7.4.0 project file", "an FBX scene"),
+        ("a.npz", b"PK\x03\x04", "arrays of NumPy, as AMASS"),
+        ("a.c3d", b"\x02\x50", "places of markers"),
+        ("a.amc", b"#!OML:ASF", "Acclaim"),
+        ("a.glb", b"glTF\x02", "a glTF scene"),
+        ("a.bvh", b"version https://git-lfs.github.com/spec/v1\n", "'git lfs pull'"),
+        ("a.json", b"{}", "'run --clip' plays it"),
+    ],
+)
+def test_another_format_is_said_with_what_to_do(
+    tmp_path: Path, name: str, content: bytes, message: str
+) -> None:
+    file = tmp_path / name
+    file.write_bytes(content)
+
+    with pytest.raises(ClipError, match="not a BVH file") as caught:
+        read_bvh(file)
+
+    assert message in str(caught.value) and "\n" not in str(caught.value)

@@ -149,3 +149,28 @@ def test_what_cannot_be_is_one_clear_line(
 
 
 LAIKAGO = "walk"
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "message"),
+    [
+        (1.0, 4.0, r"4 s is not within the clip, which lasts 1\.\d+ s, and begins again there"),
+        (-0.1, 1.0, "-0.1 s is not within"),
+        (float("nan"), 1.0, "nan s"),
+        (0.2, float("inf"), "inf s is not within"),
+        (0.8, 0.3, "two or more|no cycle"),
+        (0.3, 0.3, "two or more|no cycle"),
+    ],
+)
+@pytest.mark.parametrize("edit", [trim, loop])
+def test_times_outside_of_a_clip_are_refused(
+    edit: Callable[[MotionClip, float, float], MotionClip], start: float, end: float, message: str
+) -> None:
+    with pytest.raises(ClipError, match=message):
+        edit(clip_of("walk"), start, end)
+
+
+def test_a_duration_as_it_is_printed_is_the_clip_s_end() -> None:
+    walk = clip_of("walk")
+
+    assert trim(walk, 0.0, float(f"{walk.duration:.3g}")).times[-1] == walk.times[-1]
