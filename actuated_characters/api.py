@@ -206,7 +206,7 @@ class Simulation:
         """The present state; without effort if it is an episode's first.
 
         Raises:
-            SimulationError: the simulation is closed.
+            ClosedError: the simulation is closed.
         """
         self._simulation.check_open()
         return self._simulation.characters[0].state
@@ -237,7 +237,7 @@ class Simulation:
 
         Raises:
             ConfigurationError: the simulation does not watch contacts.
-            SimulationError: it is closed.
+            ClosedError: it is closed.
         """
         self._simulation.check_open()
         if not self._simulation.watches_contacts:
@@ -267,7 +267,7 @@ class Simulation:
 
         Raises:
             CommandError: no such link, or force or torque is not three finite numbers.
-            SimulationError: the simulation is closed.
+            ClosedError: the simulation is closed.
         """
         self._simulation.check_open()
         wrench = [
@@ -287,8 +287,8 @@ class Simulation:
 
         Raises:
             ConfigurationError: the effort has another shape, or is not of numbers.
-            SimulationError: the state has diverged; the message names the degree of freedom. Or
-                the simulation is closed.
+            SimulationError: the state has diverged; the message names the degree of freedom.
+            ClosedError: the simulation is closed.
         """
         self._simulation.check_open()
         effort = real_array("an effort", effort)
@@ -315,7 +315,7 @@ class Simulation:
 
         Raises:
             ConfigurationError: `start` has not one finite number a degree of freedom.
-            SimulationError: the simulation is closed.
+            ClosedError: the simulation is closed.
         """
         size = self.character.layout.size
         states = {} if start is None else {"": finite_state(start, size)}

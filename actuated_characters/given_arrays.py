@@ -26,10 +26,9 @@ def finite_state(state: StampedState, size: int) -> StampedState:
 
 def has_arrays(state: StampedState, size: int) -> bool:
     """Whether a state's position and velocity are arrays (size,)."""
-    return all(
-        isinstance(array, np.ndarray) and array.shape == (size,)
-        for array in (state.position, state.velocity)
-    )
+    position, velocity = state.position, state.velocity
+    are_arrays = isinstance(position, np.ndarray) and isinstance(velocity, np.ndarray)
+    return are_arrays and position.shape == velocity.shape == (size,)
 
 
 def real_array(what: str, numbers: Sequence[float] | FloatArray) -> FloatArray:

@@ -58,7 +58,11 @@ class RunError(ActuatedCharactersError):
 
 
 class SimulationError(ActuatedCharactersError):
-    """The simulation cannot go on: it diverged, is closed, or a command never came."""
+    """The simulation cannot go on: it diverged, or a command never came."""
+
+
+class ClosedError(ActuatedCharactersError):
+    """Something with an engine, such as a simulation, is used after it was closed."""
 
 
 def one_of(what: str, value: object, choices: list[str], prefix: str = "") -> str:

@@ -13,7 +13,7 @@ from typing import NoReturn
 from msgs_config.character.c_library import c_numbers, captured_output
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf.engine_text import write_engine_urdf
-from msgs_config.errors import CharacterError, SimulationError
+from msgs_config.errors import CharacterError, ClosedError, SimulationError
 
 with captured_output("stdout", "stderr"):
     import pybullet
@@ -38,10 +38,10 @@ class Engine:
         """PyBullet's number of it.
 
         Raises:
-            SimulationError: it is closed.
+            ClosedError: it is closed.
         """
         if self._number is None:
-            raise SimulationError("it is closed: its engine has ended; make a new one")
+            raise ClosedError("it is closed: its engine has ended; make a new one")
         return self._number
 
     def __reduce__(self) -> NoReturn:

@@ -75,9 +75,9 @@ def captured_output(*streams: str) -> Iterator[Callable[[], str]]:
         variables = [ctypes.c_void_p.in_dll(_LIBRARY, name) for name in streams or ("stdout",)]
         before = [variable.value for variable in variables]
         _printed.clear()
-        for variable in variables:
-            variable.value = _printed.address
         try:
+            for variable in variables:
+                variable.value = _printed.address
             yield _printed.text
         finally:
             for variable, value in zip(variables, before, strict=True):

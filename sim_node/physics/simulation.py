@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from msgs_config.arrays import FloatArray
-from msgs_config.errors import SimulationError
+from msgs_config.errors import ClosedError, SimulationError
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
@@ -103,9 +103,9 @@ class Simulation:
         self._world.close()
 
     def check_open(self) -> None:
-        """Raise SimulationError if it is closed."""
+        """Raise ClosedError if it is closed."""
         if self._is_closed:
-            raise SimulationError("the simulation is closed; make a new one")
+            raise ClosedError("the simulation is closed; make a new one")
 
     @property
     def stamp_ns(self) -> int:
@@ -133,7 +133,8 @@ class Simulation:
 
         Raises:
             SimulationError: a next state is not finite or faster than the speed limit; it names
-                the degree of freedom. Or the simulation is closed.
+                the degree of freedom.
+            ClosedError: the simulation is closed.
         """
         self.check_open()
         pushes = pushes or [()] * len(self.characters)
@@ -182,7 +183,7 @@ class Simulation:
         names, where they are given; the engine's step stays.
 
         Raises:
-            SimulationError: the simulation is closed.
+            ClosedError: the simulation is closed.
         """
         self.check_open()
         if world is not None:
@@ -199,7 +200,7 @@ class Simulation:
         To be called before the first step.
 
         Raises:
-            SimulationError: the simulation is closed.
+            ClosedError: the simulation is closed.
         """
         self.check_open()
         for character in self.characters:
@@ -212,7 +213,7 @@ class Simulation:
         """The present state, for this simulation or one in another process.
 
         Raises:
-            SimulationError: the simulation is closed.
+            ClosedError: the simulation is closed.
         """
         self.check_open()
         return Snapshot(
@@ -230,7 +231,7 @@ class Simulation:
         """Go on from a snapshot: what follows is what followed it, to the bit.
 
         Raises:
-            SimulationError: the simulation is closed.
+            ClosedError: the simulation is closed.
         """
         self.check_open()
         each = list(zip(self.characters, snapshot.characters, strict=True))

@@ -13,7 +13,7 @@ import pytest
 import actuated_characters as ac
 from actuated_characters.render.engine.renderer import Renderer
 from msgs_config.character.bullet import Engine
-from msgs_config.errors import CharacterError, SimulationError
+from msgs_config.errors import CharacterError, ClosedError
 from msgs_config.messages.throw import ProjectileThrow
 from tests.support.physics import character as shared_character
 from tests.support.urdf import inertial, joint, link, robot
@@ -82,7 +82,7 @@ def test_what_is_closed_can_be_used_no_more(
     alone = ten_steps(pendulum)
 
     def refused() -> None:
-        with pytest.raises(SimulationError, match="closed"):
+        with pytest.raises(ClosedError, match="closed"):
             use(closed)
 
     refused()
@@ -95,7 +95,7 @@ def test_a_snapshot_is_not_loaded_by_what_is_closed(
     with ac.Simulation(pendulum) as other:
         other.step([1.0])
         saved = other._simulation.snapshot()
-        with pytest.raises(SimulationError, match="closed"):
+        with pytest.raises(ClosedError, match="closed"):
             closed._simulation.load_snapshot(saved)
         before = other.state.position.copy()
         other._simulation.load_snapshot(saved)
@@ -123,7 +123,7 @@ def test_it_may_be_closed_by_another_thread(pendulum: ac.Character) -> None:
     closer.start()
     closer.join()
     assert ten_steps(pendulum, simulation.close) == alone
-    with pytest.raises(SimulationError, match="closed"):
+    with pytest.raises(ClosedError, match="closed"):
         simulation.step([0.0])
 
 
@@ -156,7 +156,7 @@ def test_a_world_that_cannot_be_built_leaves_no_engine(tmp_path: Path) -> None:
     with pytest.raises(CharacterError, match=r"box\.obj"):
         simulation.reset()
     assert engines() == before
-    with pytest.raises(SimulationError, match="closed"):
+    with pytest.raises(ClosedError, match="closed"):
         simulation.step([0.0])
     simulation.close()
 
@@ -188,7 +188,28 @@ def test_an_engine_gives_its_number_until_it_is_closed() -> None:
     with closing(Engine()) as third:
         assert int(third) == number  # PyBullet gives it again
         first.close()
-        with pytest.raises(SimulationError, match="closed"):
+        with pytest.raises(ClosedError, match="closed"):
             pybullet.stepSimulation(physicsClientId=first)
         assert pybullet.isConnected(third)
     second.close()
+
+
+def test_a_closed_environment_is_no_fall() -> None:
+    gymnasium = pytest.importorskip("gymnasium")
+    from actuated_characters import environments  # noqa: F401  registers them
+
+    made = [
+        gymnasium.make("actuated_characters/Track-v0", character="pendulum", reference="hold")
+        for _ in range(2)
+    ]
+    made[0].reset(seed=0)
+    made[0].close()
+    made[1].reset(seed=0)
+    action = np.zeros(made[1].action_space.shape)
+    with pytest.raises(ClosedError, match="closed"):
+        made[0].step(action)
+    with pytest.raises(ClosedError, match="closed"):
+        made[0].reset()
+    made[0].close()
+    assert not made[1].step(action)[2]
+    made[1].close()
