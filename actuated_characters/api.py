@@ -343,7 +343,8 @@ class Simulation:
         """Go on from a snapshot, to the bit; the state in which it was taken.
 
         It may be that of another simulation of the same character and parameters, in another
-        process as well. A snapshot that was pickled begins `state_hash` anew.
+        process as well. From a pickled snapshot
+        `state_hash` goes on with the hash so far instead of the states.
 
         Raises:
             ConfigurationError: it is of another character, or other parameters.

@@ -105,19 +105,17 @@ class TargetActuation:
         self.space: spaces.Space[FloatArray] = spaces.Box(
             lower[self._actuated], upper[self._actuated], dtype=np.float64
         )
-        self._offset: FloatArray | None = (
-            None  # (n,); None: nothing, and the law is `run`'s to the bit
-        )
+        self._offset: FloatArray | None = None  # (n,); None: nothing is added, not even a zero
         self._target: GeneralizedPosition | None = None  # in place of the reference's
 
     def hold(self, action: FloatArray) -> None:
         """Hold offsets or positions (a,)."""
-        held = np.zeros(self._layout.size)
-        held[self._actuated] = action
+        whole = np.zeros(self._layout.size)
+        whole[self._actuated] = action
         if not self._is_absolute:
-            self._offset = held if held.any() else None
+            self._offset = whole if whole.any() else None
             return
-        self._target = self._layout.configuration(held)
+        self._target = self._layout.configuration(whole)
 
     def effort(self, tick: int, state: StampedState) -> FloatArray:
         """The law's effort within the limits, N m and N."""

@@ -1,7 +1,6 @@
 """Tracking a motion as a Gymnasium environment, `actuated_characters/Track-v0`."""
 
 import hashlib
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -21,7 +20,15 @@ from actuated_characters.environments.actions import (
 )
 from actuated_characters.environments.assessment import Assessment
 from actuated_characters.environments.motion import EpisodeMotion
-from actuated_characters.environments.options import controller_values, with_shared
+from actuated_characters.environments.options import (
+    RENDER_MODES,
+    check_drawing,
+    check_options,
+    checked_action,
+    controller_values,
+    start_of,
+    with_shared,
+)
 from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import Picture
 from controller_node.model_check import check_inertia
@@ -30,7 +37,7 @@ from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
-from msgs_config.errors import ConfigurationError, SimulationError, one_of
+from msgs_config.errors import ConfigurationError, SimulationError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values
@@ -40,7 +47,6 @@ if TYPE_CHECKING:
     from actuated_characters.environments.camera import FollowingCamera
 
 _NONE: Mapping[str, object] = MappingProxyType({})
-_RESET_OPTIONS = ("start",)
 _POSES_IN_VIEW, _TIME_IN_VIEW = 16, 4.0  # of the reference, s, that the camera is far enough for
 
 
@@ -74,7 +80,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
     than half of it, or the simulation diverges; it is truncated after `duration`.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012 - as its base has it
+    metadata = {"render_modes": RENDER_MODES, "render_fps": 30}  # noqa: RUF012 - as its base has it
 
     def __init__(
         self,
@@ -108,9 +114,9 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
             ActuatedCharactersError: a name or a value is wrong.
         """
         check_action(action)
-        _check(duration, ticks_per_step, simulator)
+        check_options(duration, ticks_per_step, simulator)
         if render_mode is not None:
-            _check_drawing(render_mode, render_size)
+            check_drawing(render_mode, render_size)
         simulator, given = with_shared(simulator, controller, reference)
         self._character = placed(load_character(character, collides(simulator)), simulator)
         values = controller_values(self._character, given)
@@ -128,12 +134,13 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._simulation = Simulation(
             self._character, motion.first_state(), simulator, watch_contacts=False
         )
-        options = (action, ticks_per_step, sorted(values.items()))
+        self._duration, self._ticks = float(duration), int(ticks_per_step)
+        self._random = random_start
+        options = (action, self._ticks, sorted(values.items()))
         self._kind = hashlib.sha256(repr(options).encode()).hexdigest()
-        self._duration, self._ticks, self._random = duration, ticks_per_step, random_start
         self._is_fresh, self._is_closed = True, False
         self.render_mode, self._render_size = render_mode, render_size
-        self.metadata = {**self.metadata, "render_fps": round(clock.rate_hz / ticks_per_step)}
+        self.metadata = {**self.metadata, "render_fps": max(clock.rate_hz // self._ticks, 1)}
         self._camera: FollowingCamera | None = None
         self._see()
 
@@ -154,7 +161,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
             ConfigurationError: the start is no time, or there is another option.
         """
         super().reset(seed=seed)
-        start = self._drawn_start() if not options else _start_of(options)
+        start = self._drawn_start() if not options else start_of(options)
         self._motion.begin(start)
         first = self._motion.at(0)
         if not self._is_fresh or start:
@@ -172,11 +179,9 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         Raises:
             ConfigurationError: the action has another shape, or is not finite.
         """
-        shape = self.action_space.shape
-        if np.shape(action) != shape or not np.isfinite(action).all():
-            raise ConfigurationError(f"an action must have shape {shape} and finite numbers")
+        numbers = checked_action(action, self.action_space.shape)
         self._is_fresh = False
-        self._actuation.hold(action)
+        self._actuation.hold(numbers)
         simulation, effort = self._simulation, self._actuation.effort
         try:
             for _ in range(self._ticks):
@@ -273,38 +278,3 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Time in s since the episode began, and of the reference."""
         elapsed = self._simulation.time
         return {"time": elapsed, "reference_time": self._motion.start + elapsed}
-
-
-def _start_of(options: Mapping[str, Any]) -> float:
-    """The time of the reference in s at which options of `reset` begin an episode."""
-    for name in options:
-        if name not in _RESET_OPTIONS:
-            raise ConfigurationError(one_of("option of reset", name, list(_RESET_OPTIONS)))
-    start = options["start"]
-    try:
-        time = float(start)
-    except (TypeError, ValueError):
-        time = math.nan
-    if not 0.0 <= time < math.inf:
-        raise ConfigurationError(f"start is {start} s; it must be 0 or later")
-    return time
-
-
-def _check_drawing(mode: str, size: Size) -> None:
-    """Raise ConfigurationError if there is no such mode, or the size is not sensible."""
-    from actuated_characters.render.stills import check_size
-
-    if mode not in TrackEnv.metadata["render_modes"]:
-        raise ConfigurationError(one_of("render_mode", mode, TrackEnv.metadata["render_modes"]))
-    check_size(size, 1)
-
-
-def _check(duration: float, ticks_per_step: int, simulator: Mapping[str, object]) -> None:
-    """Raise ConfigurationError if an option is wrong."""
-    if not isinstance(ticks_per_step, int) or ticks_per_step < 1:
-        raise ConfigurationError(f"ticks_per_step is {ticks_per_step}; it must be 1 or more")
-    if not 0.0 < duration < math.inf:
-        raise ConfigurationError(f"duration is {duration} s; it must be a time above 0")
-    for name in ("initial_position", "initial_velocity", "initial_state"):
-        if name in simulator:
-            raise ConfigurationError(f"'{name}' is where the reference begins; leave it out")

@@ -60,7 +60,7 @@ class Tick:
 class StateHash:
     """A hash over every tick's state, its doubles bit for bit.
 
-    A copy goes on from the same states. A pickled one begins anew with the hash so far: what
+    A copy goes on from the same states. A pickled one begins again with the hash so far: what
     SHA-256 remembers cannot be sent to another process.
     """
 

@@ -142,7 +142,7 @@ class SimulatedCharacter:
     def add_contacts(self, touched: Callable[[], TouchedLinks], share: float) -> None:
         """Add the contacts of the last engine step, which is a share of the tick.
 
-        Where it is the whole tick, they are left to be found when somebody asks for them: the
+        Where it is the whole tick, they are left to be found when they are asked for: the
         engine has them until its next step. `touched` is what it has.
         """
         if share == 1.0:

@@ -30,10 +30,10 @@ def test_a_simulation_goes_on_from_a_snapshot_to_the_bit(walker: ac.Controller, 
     with ac.Simulation(walker.character, walker.start) as simulation:
         go_on(walker, simulation, ticks)
         simulation.push("chest", (60.0, 0.0, 0.0))
-        kept = simulation.snapshot()
+        saved = simulation.snapshot()
         followed, states = go_on(walker, simulation, 30), simulation.state_hash
 
-        restored = simulation.restore(kept)
+        restored = simulation.restore(saved)
 
         assert (restored.effort is None) == (ticks == 0)
         assert (simulation.ticks, simulation.time) == (ticks, ticks / 240)
@@ -42,7 +42,7 @@ def test_a_simulation_goes_on_from_a_snapshot_to_the_bit(walker: ac.Controller, 
 
     with ac.Simulation(walker.character, walker.start) as other:
         go_on(walker, other, 5)
-        other.restore(pickle.loads(pickle.dumps(kept)))
+        other.restore(pickle.loads(pickle.dumps(saved)))
         assert go_on(walker, other, 30) == followed
 
 

@@ -57,17 +57,17 @@ def test_what_follows_a_state_is_what_followed_it_to_the_bit(case: str, steps: i
     environment = TrackEnv(**CASES[case])
     environment.reset(seed=4)
     go_on(environment, steps, seed=1)
-    kept = environment.get_state()
+    saved = environment.get_state()
     followed, states = go_on(environment, 30), environment.simulation.state_hash
     go_on(environment, 3, seed=2)
 
     for _ in range(2):
-        observation, info = environment.set_state(kept)
-        assert observation.tobytes() == kept.observation.tobytes()
+        observation, info = environment.set_state(saved)
+        assert observation.tobytes() == saved.observation.tobytes()
         assert info["time"] == environment.simulation.time
         assert go_on(environment, 30) == followed
         assert environment.simulation.state_hash == states
-    assert continue_elsewhere(CASES[case], pickle.dumps(kept), 30) == followed
+    assert continue_elsewhere(CASES[case], pickle.dumps(saved), 30) == followed
     environment.close()
 
 
@@ -75,12 +75,12 @@ def test_another_process_goes_on_to_the_bit() -> None:
     environment = TrackEnv(**WALK)
     environment.reset(seed=4)
     go_on(environment, 5)
-    kept = pickle.dumps(environment.get_state())
+    saved = pickle.dumps(environment.get_state())
     followed = go_on(environment, 30)
     environment.close()
 
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        assert pool.submit(continue_elsewhere, WALK, kept, 30).result() == followed
+        assert pool.submit(continue_elsewhere, WALK, saved, 30).result() == followed
 
 
 def test_a_push_that_acts_goes_on_acting() -> None:
@@ -88,14 +88,14 @@ def test_a_push_that_acts_goes_on_acting() -> None:
     environment.reset(seed=0)
     environment.simulation.push("chest", (80.0, 0.0, 0.0))
     go_on(environment, 2)
-    kept = environment.get_state()
+    saved = environment.get_state()
     followed = go_on(environment, 10)
     other = TrackEnv(clip="walk", simulator={"wrench_duration": 0.5})
     other.reset(seed=0)
-    other.set_state(kept)
+    other.set_state(saved)
 
     assert go_on(other, 10) == followed
-    environment.set_state(kept)
+    environment.set_state(saved)
     environment.reset(seed=0)
     other.reset(seed=0)
     assert go_on(environment, 10) == go_on(other, 10)

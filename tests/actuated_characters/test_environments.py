@@ -340,6 +340,8 @@ def test_a_placed_reference_is_in_its_world() -> None:
     [
         ({"duration": -1.0}, "duration is -1.0"),
         ({"ticks_per_step": 1.5}, "ticks_per_step is 1.5"),
+        ({"duration": "long"}, "duration is long s"),
+        ({"render_mode": "rgb_array", "render_size": 480}, "render_size is 480; .* in pixels"),
         ({"simulator": {"initial_position": [1.0]}}, "'initial_position'"),
         ({"action": "torque"}, "unknown action 'torque'; did you mean 'torques'"),
         ({"render_mode": "human"}, "unknown render_mode 'human'"),
@@ -368,7 +370,7 @@ def test_what_both_sides_must_agree_on_is_given_once(side: str) -> None:
 
 def test_actions_and_starts_are_checked() -> None:
     environment = make(character="pendulum")
-    for wrong in (np.array([np.nan]), np.zeros(2), 5.0):
+    for wrong in (np.array([np.nan]), np.zeros(2), 5.0, ["up"], None, [[0.0]]):
         with pytest.raises(ac.ActuatedCharactersError, match="an action must have shape"):
             environment.step(wrong)  # type: ignore[arg-type]
     for wrong in (float("nan"), -1.0, "soon", None):

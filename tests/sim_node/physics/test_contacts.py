@@ -74,19 +74,19 @@ def read_twice(run: Simulation, one: SimulatedCharacter) -> Contacts | None:
 
 
 def read_from_a_snapshot(run: Simulation, one: SimulatedCharacter) -> Contacts | None:
-    kept = run.snapshot()
-    run.load_snapshot(kept)
+    saved = run.snapshot()
+    run.load_snapshot(saved)
     return one.contacts
 
 
 WAYS = [read_at_once, read_after_frames, read_twice, read_from_a_snapshot]
-Way = Callable[[Simulation, SimulatedCharacter], Contacts | None]
+Reading = Callable[[Simulation, SimulatedCharacter], Contacts | None]
 
 
 @pytest.mark.parametrize("read", WAYS, ids=lambda way: way.__name__)
 @pytest.mark.parametrize("name", ["humanoid", "laikago", "franka_panda"])
 def test_they_are_those_of_the_engines_last_step_however_late_they_are_read(
-    name: str, read: Way
+    name: str, read: Reading
 ) -> None:
     rng, size = np.random.default_rng(3), character(name).layout.size
     ball = ProjectileThrow(1.0, 0.1, (0.5, 0.0, 1.0), (-6.0, 0.0, 0.0))
