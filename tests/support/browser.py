@@ -91,7 +91,9 @@ class Browser:
                 result: dict[str, Any] = message["result"]
                 return result
             if message.get("method") == "Runtime.exceptionThrown":
-                self.console.append(message["params"]["exceptionDetails"]["text"])
+                details = message["params"]["exceptionDetails"]
+                reason = details.get("exception", {}).get("description", "")
+                self.console.append(f"{details['text']} {reason}".strip())
 
     def open(self, url: str) -> None:
         """Load a page, until all of it has come."""
