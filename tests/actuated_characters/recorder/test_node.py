@@ -23,6 +23,7 @@ from std_msgs.msg import Header
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import read_recording
 from msgs_config.messages import topics
+from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.topics import Topic
@@ -120,6 +121,35 @@ def test_a_recorder_without_a_tick_fails_in_a_line(
     line = recorder.stderr.splitlines()[-1]
     assert line == "error: no tick was recorded: the simulator's first state had no answer"
     assert summary_of(tmp_path / "run")["ticks"] == 0
+
+
+def test_a_recorder_of_bounded_size_measures_all_and_keeps_the_last_states(
+    processes: Processes, tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    recorder = processes.node(topics.RECORDER_NODE, directory=str(run), last_megabytes=1.0)
+    loop = processes.composed(
+        {"max_ticks": LONG, "wait_for_subscribers": 2}, {"wait_for_subscribers": 2}
+    )
+
+    assert loop.wait(SLOW) == 0, loop.stderr
+    assert recorder.end(signal.SIGINT, SLOW) == 0, recorder.stderr
+
+    assert summary_of(run)["ticks"] == LONG
+    recording = read_recording(run)
+    assert recording.begins_amid
+    assert len(recording.effort) < LONG
+    assert tick_of_stamp(int(recording.stamps_ns[-1])) == LONG + 1
+    kept = sum(len(message.raw) for message in read_messages(run / "bag"))
+    assert 1.0e6 < kept < 2.2e6
+    assert not (run / "bag-earlier").exists()
+    replaying = processes.command("replay", str(run))
+    assert replaying.wait() == 1
+    assert "it can be viewed, not repeated" in only_line(replaying)
+
+
+def tick_of_stamp(stamp_ns: int) -> int:
+    return TickClock(240).tick(stamp_ns)
 
 
 def only_line(process: Process) -> str:

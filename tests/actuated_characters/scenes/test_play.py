@@ -52,6 +52,7 @@ def test_the_brawl_has_the_states_of_its_two_classes_and_replays(
 
     assert command.wait(LONG) == 0, command.stderr
     assert "left goes for right: root force at most 400.0 N" in command.stdout
+    assert "all is recorded" in command.stdout
     found = {name: hash_of(run / name, DURATION * RATE) for name in SIDES}
     assert found == brawl.hashes
     assert replay(read_recordings(run)).state_hashes == found
@@ -169,6 +170,7 @@ def test_play_alone_shows_the_walker_in_a_browser_until_it_is_ended(
         wait_until(lambda: page.pictures > 20, "pictures")
 
         assert command.end(signal.SIGINT, LONG) == 0, command.stderr
+    assert "the last minutes are recorded, 150 to 300 MB" in command.stdout
     (recording,) = read_recordings(tmp_path / "runs" / "play-walker")
     assert recording.character.name == "humanoid"
     assert replay([recording]).difference is None
