@@ -8,7 +8,11 @@ from msgs_config.runtime.process import limit_threads, middleware_settings
 
 limit_threads()
 
-from rich.console import Console  # noqa: E402 - after the limit on threads
+from benchmarks.support.needed import need  # noqa: E402 - after the limit on threads
+
+need("make bench", "plan", "view")
+
+from rich.console import Console  # noqa: E402
 
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
 from benchmarks.control_law import measure_control_laws  # noqa: E402

@@ -1,9 +1,43 @@
-"""What not every user needs, and so not every installation has: the extras of setup.py."""
+"""Packages that not every user has: what they are for, and how one gets them."""
+
+from importlib.util import find_spec
+
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError
+
+PACKAGES = {
+    "gymnasium": ("gymnasium",),
+    "meshes": ("trimesh",),
+    "plan": ("numba",),
+    "search": ("cma",),
+    "video": ("av",),
+    "view": ("viser", "websockets"),
+}
+"""Python packages of the extras of `setup.py`, by the extras' names."""
 
 
-def installation_of(extra: str) -> str:
-    """The command that installs an extra, for the error that says that it is missing."""
+def hint(extra: str) -> str:
+    """How to install an extra."""
     return (
         f"pip install 'actuated_characters[{extra}]', or in a clone "
         f".venv/bin/pip install -e '.[{extra}]'"
     )
+
+
+def require_extra(
+    extra: str, what: str, error: type[ActuatedCharactersError] = ConfigurationError
+) -> None:
+    """Check that the packages of an extra are installed, before anything begins.
+
+    Args:
+        extra: A key of `PACKAGES`.
+        what: What needs it: the subject of the error's sentence.
+        error: The class of the error.
+
+    Raises:
+        error: one is missing; says how to get it.
+    """
+    for package in PACKAGES[extra]:
+        if find_spec(package) is None:
+            raise error(
+                f"{what} needs the extra '{extra}' ({package} is not installed): {hint(extra)}"
+            )

@@ -18,6 +18,7 @@ from actuated_characters.commands.common.settings import (
 from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.view import add_server, server_parameters
 from msgs_config.errors import ConfigurationError
+from msgs_config.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a while to import
     from actuated_characters.scenes.scene import Scene
@@ -78,6 +79,8 @@ def _play(options: argparse.Namespace) -> None:
         for name in scene_names():
             print(f"{name}: {load_scene(name).title}")
         return
+    if not options.no_view:
+        require_extra("view", "play (without --no-view)")
     _run_scene(options, load_scene(options.scene, node_settings(options.set, NODES)))
 
 

@@ -32,6 +32,7 @@ from actuated_characters.commands.common.settings import (
 from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.view import server_parameters
 from msgs_config.errors import ConfigurationError, one_of
+from msgs_config.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.runs.plan import RunPlan
@@ -104,6 +105,8 @@ def _run(options: argparse.Namespace) -> None:
         read_metrics,
     )
 
+    if options.view:
+        require_extra("view", "--view")
     run = planned_run(options)
     plan, motion = run.plan, _motion_name(run.plan)
     name = f"{plan.character.name}-{Path(motion).stem}"

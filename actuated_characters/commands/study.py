@@ -12,11 +12,13 @@ from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.common.tables import make_table, show
 from actuated_characters.studies.catalogue import NAMES, load_study
 from msgs_config.errors import ConfigurationError
+from msgs_config.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.studies.framework.study import Study
 
 _ALL = "all"
+_COMPARES_PLANS = "athletics"
 
 
 def add_study(commands: "Commands[argparse.ArgumentParser]") -> None:
@@ -53,6 +55,8 @@ def _study(options: argparse.Namespace) -> None:
             raise ConfigurationError(
                 f"{directory} is not empty; --overwrite replaces what is there"
             )
+    if _COMPARES_PLANS in names:
+        require_extra("plan", f"study {_COMPARES_PLANS}, which has the planner walk,")
     with own_domain() as domain:  # one for all runs
         os.environ.setdefault("ROS_DOMAIN_ID", str(domain))
         for number, (name, directory) in enumerate(directories.items(), start=1):

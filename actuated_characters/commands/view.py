@@ -13,9 +13,9 @@ from actuated_characters.commands.common.settings import (
     print_remarks,
     robot_source,
 )
-from actuated_characters.viewer.extra import check_viser
 from actuated_characters.viewer.parameters import PARAMETERS as SERVER_PARAMETERS
 from msgs_config.errors import ConfigurationError
+from msgs_config.extras import require_extra
 from msgs_config.parameters import resolve
 
 _FPS = 30.0
@@ -80,6 +80,7 @@ def server_parameters(options: argparse.Namespace) -> dict[str, object]:
 
 def _view(options: argparse.Namespace) -> None:
     """Show a recorded run, or become the node, which has this process's signals and terminal."""
+    require_extra("view", "view")
     if options.run is not None:
         _view_recorded(options)
         return
@@ -104,7 +105,6 @@ def _view_recorded(options: argparse.Namespace) -> None:
     if options.namespace is not None:
         raise ConfigurationError("--namespace is of running simulators; a RUN has none")
     values = resolve(SERVER_PARAMETERS, server_parameters(options))
-    check_viser()
     from actuated_characters.viewer.recorded.main import show_recorded
 
     show_recorded(

@@ -1,6 +1,13 @@
-"""Environments of Gymnasium (the extra `gymnasium`); importing this registers them."""
+"""Environments of Gymnasium (the extra `gymnasium`); importing this registers them.
 
-import gymnasium
+Raises ConfigurationError, with how to get it, where the extra is not installed.
+"""
+
+from msgs_config.extras import require_extra
+
+require_extra("gymnasium", "actuated_characters.environments")
+
+import gymnasium  # noqa: E402 - after the check
 
 TRACK = "actuated_characters/Track-v0"
 

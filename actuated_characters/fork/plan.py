@@ -21,6 +21,7 @@ from actuated_characters.runs.planned_files import Planned
 from actuated_characters.runs.planned_throws import PlannedThrow, plan_throws
 from actuated_characters.runs.planned_wrenches import PlannedPush, parse_push
 from controller_node import parameters as controller_parameters
+from controller_node.planner.factory import check_installed
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.factory import make_motion
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
@@ -159,6 +160,7 @@ def _run_plan(recording: Recording, ticks: int) -> RunPlan:
     given = {**first_parameters(recording), "wait_for_subscribers": 0}
     own = controller_parameters.character_parameters(character, given)
     controller = resolve(controller_parameters.PARAMETERS + own, given)
+    check_installed(controller)
     make_motion(character, controller)  # raises where a file is not there any more
     return RunPlan(character, _RecordedMotion(recording), simulator, controller, ())
 

@@ -9,6 +9,7 @@ from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.whole_files import replacing
 from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.extras import require_extra
 
 if TYPE_CHECKING:
     from av.container import OutputContainer
@@ -64,12 +65,9 @@ def check_video(size: Size, fps: int) -> None:
         )
     if not 1 <= fps <= FASTEST:
         raise ConfigurationError(f"{fps} frames a second; it must be 1 to {FASTEST}")
-    try:
-        import av
-    except ImportError as error:
-        raise ConfigurationError(
-            "a video needs the package 'av', which is not installed: pip install 'av>=14,<19'"
-        ) from error
+    require_extra("video", "a film")
+    import av
+
     if _ENCODER not in av.codecs_available:
         raise ConfigurationError(
             f"the package 'av' here is built without the encoder {_ENCODER}; "

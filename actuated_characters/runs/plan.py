@@ -8,7 +8,7 @@ from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import choose_behaviour
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.model_check import check_agreement
-from controller_node.planner.factory import check_planning
+from controller_node.planner.factory import check_installed, check_planning
 from controller_node.planner.settings import PREDICTIVE
 from controller_node.references.base import Motion, Reference
 from controller_node.references.factory import make_motion
@@ -91,6 +91,7 @@ def make_plan(
     character = placed(character, simulator_given)
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller, motion = _controller_values(character, controller_given)
+    check_installed(controller)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
     if controller.text("planner") == PREDICTIVE or controller.text("behaviour") == STATE_MACHINE:

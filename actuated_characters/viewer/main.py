@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable
 from typing import NoReturn
 
-from actuated_characters.viewer.extra import check_viser
+from msgs_config.extras import require_extra
 from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, use_batch_scheduling
 
 _NICE = 5  # pictures can wait on a busy machine, ticks cannot
@@ -23,7 +23,7 @@ def main() -> NoReturn:
 
 
 def _load() -> Callable[[], RunnableNode]:
-    check_viser()
+    require_extra("view", "the viewer")
     from actuated_characters.viewer.node import ViewerNode
 
     return ViewerNode

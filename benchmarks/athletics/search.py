@@ -35,6 +35,7 @@ from controller_node.behaviours.state_machine.file import (  # noqa: E402
     read_content,
 )
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError  # noqa: E402
+from msgs_config.extras import require_extra  # noqa: E402
 
 SEARCHED = (
     "states.step.duration=0.04",
@@ -227,6 +228,7 @@ def main() -> int:
         parser.error("--generations, --trials and --rate must be 1 or more, --population 2")
     done = 0
     try:
+        require_extra("search", "the search")
         for generation in search(options):
             done = generation
     except KeyboardInterrupt:
@@ -235,9 +237,6 @@ def main() -> int:
         return 130
     except (ActuatedCharactersError, OSError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
-        return 1
-    except ModuleNotFoundError as error:
-        print(f"error: {error}: pip install 'actuated_characters[search]'", file=sys.stderr)
         return 1
     return 0
 

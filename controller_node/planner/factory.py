@@ -11,7 +11,7 @@ from controller_node.references.files.reconstructed import ReconstructedClip
 from controller_node.references.offsets import RecordedPlan
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
-from msgs_config.extras import installation_of
+from msgs_config.extras import hint, require_extra
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import COMMAND_DELAY
 
@@ -29,6 +29,14 @@ def check_planning(character: Character, values: Values) -> None:
         _recorded_plan(character, values)
     else:
         make_settings(character, values)
+
+
+def check_installed(values: Values) -> None:
+    """Raise ConfigurationError, with how to get it, where the planner's extra is not installed."""
+    name = values.text("planner")
+    delayed = values.integer(COMMAND_DELAY.name) > 0
+    if name != NO_PLANNER and (name != RECORDED or delayed):
+        require_extra("plan", f"planner '{name}'")
 
 
 def make_planner(character: Character, values: Values) -> Planner | None:
@@ -95,5 +103,5 @@ def saying_what_it_needs(planner: str) -> Iterator[None]:
         if (error.name or "").partition(".")[0] not in ("numba", "llvmlite"):
             raise
         raise ConfigurationError(
-            f"planner '{planner}' needs numba ({error}): {installation_of('plan')}"
+            f"planner '{planner}' needs the extra 'plan' ({error}): {hint('plan')}"
         ) from error

@@ -1,40 +1,110 @@
-"""The extras that errors and pages name are those that can be installed."""
+"""Extras are looked for before anything begins, and the hint names them as the docs do."""
 
+import importlib
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from msgs_config.extras import installation_of
+from actuated_characters.cli import main
+from msgs_config.errors import ConfigurationError
+from msgs_config.extras import PACKAGES, hint, require_extra
 
-PROJECT = Path(__file__).parents[2]
-PACKAGES = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
-NAMED = re.compile(r"installation_of\([\"'](\w+)|(?:actuated_characters|\.)\[([\w,]+)\]'")
-
-
-def offered() -> set[str]:
-    """The extras of setup.py."""
-    text = (PROJECT / "setup.py").read_text("utf-8")
-    block = text[text.index("extras_require={") : text.index("entry_points={")]
-    return set(re.findall(r'^        "(\w+)": \[', block, flags=re.MULTILINE))
-
-
-def named(file: Path) -> set[str]:
-    """The extras that a file names in commands of pip."""
-    groups = ["".join(each) for each in NAMED.findall(file.read_text("utf-8"))]
-    return {name for group in groups for name in group.split(",")}
-
-
-def test_what_is_to_be_installed_can_be() -> None:
-    files = [file for package in PACKAGES for file in (PROJECT / package).rglob("*.py")]
-    files += [PROJECT / "README.md", *(PROJECT / "docs").glob("*.md")]
-    found = {name for file in files if file.name != "extras.py" for name in named(file)}
-    assert {"plan", "view", "meshes"} <= found
-    assert found <= offered()
+ROOT = Path(__file__).parents[2]
+WALK = ("run", "--clip", "walk", "--duration", "0.1", "--output", "results")
+NEEDS = [  # package, extra, arguments
+    ("viser", "view", ("run", "--character", "pendulum", "--view", "--output", "results")),
+    ("websockets", "view", ("run", "--character", "pendulum", "--view", "--output", "results")),
+    ("viser", "view", ("play", "--output", "results")),
+    ("viser", "view", ("view",)),
+    ("viser", "view", ("view", "run")),
+    ("numba", "plan", (*WALK, "--planner", "predictive")),
+    ("numba", "plan", (*WALK, "--planner", "predictive", "--in-process")),
+    ("numba", "plan", ("reconstruct", "--clip", "walk", "--output", "walk.json")),
+    ("numba", "plan", ("study", "athletics", "--output", "results")),
+    ("numba", "plan", ("study", "all", "--output", "results")),
+    ("av", "video", ("render", "run", "--output", "film.mp4")),
+    ("av", "video", ("render", "run", "--video")),
+]
 
 
-@pytest.mark.parametrize("extra", ["plan", "meshes"])
-def test_the_command_is_that_of_the_docs(extra: str) -> None:
-    command = installation_of(extra)
-    assert f"pip install 'actuated_characters[{extra}]'" in command
-    assert f".venv/bin/pip install -e '.[{extra}]'" in command
+def test_every_extra_is_one_of_the_packaging() -> None:
+    declared = set(re.findall(r'^        "(\w+)": \[', (ROOT / "setup.py").read_text(), re.M))
+
+    assert set(PACKAGES) <= declared
+
+
+def test_the_hint_is_the_one_of_the_docs() -> None:
+    assert hint("view") == (
+        "pip install 'actuated_characters[view]', or in a clone .venv/bin/pip install -e '.[view]'"
+    )
+
+
+def test_what_is_installed_is_no_error() -> None:
+    require_extra("search", "the search")
+
+
+@pytest.mark.parametrize(
+    ("package", "extra", "arguments"), NEEDS, ids=lambda given: str(given).replace("/", "")
+)
+def test_a_command_without_its_extra_is_refused_in_one_line_before_anything_begins(
+    package: str,
+    extra: str,
+    arguments: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, package, None)  # as if it were not installed
+    if package == "numba":
+        for name in [each for each in sys.modules if each.startswith("controller_node.planner.")]:
+            monkeypatch.delitem(sys.modules, name)
+
+    assert main(arguments) == 1
+
+    output = capsys.readouterr()
+    (line,) = output.err.splitlines()
+    assert line.startswith("error: ")
+    assert hint(extra) in line
+    assert output.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_environments_without_gymnasium_say_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in [each for each in sys.modules if "actuated_characters.environments" in each]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+
+    with pytest.raises(ConfigurationError, match=r"actuated_characters\[gymnasium\]"):
+        importlib.import_module("actuated_characters.environments")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("package", "extra", "module"),
+    [
+        ("numba", "plan", "benchmarks"),
+        ("viser", "view", "benchmarks"),
+        ("numba", "plan", "benchmarks.planner.walks"),
+        ("cma", "search", "benchmarks.athletics.search"),
+    ],
+)
+def test_benchmarks_without_an_extra_end_in_one_line(package: str, extra: str, module: str) -> None:
+    code = (
+        f"import sys, runpy; sys.modules[{package!r}] = None; "
+        "sys.argv = ['x']; "
+        f"runpy.run_module({module!r}, run_name='__main__')"
+    )
+
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert hint(extra) in done.stderr.splitlines()[-1]

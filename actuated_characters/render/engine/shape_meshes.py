@@ -10,7 +10,7 @@ from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.character.model import Shape, ShapeType
 from msgs_config.errors import CharacterError
-from msgs_config.extras import installation_of
+from msgs_config.extras import require_extra
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 _SIDES = np.array(  # corners of each, counterclockwise from outside
@@ -66,12 +66,9 @@ def _read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
     vertices = read_vertices(path)  # which checks the file
     if path.suffix.lower() != ".obj":
         return vertices, np.arange(len(vertices)).reshape(-1, 3)
-    try:
-        import trimesh
-    except ImportError as error:
-        raise CharacterError(
-            f"mesh {path} is an .obj, which takes trimesh to draw: {installation_of('meshes')}"
-        ) from error
+    require_extra("meshes", f"mesh {path}, an .obj that is to be drawn,", CharacterError)
+    import trimesh
+
     try:
         mesh = trimesh.load_mesh(path, process=False, skip_materials=True)
         return np.array(mesh.vertices), np.array(mesh.faces)

@@ -1,7 +1,6 @@
 """Athletes by state machine: their states, speed and heading, and the pushes that they survive."""
 
 from collections.abc import Mapping
-from importlib.util import find_spec
 
 import numpy as np
 
@@ -33,10 +32,9 @@ _JUMP_LENGTH = 4.5
 _RUN_COMMANDS, _RUN_LENGTH = "1,0,0@0.5 2,0,0@3 2,0,0.3@8 0,0,0@11", 16.0
 _RUN_POSES = tuple(7.5 + 0.06 * number for number in range(12))  # s
 _SETTLED = 2.0  # s, from which on speeds are compared
-_PLANNER = "planner"
 _WALKS: Mapping[str, Mapping[str, object]] = {
     "walk": {"behaviour": "state_machine", "machine": "walk"},
-    _PLANNER: {"planner": "predictive"},
+    "planner": {"planner": "predictive"},
 }
 _PUSH_COMMANDS, _PUSH_TIME, _PUSH_END = "0.6,0,0@0.2", 3.0, 6.5
 _USUAL, _FINE = (4, 4), (12, 6)  # directions, runs for each
@@ -44,8 +42,7 @@ _USUAL, _FINE = (4, 4), (12, 6)  # directions, runs for each
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
     """Steer walks by a machine and by the planner, run, jump, and push the walking machine."""
-    plans = find_spec("numba") is not None
-    walks = {name: _steered(name) for name in _WALKS if plans or name != _PLANNER}
+    walks = {name: _steered(name) for name in _WALKS}
     runs = {name: runner.run(case).recording for name, case in walks.items()}
     wanted = commanded(walks["walk"])
     jump = runner.run(_case("jump", _JUMP_LENGTH, _machine("jump")))
@@ -60,8 +57,6 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     names = list(walks) if runner.fine else ["walk"]
     maps = {name: _pushed(runner, name, directions, halvings) for name in names}
     draw_pushes(result, maps)
-    if not plans:
-        result.remarks.append("without the planner beside it, which needs the extra 'plan'")
     result.remarks.append(
         "pushes: 0.2 s at the root, while it walks at 0.6 m/s; finer, and the planner's, by --fine"
     )

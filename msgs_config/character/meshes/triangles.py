@@ -18,7 +18,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.meshes.check import check_mesh, is_stl_of_text
 from msgs_config.errors import CharacterError
-from msgs_config.extras import installation_of
+from msgs_config.extras import require_extra
 from msgs_config.geometry import fixed_order
 
 _MAX_TRIANGLES = 2_000_000
@@ -150,13 +150,9 @@ def _read_collada(path: Path, raw: bytes) -> FloatArray:
 
 def _read_by_trimesh(path: Path, raw: bytes) -> FloatArray:
     """The triangles (m, 3, 3) of a .glb or .ply file, in its own axes and units."""
-    try:
-        import trimesh
-    except ImportError as error:
-        raise CharacterError(
-            f"mesh {path} is a {path.suffix}, which takes trimesh to read: "
-            f"{installation_of('meshes')}"
-        ) from error
+    require_extra("meshes", f"mesh {path}", CharacterError)
+    import trimesh
+
     scene = trimesh.load_scene(io.BytesIO(raw), file_type=path.suffix[1:].lower())
     if sum(len(each.faces) for each in scene.geometry.values()) > _MAX_TRIANGLES:
         raise ValueError(f"it has more than {_MAX_TRIANGLES} triangles")

@@ -117,7 +117,7 @@ def test_without_the_package_one_line_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
 
-    with pytest.raises(ConfigurationError, match="pip install 'av"):
+    with pytest.raises(ConfigurationError, match=r"pip install 'actuated_characters\[video\]'"):
         check_video(SIZE, 24)
 
 
