@@ -32,7 +32,7 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "or an --output that ends in .mp4, as a movie. Arrows are pushes since the last picture.",
         epilog="examples: actuated_characters render runs/demo --times 0,0.5,1 --ghost over; "
         "actuated_characters render runs/demo --video --speed 0.25 --from 1 --to 3; "
-        "actuated_characters render BAG --character robot.urdf --topic /joint_states",
+        "actuated_characters render runs/demo --topic description_joint_states",
     )
     render.set_defaults(command=_render)
     add = render.add_argument

@@ -29,7 +29,10 @@ def add_report(commands: "Commands[argparse.ArgumentParser]") -> None:
         "against the reference, contacts, and tick times, with pushes, resets and changed "
         "parameters marked: an HTML page that needs nothing beside itself, and its pictures as PNG "
         "files.",
-        ["report runs/demo", "report BAG --character robot.urdf --topic /joint_states"],
+        [
+            "report runs/demo",
+            "report runs/demo --topic description_joint_states --output robot-report",
+        ],
     )
     add_bag(report)
     add_robot(report, "report on this one alone of several")

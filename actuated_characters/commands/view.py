@@ -37,7 +37,7 @@ def add_view(commands: "Commands[argparse.ArgumentParser]") -> None:
             "view",
             "view runs/demo",
             "view runs/demo runs/demo-fork",
-            "view BAG --character robot.urdf --topic /joint_states",
+            "view runs/demo --topic description_joint_states",
         ],
     )
     view.add_argument(

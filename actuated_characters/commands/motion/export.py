@@ -42,7 +42,7 @@ def add_motion_export(commands: "Commands[argparse.ArgumentParser]") -> None:
         [
             "motion export runs/demo --output demo.glb",
             "motion export walk --output walk.bvh --units cm",
-            "motion export BAG --character robot.urdf --topic /joint_states --output robot.glb",
+            "motion export runs/demo --topic description_joint_states --output robot.glb",
         ],
     )
     export.add_argument(

@@ -14,7 +14,11 @@ import pytest
 from matplotlib.image import imread
 from rosbags.rosbag2 import StoragePlugin
 
+from actuated_characters.bags.robots.reading import RobotSource, read_any
 from actuated_characters.cli import main
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import still_model
+from msgs_config.character.model import Character
 from tests.support.robot_bags import (
     JOINTS,
     ROLLER,
@@ -25,6 +29,7 @@ from tests.support.robot_bags import (
     write_bag,
 )
 from tests.support.ros import Processes, wait_until
+from tests.support.runs import Run
 
 pytestmark = pytest.mark.sharing
 
@@ -200,3 +205,30 @@ def test_options_of_a_bag_are_refused_where_there_is_none(
     lines = capsys.readouterr().err.splitlines()
     assert "--topic and --base are of a bag; walk is none" in lines[0]
     assert "--topic is of a recorded RUN; name one" in lines[1]
+
+
+@pytest.mark.slow
+def test_a_run_s_own_bag_read_as_any_robot_s_has_its_links_in_the_same_places(
+    processes: Processes, tmp_path: Path
+) -> None:
+    Run(processes, "run", "--clip", "walk", "--duration", "0.3", "--output", "run").finish()
+    (run,) = read_any(tmp_path / "run", RobotSource())
+
+    (robot,) = read_any(tmp_path / "run", RobotSource(topic="description_joint_states"))
+
+    rows = np.searchsorted(run.stamps_ns, robot.stamps_ns)
+    assert len(rows) >= 8
+    np.testing.assert_array_equal(run.stamps_ns[rows], robot.stamps_ns)
+    for row, position in zip(rows.tolist(), robot.position, strict=True):
+        one, two = _places(run.character, run.position[row]), _places(robot.character, position)
+        both = one.keys() & two.keys()  # the description's base is another frame
+        assert len(both) >= 15
+        for link in both:
+            np.testing.assert_allclose(two[link], one[link], atol=1e-9)
+
+
+def _places(character: Character, position: FloatArray) -> dict[str, FloatArray]:
+    """Where the origins of the links are, by their names."""
+    origins, _ = still_model(character, position).link_poses()
+    names = [link.name for link in character.links]
+    return dict(zip(names, origins, strict=True))
