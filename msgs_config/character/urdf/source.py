@@ -9,6 +9,7 @@ from pathlib import Path
 from msgs_config import files
 from msgs_config.character.urdf.formats import check_suffix
 from msgs_config.errors import CharacterError
+from msgs_config.extras import hint
 
 XACRO = ".xacro"
 _EXPANDED_BY = "msgs_config.character.urdf.xacro_process"
@@ -30,10 +31,7 @@ def read_urdf_text(path: Path, arguments: Mapping[str, str] | None = None) -> fi
 def _expand(path: Path, arguments: Mapping[str, str]) -> str:
     files.read_xml(path, CharacterError)  # names what is no file, or too large
     if not _has_xacro():
-        raise CharacterError(
-            f"{path}: to expand a xacro needs the extra 'xacro': pip install "
-            "'actuated_characters[xacro]', or in a clone .venv/bin/pip install -e '.[xacro]'"
-        )
+        raise CharacterError(f"{path}: to expand a xacro needs the extra 'xacro': {hint('xacro')}")
     given = [f"{name}:={value}" for name, value in arguments.items()]
     command = [sys.executable, "-P", "-m", _EXPANDED_BY, str(path.absolute()), *given]
     try:
