@@ -7,17 +7,20 @@ over joints, c the centre of mass, d of the desired state at the new state's tim
 """
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
-from actuated_characters.metrics.error_measures import is_lost
+from actuated_characters.metrics.error_measures import FARTHEST
+from actuated_characters.metrics.falls import FallWatch, reader_for
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.model import Character
+from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.geometry import fixed_order, frames
 from msgs_config.messages.state import StampedState
 
+Terrain: TypeAlias = UrdfOptions | None
 _DOWN = (0.0, 0.0, -1.0)
 _BASE = 6  # entries of a floating base
 _OF_BASE = 10  # numbers in an observation: height, gravity, velocity, angular velocity
@@ -26,9 +29,14 @@ _OF_BASE = 10  # numbers in an observation: height, gravity, velocity, angular v
 class Assessment:
     """Observations (k,) and rewards of one character's states, by a model of its dynamics."""
 
-    def __init__(self, character: Character, model: DynamicsModel) -> None:
-        """The model is in another state after each call."""
+    def __init__(
+        self, character: Character, model: DynamicsModel, step_rate_hz: float, terrain: Terrain
+    ) -> None:
+        """For steps at a rate, on a terrain; the model is in another state after each call."""
         self._model = model
+        reader = reader_for(character, terrain)
+        self.fall = None if reader is None else FallWatch(reader, step_rate_hz)
+        """Watches the states that are judged for a fall; None for a fixed base."""
         self._floats = character.layout.has_floating_base
         self._joints = slice(_BASE if self._floats else 0, None)
         size = character.layout.size
@@ -67,11 +75,14 @@ class Assessment:
         speed = 0.1 * math.exp(-0.1 * float(fixed_order.dot(spin, spin)))
         away = wanted - centre
         place = 0.25 * math.exp(-10.0 * float(fixed_order.dot(away, away)))
-        return pose + speed + place, self._is_over(centre, wanted)
+        return pose + speed + place, self._is_over(state, desired, away)
 
-    def _is_over(self, centre: FloatArray, wanted: FloatArray) -> bool:
-        """Whether the centre of mass (3,), m, is where an episode ends; never on a fixed base."""
-        return self._floats and is_lost(centre, wanted)
+    def _is_over(self, state: StampedState, desired: ReferenceState, away: FloatArray) -> bool:
+        """Whether an episode ends: it fell, or its centre of mass is far, by `away` (3,) m."""
+        if self.fall is None:
+            return False
+        fell = self.fall.has_fallen(state.position, desired.configuration.position)
+        return fell or bool(fixed_order.norm(away) > FARTHEST)
 
     def _error(self, state: StampedState, desired: ReferenceState) -> FloatArray:
         """The error (n,) from a state to a desired one: `JointLayout.difference`."""

@@ -59,6 +59,7 @@ class TrackState:
     start: float  # s of the reference, where the episode began
     random: Mapping[str, Any]  # the generator's state
     observation: FloatArray  # the last one
+    ticks_down: int  # steps for which it has been down, see `falls`
 
 
 class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
@@ -76,8 +77,9 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
     velocity; the joints' positions and velocities; the error to the desired state at the next
     step, `reference - state` (n,), and that state's velocity (n,).
 
-    An episode terminates where the centre of mass is more than 0.6 m from the reference's, or lower
-    than half of it, or the simulation diverges; it is truncated after `duration`.
+    An episode terminates where the centre of mass is more than 0.6 m from the reference's, where it
+    fell (`metrics.falls`: it is down for 0.3 s), or where the simulation diverges; it is truncated
+    after `duration`.
     """
 
     metadata = {"render_modes": RENDER_MODES, "render_fps": 30}  # noqa: RUF012 - as its base has it
@@ -127,12 +129,15 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         check_inertia(model, self._character)
         self._actuation = self._make_actuation(action, values, model, clock)
         self.action_space = self._actuation.space
-        self._assessment = Assessment(self._character, model)
-        self.observation_space = gymnasium.spaces.Box(
-            -np.inf, np.inf, (self._assessment.size,), dtype=np.float64
-        )
         self._simulation = Simulation(
             self._character, motion.first_state(), simulator, watch_contacts=False
+        )
+        terrain = self._simulation.settings.world.terrain
+        self._assessment = Assessment(
+            self._character, model, clock.rate_hz / ticks_per_step, terrain
+        )
+        self.observation_space = gymnasium.spaces.Box(
+            -np.inf, np.inf, (self._assessment.size,), dtype=np.float64
         )
         self._duration, self._ticks = float(duration), int(ticks_per_step)
         self._random = random_start
@@ -169,7 +174,12 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
                 StampedState(0, first.configuration.position, first.velocity, None)
             )
         self._is_fresh = False
+        self._put_down(0)
         return self._see(), self._info()
+
+    def _put_down(self, ticks_down: int) -> None:
+        if self._assessment.fall is not None:
+            self._assessment.fall.ticks_down = ticks_down
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Hold an action (a,) for `ticks_per_step` ticks; see the class for what comes back.
@@ -202,6 +212,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
             self._motion.start,
             self.np_random.bit_generator.state,
             self._seen,
+            0 if self._assessment.fall is None else self._assessment.fall.ticks_down,
         )
 
     def set_state(self, state: TrackState) -> tuple[FloatArray, dict[str, Any]]:
@@ -221,6 +232,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._motion.begin(state.start)
         self.np_random.bit_generator.state = state.random
         self._seen, self._is_fresh = state.observation, False
+        self._put_down(state.ticks_down)
         return self._seen.copy(), self._info()
 
     def render(self) -> Picture | None:

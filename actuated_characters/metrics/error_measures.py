@@ -14,11 +14,13 @@ from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
 
+FARTHEST = 0.6
+"""How far the centre of mass may be from the reference's until the motion is lost, m."""
+
 AT_LIMIT = 1.0 - 1e-9
 """Share of its limit from which on an effort is at the limit: it was clipped in its direction."""
 
 _EXACT = 1e-12  # m or rad: more than what conversions of rotations round
-_FARTHEST = 0.6  # m, of the centre of mass from the reference's
 _LOWEST = 0.5  # of the height of the reference's centre of mass
 _BLOCK = 8192  # rows that are worked on together, so that long recordings need no more memory
 
@@ -125,5 +127,5 @@ def is_lost(centre: FloatArray, desired: FloatArray) -> bool:
 
     It is beyond 0.6 m, or below half of the desired height.
     """
-    is_far = fixed_order.norm(centre - desired) > _FARTHEST
+    is_far = fixed_order.norm(centre - desired) > FARTHEST
     return bool(is_far or centre[2] < _LOWEST * desired[2])

@@ -14,6 +14,7 @@ from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
+from msgs_config.geometry.single_rotations import Vector, exp, rotate
 from sim_node.physics.ground import Ground
 
 FALLEN_HEIGHT = 0.5
@@ -50,7 +51,9 @@ class PostureReader:
         self._ground = None if terrain is None else Ground(terrain)
         rest = np.array(character.rest_position)
         upright = rotations.exp(rest[3:6])
-        self._up_in_base = rotations.rotate(rotations.conjugate(upright), _UP)
+        self._up_in_base: Vector = tuple(
+            rotations.rotate(rotations.conjugate(upright), _UP).tolist()
+        )
         self.standing_height = self._standing_height(character, rest)
         """Of the centre of mass above the lowest point of the character at rest, m."""
 
@@ -64,16 +67,16 @@ class PostureReader:
 
     def read(self, positions: FloatArray) -> Posture:
         """The postures at positions (r, n), message form; NaN where a position is."""
-        centres = np.full((len(positions), 3), np.nan)
+        heights = np.full(len(positions), np.nan)
         up = np.full((len(positions), 3), np.nan)
-        known = ~np.isnan(positions).any(axis=1)
-        if known.any():
-            rows = positions[known]
-            centres[known] = [self._model.centre_of_mass_at(row) for row in rows]
-            up[known] = rotations.rotate(rotations.exp(rows[:, 3:6]), self._up_in_base)
-        heights = centres[:, 2]
-        if self._ground is not None and known.any():
-            heights[known] -= self._ground.heights_below(centres[known])
+        for row, position in enumerate(positions):
+            turn: Vector = tuple(position[3:6].tolist())
+            if turn[0] == turn[0]:
+                centre = self._model.centre_of_mass_at(position)
+                ground = self._ground
+                below = 0.0 if ground is None else ground.heights_below(centre[np.newaxis])[0]
+                heights[row] = centre[2] - below
+                up[row] = rotate(exp(turn), self._up_in_base)
         return Posture(heights, up)
 
 
@@ -128,13 +131,15 @@ class FallWatch:
     def __init__(self, reader: PostureReader, rate_hz: float) -> None:
         self._reader = reader
         self._least = math.ceil(FALLEN_TIME * rate_hz)
-        self._count = 0  # ticks that it has been down for
+        self.ticks_down = 0
+        """For how many ticks it has been down, until now."""
 
     def has_fallen(self, position: FloatArray, desired: FloatArray | None = None) -> bool:
         """Look at the next tick's position (n,), and a desired one that does not follow it."""
         reader = self._reader
         wanted = np.full_like(position, np.nan) if desired is None else desired
-        body, reference = reader.read(position[np.newaxis]), reader.read(wanted[np.newaxis])
+        height, up = reader.read(np.stack((position, wanted)))
+        body, reference = Posture(height[:1], up[:1]), Posture(height[1:], up[1:])
         down = bool(is_down(body, reference, reader.standing_height)[0])
-        self._count = self._count + 1 if down else 0
-        return self._count >= self._least
+        self.ticks_down = self.ticks_down + 1 if down else 0
+        return self.ticks_down >= self._least

@@ -2,11 +2,9 @@
 
 import math
 import os
-import timeit
 import warnings
 from functools import lru_cache
 from pathlib import Path
-from time import process_time
 from typing import Any
 
 import gymnasium
@@ -234,22 +232,6 @@ def test_a_reward_is_the_sum_that_the_page_names() -> None:
     without_place = 0.65 * np.exp(-2.0 * pose) + 0.1 * np.exp(-0.1 * speed)
     assert without_place < reward < without_place + 0.25
     assert reward < 0.99
-    environment.close()
-
-
-def test_observation_and_reward_take_at_most_a_tenth_of_a_millisecond() -> None:
-    environment = make(clip="walk")
-    environment.reset(seed=0)
-    state, motion = environment.simulation.state, environment._motion
-    assessment = environment._assessment
-
-    def assess() -> None:
-        assessment.reward(state, motion.at(8))
-        assessment.observation(state, motion.at(16))
-
-    assess()
-    taken = min(timeit.repeat(assess, number=100, repeat=10, timer=process_time)) / 100
-    assert taken < 100e-6
     environment.close()
 
 
