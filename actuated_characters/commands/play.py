@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # it takes a while to import
 
 _SCENE = "walker"
 _DURATION = 600.0  # s
-_LAST_MEGABYTES = 150.0  # of a scene that nobody has asked to keep
+_LAST_MEGABYTES = 150.0  # of a scene without --output
 
 
 def add_play(commands: "Commands[argparse.ArgumentParser]") -> None:
@@ -99,7 +99,7 @@ def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
     viewer = None if options.no_view else server_parameters(options)
     check_interruption()  # all modules are imported by now
     last_megabytes = 0.0 if options.output else _LAST_MEGABYTES
-    for line in (*_described(scene), _kept(last_megabytes)):
+    for line in (*_described(scene), _recorded_part(last_megabytes)):
         print(line, flush=True)
     with progress_bar(f"{scene.name} (Ctrl-C ends it)", ticks, "ticks") as bar:
         done = play_scene(
@@ -116,7 +116,7 @@ def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
         print("ended before its first tick")
 
 
-def _kept(last_megabytes: float) -> str:
+def _recorded_part(last_megabytes: float) -> str:
     """What the recording will be of, of 1.4 MB/s for each character of a few dozen joints."""
     if not last_megabytes:
         return "all is recorded"

@@ -1,4 +1,4 @@
-"""Which control messages of a page the viewer takes: those of its own controls.
+"""Which control messages of a page the viewer takes: those of the controls that it has.
 
 viser decodes whatever a page sends, sets the property that it names, and ends the connection, or
 the caller, with the first value of another type than it expects. So each message is checked before

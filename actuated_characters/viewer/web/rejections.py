@@ -11,16 +11,16 @@ class Rejections:
     """Sentences, each told once."""
 
     def __init__(self) -> None:
-        self._waiting: deque[str] = deque(maxlen=_MOST_WAITING)
+        self._untold: deque[str] = deque(maxlen=_MOST_WAITING)
         self._told: set[str] = set()
-        self.note = self._waiting.append
+        self.note = self._untold.append
         """Notes a sentence; for any thread."""
 
     def take(self) -> list[str]:
         """The sentences since the last call that were not told before."""
         new = []
-        while self._waiting and len(self._told) <= _MOST_TOLD:
-            sentence = self._waiting.popleft()[:_LONGEST]
+        while self._untold and len(self._told) <= _MOST_TOLD:
+            sentence = self._untold.popleft()[:_LONGEST]
             if len(self._told) == _MOST_TOLD:
                 sentence = f"more than {_MOST_TOLD} different rejections; further ones are not told"
             if sentence not in self._told:

@@ -65,12 +65,12 @@ def test_of_a_long_one_the_last_states_are_kept_to_the_bit(made: Made, tmp_path:
     write(tmp_path / "bag", messages, PART).close()
 
     files = sorted(path.name for path in (tmp_path / "bag").iterdir())
-    kept = list(read_messages(tmp_path / "bag"))
+    messages = list(read_messages(tmp_path / "bag"))
     recording = read_recording(tmp_path / "bag")
 
     assert total > 4 * PART
     assert files == ["bag-earlier.mcap", "bag.mcap", "metadata.yaml"]
-    assert PART < sum(len(each.raw) for each in kept) < 2.2 * PART
+    assert PART < sum(len(each.raw) for each in messages) < 2.2 * PART
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
     states = made.states[-len(recording.stamps_ns) :]
     assert 200 < len(states) < len(made.states)
@@ -98,15 +98,15 @@ def test_its_metadata_is_that_of_all_its_files(made: Made, tmp_path: Path) -> No
     write(tmp_path / "bag", in_time(made), PART).close()
     text = (tmp_path / "bag" / "metadata.yaml").read_text()
     found = yaml.safe_load(text)["rosbag2_bagfile_information"]
-    kept = list(read_messages(tmp_path / "bag"))
+    messages = list(read_messages(tmp_path / "bag"))
 
     with AnyReader([tmp_path / "bag"]) as reader:
         times = [time for _, time, _ in reader.messages()]
-        assert len(times) == reader.message_count == found["message_count"] == len(kept)
+        assert len(times) == reader.message_count == found["message_count"] == len(messages)
         assert (reader.start_time, reader.end_time) == (times[0], times[-1] + 1)
     assert found["relative_file_paths"] == ["bag-earlier.mcap", "bag.mcap"]
     counts = [each["message_count"] for each in found["topics_with_message_count"]]
-    assert sum(counts) == sum(each["message_count"] for each in found["files"]) == len(kept)
+    assert sum(counts) == sum(each["message_count"] for each in found["files"]) == len(messages)
     assert found["starting_time"]["nanoseconds_since_epoch"] == times[0]
     assert found["duration"]["nanoseconds"] == times[-1] - times[0]
 

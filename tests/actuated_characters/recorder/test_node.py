@@ -140,8 +140,8 @@ def test_a_recorder_of_bounded_size_measures_all_and_keeps_the_last_states(
     assert recording.begins_amid
     assert len(recording.effort) < LONG
     assert tick_of_stamp(int(recording.stamps_ns[-1])) == LONG + 1
-    kept = sum(len(message.raw) for message in read_messages(run / "bag"))
-    assert 1.0e6 < kept < 2.2e6
+    size = sum(len(message.raw) for message in read_messages(run / "bag"))
+    assert 1.0e6 < size < 2.2e6
     assert not (run / "bag-earlier").exists()
     replaying = processes.command("replay", str(run))
     assert replaying.wait() == 1

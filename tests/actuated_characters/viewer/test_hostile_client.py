@@ -84,7 +84,7 @@ def resident_bytes(pid: int) -> int:
     return 4096 * int(Path(f"/proc/{pid}/statm").read_text().split()[1])
 
 
-def attack(url: str, pid: int, said: Callable[[], str]) -> None:
+def attack(url: str, pid: int, log: Callable[[], str]) -> None:
     """Send the messages, and then some that are too large; asserts that nothing grows or ends."""
     with open_page(url) as page:
         page.send(msgspec.msgpack.encode(CAMERA))
@@ -106,8 +106,8 @@ def attack(url: str, pid: int, said: Callable[[], str]) -> None:
         _send(page, [])
     growth = resident_bytes(pid) - before
     assert growth < MOST_GROWTH, f"{growth / 1e6:.1f} MB"
-    wait_until(lambda: "rejected a message" in said(), "a line", SOON)
-    assert "Traceback" not in said()
+    wait_until(lambda: "rejected a message" in log(), "a line", SOON)
+    assert "Traceback" not in log()
 
 
 def _send(page: ClientConnection, messages: list[bytes]) -> None:
