@@ -19,6 +19,7 @@ _MOST_TEXT = 1000  # characters of a text field
 _MOST_PIXELS = 1 << 14  # of a window's width or height
 _MOST_AREA = 1 << 25  # pixels of a picture: a small file may have very many
 _FARTHEST = 1e6  # m, or pixels: what is farther comes from no mouse
+_ROUNDING = 1e-9  # by which a page's slider may miss its own end
 _UNIT_TOLERANCE = 1e-3  # of the length of a direction
 _LONGEST = 60  # characters of a value that a line shows
 _PNG_HEAD = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
@@ -132,7 +133,7 @@ def _value_fault(handle: Any, value: Any) -> _Fault:
         least = -math.inf if handle.min is None else handle.min
         most = math.inf if handle.max is None else handle.max
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        is_within = is_number and least <= value <= most
+        is_within = is_number and least - _ROUNDING <= value <= most + _ROUNDING
         return None if is_within else f"it must be a number from {least:g} to {most:g}"
     return "it takes none"
 
