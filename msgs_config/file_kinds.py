@@ -77,7 +77,7 @@ def refuse_other_kind(
 ) -> None:
     """Refuse a file of a known kind that is not the one that is wanted.
 
-    A file that does not exist, or whose kind is not known, is left to whoever reads it. A Git LFS
+    A file that does not exist, or whose kind is not known, is left to its reader. A Git LFS
     pointer is refused whatever its name is.
 
     Args:

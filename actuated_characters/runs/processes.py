@@ -28,7 +28,7 @@ MODULES = {
 """The modules that are run by `python -m`, by the names of the nodes, or of several in one."""
 
 _END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
-_LAST_LINES = 3  # of a process that failed without an error of its own
+_LAST_LINES = 3  # are told of a process that failed without saying why
 _PROGRESS = re.compile(r"(tick|flushed|state) [0-9]+$")  # lines for the parent, not for a reader
 _WARNED = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[0-9.]+\] \[[^]]*\]: (.+)")  # of rcutils
 _PR_SET_PDEATHSIG = 1  # prctl(2)

@@ -224,10 +224,10 @@ def test_the_base_is_that_of_an_odometry_between_its_messages(
 
     place, turn = root(read(sent))
 
-    held = np.array([0.0, 0.25, 0.5, 1.0, 2.0])  # after the last odometry it stays
+    reached = np.array([0.0, 0.25, 0.5, 1.0, 2.0])  # after the last odometry it stays
     # base_link is 0.25 m above the root of the URDF, base_footprint
-    np.testing.assert_allclose(place, np.outer(held, [2.0, -1.0, 0.0]), atol=1e-9)
-    np.testing.assert_allclose(turn, np.outer(held, [0.0, 0.0, 0.8]), atol=1e-9)
+    np.testing.assert_allclose(place, np.outer(reached, [2.0, -1.0, 0.0]), atol=1e-9)
+    np.testing.assert_allclose(turn, np.outer(reached, [0.0, 0.0, 0.8]), atol=1e-9)
 
 
 def test_the_base_is_that_of_a_chain_of_transforms(read: Callable[..., RobotRecording]) -> None:
