@@ -143,8 +143,9 @@ def test_threads_lose_no_output_while_others_load() -> None:
 
 
 WORLDS_IN_THREADS = """
-import sys, threading
+import threading, time
 import actuated_characters as ac
+from msgs_config.character.bullet import pybullet
 
 def walk(threshold, hashes):
     character = ac.load_character("humanoid")
@@ -157,7 +158,13 @@ def walk(threshold, hashes):
 thresholds, alone, together = (0.02, 0.001), {}, {}
 for threshold in thresholds:
     walk(threshold, alone)
-sys.setswitchinterval(1e-6)
+set_parameter = pybullet.setPhysicsEngineParameter
+
+def set_and_let_others_go_on(**parameters):
+    set_parameter(**parameters)
+    time.sleep(1e-3)
+
+pybullet.setPhysicsEngineParameter = set_and_let_others_go_on
 threads = [threading.Thread(target=walk, args=(each, together)) for each in thresholds]
 for thread in threads:
     thread.start()
@@ -173,8 +180,10 @@ def test_worlds_of_other_settings_in_threads_are_as_alone() -> None:
 
 
 FORK = """
-import os, threading
+import os, threading, warnings
 import actuated_characters as ac
+
+warnings.simplefilter("ignore", DeprecationWarning)  # of a fork while there are threads
 
 def ten_steps(simulation):
     for _ in range(10):
