@@ -10,7 +10,9 @@ DEFAULT_CHARACTER = "humanoid"
 PLANE, NO_GROUND = "plane", "none"  # of a simulator's `terrain`; else it is a URDF's path
 
 CHARACTER = Parameter(
-    "character", DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml or .urdf file"
+    "character",
+    DEFAULT_CHARACTER,
+    "name of a shipped character, or path of a .yaml, .urdf or .xacro file",
 )
 FROM_FILE, NO_COLLISIONS = "file", "none"
 COLLISION = Parameter(

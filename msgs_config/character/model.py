@@ -18,7 +18,7 @@ from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.sensors import Sensor
 from msgs_config.character.urdf.reading import ReadUrdf, read_robot
 from msgs_config.character.urdf.vocabulary import LeftOut
-from msgs_config.geometry import rotations
+from msgs_config.geometry import fixed_order, rotations
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 
 ROOT_TORQUE = ROOT + "_r"
@@ -125,6 +125,11 @@ class Link:
     inertial_pose: Pose  # in the link frame
     shapes: tuple[Shape, ...] = ()  # that are seen
     collision_shapes: tuple[Shape, ...] = ()
+
+    def inertia_in_link_axes(self) -> FloatArray:
+        """Its inertia (3, 3) about its centre of mass along its own axes, kg m^2."""
+        axes = rotations.matrix(np.array(self.inertial_pose.orientation_xyzw))
+        return fixed_order.product(axes * np.array(self.inertia_diagonal), axes.T)
 
 
 @dataclass(frozen=True)

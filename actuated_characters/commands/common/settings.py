@@ -84,7 +84,7 @@ def add_character(command: argparse.ArgumentParser) -> None:
         "--character",
         default=CHARACTER,
         metavar="NAME",
-        help="name, or path of a .yaml or .urdf file (%(default)s)",
+        help="name, or path of a .yaml, .urdf or .xacro file (%(default)s)",
     )
 
 

@@ -10,11 +10,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Link, UrdfOptions
 from msgs_config.character.urdf.inertia import read_inertial
 from msgs_config.errors import CharacterError
-from msgs_config.geometry import fixed_order, rotations
 
 _LARGEST = 1e-9  # of the largest entry
 
@@ -38,7 +36,8 @@ def check_links(links: Sequence[Link], repaired: ElementTree.Element, loading: U
             ("a centre of mass in m", link.inertial_pose.position, centre),
         ]
         if loading.inertia_from_file:
-            pairs.append(("an inertia in kg m^2", _tensor(link), given.in_link_axes()))
+            own = link.inertia_in_link_axes()
+            pairs.append(("an inertia in kg m^2", own, given.in_link_axes()))
         for what, read, expected in pairs:
             _compare(f"{loading.urdf_path}: link '{link.name}'", what, read, expected)
     total = _mass(loading.robot)
@@ -52,12 +51,6 @@ def check_links(links: Sequence[Link], repaired: ElementTree.Element, loading: U
 
 def _mass(robot: ElementTree.Element) -> float:
     return math.fsum(read_inertial(link).mass for link in robot.findall("link"))
-
-
-def _tensor(link: Link) -> FloatArray:
-    """A link's inertia (3, 3) about its centre of mass along its own axes, kg m^2."""
-    axes = rotations.matrix(np.array(link.inertial_pose.orientation_xyzw))
-    return fixed_order.product(axes * np.array(link.inertia_diagonal), axes.T)
 
 
 def _compare(where: str, what: str, read: ArrayLike, given: ArrayLike) -> None:

@@ -11,6 +11,7 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import Character, Link, Pose, Quadruple, Shape, ShapeType
 from msgs_config.character.urdf.described_joints import DescribedJoint, DescribedJoints
+from msgs_config.character.urdf.inertia import read_inertial, write_moments
 from msgs_config.character.urdf.joints import fix_locked_joints
 from msgs_config.character.urdf.origin import write_numbers, write_origin
 from msgs_config.frame_names import BASE_FRAME
@@ -24,9 +25,10 @@ _UNLIMITED = 1e9  # m, N, N m or their rates: URDF's limits must be numbers
 def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str:
     """The text of a URDF of a character, its meshes as `file://` URIs.
 
-    It is the character's own where that is a legal one. Ball joints, capsules and a scale are the
-    engine's own and no part of URDF; a character that has any is described by hinges, cylinders
-    and spheres. The root is `base_frame`, see `DescribedJoints`.
+    It is the character's own where that is a legal one, of which it has what counts, and that as it
+    is simulated: axes, fixed joints, effort limits, mass and inertia. Ball joints, capsules and a
+    scale are the engine's own and no part of URDF; a character that has any is described by hinges,
+    cylinders and spheres. The root is `base_frame`, see `DescribedJoints`.
     """
     joints = DescribedJoints(character, base_frame)
     if character.loading.scale == 1.0 and _is_legal(character.loading.robot):
@@ -34,10 +36,8 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
         fix_locked_joints(robot)
         for mesh in robot.iterfind("link//mesh"):
             mesh.set("filename", Path(mesh.get("filename", "")).as_uri())
-        fixed = {joint.name for joint in joints.fixed}  # also what moves no mass
-        for joint in robot.findall("joint"):
-            if joint.get("name") in fixed:
-                joint.set("type", "fixed")
+        _write_joints(robot, joints)
+        _write_inertia(robot, character)
         if joints.has_own_base:
             robot.insert(0, ElementTree.Element("link", name=joints.root))
             robot.insert(1, _joint(joints.joints[0]))
@@ -48,6 +48,36 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
     else:
         robot = _describe(character, joints)
     return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _write_joints(robot: ElementTree.Element, joints: DescribedJoints) -> None:
+    """Give joints the type and the effort limit that they have here."""
+    elements = {joint.get("name"): joint for joint in robot.findall("joint")}
+    for joint in joints.fixed:  # also what moves no mass
+        if joint.name in elements:
+            elements[joint.name].set("type", "fixed")
+    for joint in joints.moving:
+        limit = elements[joint.name].find("limit")
+        effort = min(joint.effort_limit, _UNLIMITED)
+        if limit is not None and float(limit.get("effort", "0")) != effort:
+            limit.set("effort", repr(effort))
+
+
+def _write_inertia(robot: ElementTree.Element, character: Character) -> None:
+    """Give links the mass and inertia that they have here, where that is not what the file says.
+
+    A link that took the mass of one which is fixed to it stays as it is: so does the other.
+    """
+    elements = {link.get("name", ""): link for link in robot.findall("link")}
+    merged = {each.parent for each in character.frames if read_inertial(elements[each.name]).mass}
+    for link in character.links:
+        element = elements[link.name]
+        given, own = read_inertial(element), link.inertia_in_link_axes()
+        same = np.allclose(given.in_link_axes(), own, rtol=0.0, atol=1e-9 * np.abs(own).max())
+        if link.mass > 0.0 and link.name not in merged and not (same and given.mass == link.mass):
+            for inertial in element.findall("inertial"):
+                element.remove(inertial)
+            element.append(_inertial(link))
 
 
 def _is_legal(robot: ElementTree.Element) -> bool:
@@ -81,19 +111,23 @@ def _describe(character: Character, joints: DescribedJoints) -> ElementTree.Elem
 def _parts(link: Link, materials: dict[Quadruple, str]) -> Iterator[ElementTree.Element]:
     """Mass and shapes of a link."""
     if link.mass > 0.0:
-        inertial = ElementTree.Element("inertial")
-        _place(inertial, link.inertial_pose)
-        ElementTree.SubElement(inertial, "mass", value=repr(float(link.mass)))
-        moments = zip(("ixx", "iyy", "izz"), link.inertia_diagonal, strict=True)
-        tensor = {name: repr(float(moment)) for name, moment in moments}
-        ElementTree.SubElement(inertial, "inertia", tensor | {"ixy": "0", "ixz": "0", "iyz": "0"})
-        yield inertial
+        yield _inertial(link)
     for shape in _without_capsules(link.shapes):
         visual = _shape("visual", shape)
         ElementTree.SubElement(visual, "material", name=materials[shape.color_rgba])
         yield visual
     for shape in _without_capsules(link.collision_shapes):
         yield _shape("collision", shape)
+
+
+def _inertial(link: Link) -> ElementTree.Element:
+    """Mass and inertia of a link, about its principal axes."""
+    inertial = ElementTree.Element("inertial")
+    _place(inertial, link.inertial_pose)
+    ElementTree.SubElement(inertial, "mass", value=repr(float(link.mass)))
+    x, y, z = link.inertia_diagonal
+    write_moments(ElementTree.SubElement(inertial, "inertia"), (float(x), float(y), float(z)))
+    return inertial
 
 
 def _without_capsules(shapes: Sequence[Shape]) -> Iterator[Shape]:

@@ -349,3 +349,39 @@ def test_yaw_pitch_and_roll_are_the_rotation_also_where_the_pitch_is_a_quarter_t
 
     np.testing.assert_allclose(matrix(*found.tolist()), matrix(*angles), atol=1e-12)
     assert abs(found[1]) <= 0.5 * math.pi + 1e-12
+
+
+def test_the_description_has_what_is_simulated_not_what_the_file_says(tmp_path: Path) -> None:
+    """Effort limits of the character's file, masses and inertia that the URDF lacks, its axes."""
+    ball = '<inertial><mass value="2"/></inertial>'
+    parts = urdf.link("world", ""), urdf.link("arm", ball), urdf.link("hand", ball)
+    hinge = urdf.joint("hinge", "world", "arm", inside='<axis xyz="0 3 0"/><axis xyz="1 0 0"/>')
+    weld = urdf.joint("weld", "arm", "hand", limit='<limit lower="1" upper="1" effort="1"/>')
+    yaml = "inertia: filled\njoints: {hinge: {effort_limit: 7}}\n"
+    character = load_character(
+        str(urdf.write_character(tmp_path, urdf.robot(*parts, hinge, weld, "<gazebo/>"), yaml))
+    )
+
+    text = robot_description(character)
+
+    robot = parse(text)
+    assert robot.joint_map["weld"].type == "fixed"
+    assert robot.joint_map["hinge"].axis == [0.0, 1.0, 0.0]
+    assert robot.joint_map["hinge"].limit.effort == 7.0
+    assert (text.count("<axis"), text.count("<gazebo")) == (1, 0)
+    for link in character.links[1:]:
+        inertia = robot.link_map[link.name].inertial
+        assert (inertia.mass, inertia.inertia.ixx) == (2.0, link.inertia_diagonal[0])
+
+
+def test_a_mass_is_described_once_where_the_base_took_it(tmp_path: Path) -> None:
+    parts = urdf.link("base", ""), urdf.link("trunk"), urdf.link("arm")
+    fixed = urdf.joint("mount", "base", "trunk", "fixed", limit="")
+    path = urdf.write_character(
+        tmp_path, urdf.robot(*parts, fixed, urdf.joint("hinge", "trunk", "arm"))
+    )
+
+    robot = parse(robot_description(load_character(str(path))))
+
+    masses = {link.name: link.inertial.mass for link in robot.links if link.inertial}
+    assert masses == {"trunk": 1.0, "arm": 1.0}
