@@ -10,7 +10,7 @@ from msgs_config.character.urdf.formats import check_root
 from msgs_config.character.urdf.frames import MAX_JOINTS, find_frames, joint_end
 from msgs_config.character.urdf.inertia import LEAST_MOMENT, ROUNDING
 from msgs_config.character.urdf.joints import WITH_BOUNDS, read_bounds
-from msgs_config.character.urdf.reading import WITH_AXIS, read_axis
+from msgs_config.character.urdf.reading import FLOATING, WITH_AXIS, read_axis
 from msgs_config.character.urdf.vocabulary import leave_out_unknown
 from msgs_config.errors import CharacterError
 
@@ -18,7 +18,7 @@ MAX_LINKS = 2000
 MAX_POSITION_ENTRIES = 128  # beyond them PyBullet reads states as empty, without an error
 MAX_NAME_BYTES = 255
 
-_TYPES = (*WITH_AXIS, "spherical", "fixed")
+_TYPES = (*WITH_AXIS, "spherical", "fixed", FLOATING)
 _LARGEST = 1e30  # the engine's single precision ends at 3e38
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _ANY, _POSITIVE = -_LARGEST, 0.0
@@ -85,6 +85,7 @@ def check_urdf(path: Path, text: str, limits: bool = True) -> ElementTree.Elemen
         raise CharacterError(f"{path}: a joint names the link {name!r}, which does not exist")
     _check_size(path, robot, joints)
     _check_tree(path, names, ends)
+    _check_floating(path, robot)
     for element in [*links, *joints, *robot.findall("material")]:
         _check_numbers(path, element)
     for joint in joints:
@@ -108,10 +109,25 @@ def _check_joint(path: Path, joint: ElementTree.Element) -> None:
     if kind not in _TYPES:
         raise CharacterError(
             f"{path}: joint {name!r} is of type {kind!r}; "
-            "it must be revolute, continuous, prismatic, spherical or fixed"
+            "it must be revolute, continuous, prismatic, spherical, fixed or, of the base, floating"
         )
     if kind in ("revolute", "prismatic") and joint.find("limit") is None:
         raise CharacterError(f"{path}: joint {name!r} is {kind} and has no <limit>")
+
+
+def _check_floating(path: Path, robot: ElementTree.Element) -> None:
+    """Check that a joint that floats is that of the base: the only one of a base without mass."""
+    links = {link.get("name"): link for link in robot.findall("link")}
+    children = {joint_end(joint, "child") for joint in robot.findall("joint")}
+    for joint in robot.findall("joint"):
+        parent = joint_end(joint, "parent")
+        sides = [each for each in robot.findall("joint") if joint_end(each, "parent") == parent]
+        is_base = parent not in children and links[parent].find("inertial") is None
+        if joint.get("type") == FLOATING and not (is_base and len(sides) == 1):
+            raise CharacterError(
+                f"{path}: joint {joint.get('name')!r} is of type floating; that is for the only "
+                "joint of a base link without <inertial>"
+            )
 
 
 def _check_size(path: Path, robot: ElementTree.Element, joints: list[ElementTree.Element]) -> None:
@@ -120,7 +136,11 @@ def _check_size(path: Path, robot: ElementTree.Element, joints: list[ElementTree
         raise CharacterError(f"{path}: {len(joints)} joints; there can be {MAX_LINKS}")
     frames = find_frames(robot)
     joints = [joint for joint in joints if joint not in frames]
-    widths = {"spherical": 4, "fixed": 0}  # of a position in the engine, a quaternion for a ball
+    widths = {
+        "spherical": 4,
+        "fixed": 0,
+        FLOATING: 0,
+    }  # of a position in the engine, a quaternion for a ball
     entries = 7 + sum(widths.get(joint.get("type", ""), 1) for joint in joints)
     if len(joints) > MAX_JOINTS or entries > MAX_POSITION_ENTRIES:
         raise CharacterError(

@@ -1,10 +1,12 @@
 """Links without mass that are fixed to others: frames, merged into what they are fixed to."""
 
+from collections.abc import Iterable
 from xml.etree import ElementTree
 
 from msgs_config.character.model import Frame
 from msgs_config.character.urdf.inertia import read_inertial
 from msgs_config.character.urdf.origin import move_origin, read_origin
+from msgs_config.character.urdf.reading import FLOATING
 
 MAX_JOINTS = 127
 """That the engine can hold, without those of mere frames, which are merged before it reads them."""
@@ -21,10 +23,12 @@ def joint_end(joint: ElementTree.Element, which: str) -> str:
 def has_massless_base(robot: ElementTree.Element) -> bool:
     """Whether the base is fixed for ROS: called `world` and without inertial, or without any mass.
 
-    Its mass is also that of the links which are fixed to it.
+    Its mass is also that of the links which are fixed to it. One on a joint that floats is not.
     """
     tree = LinkTree(robot)
     base = tree.base()
+    if any(joint.get("type") == FLOATING for joint in robot.findall("joint")):
+        return False
     if base.get("name") == "world" and base.find("inertial") is None:
         return True
     group = [base]
@@ -58,25 +62,30 @@ class LinkTree:
         self._joints = robot.findall("joint")
 
     def fix_empty_joints(self) -> list[str]:
-        """Fix the joints that move no mass and no inertia; returns their names.
+        """Fix the joints that move no mass and no inertia, sliders without mass; their names.
 
         Where nothing in the robot has any, they stay, and the robot cannot be moved.
         """
-        moving = {name for name, link in self._links.items() if not read_inertial(link).is_nothing}
-        if not moving:
-            return []
-        above = {joint_end(joint, "child"): joint for joint in self._joints}
-        needed = set[str]()
-        for name in moving:
-            while name in above and name not in needed:
-                needed.add(name)
-                name = joint_end(above[name], "parent")
+        inertials = {name: read_inertial(link) for name, link in self._links.items()}
+        moved = self._with_all_above(name for name, own in inertials.items() if not own.is_nothing)
+        heavy = self._with_all_above(name for name, own in inertials.items() if own.mass)
         fixed = []
-        for joint in self._joints:
+        for joint in self._joints if moved else ():
+            needed = heavy if joint.get("type") == "prismatic" else moved
             if joint.get("type") != "fixed" and joint_end(joint, "child") not in needed:
                 joint.set("type", "fixed")
                 fixed.append(joint.get("name", ""))
         return fixed
+
+    def _with_all_above(self, names: Iterable[str]) -> set[str]:
+        """The names of links, and of all that lead from the base to them."""
+        above = {joint_end(joint, "child"): joint_end(joint, "parent") for joint in self._joints}
+        found = set[str]()
+        for name in names:
+            while name not in found:
+                found.add(name)
+                name = above.get(name, name)
+        return found
 
     def merge_frames(self) -> dict[str, str]:
         """Merge all frames; returns the name of each, with that of the link it is merged into."""

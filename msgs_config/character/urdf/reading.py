@@ -12,6 +12,8 @@ from msgs_config.errors import CharacterError
 WITH_AXIS = ("revolute", "continuous", "prismatic")
 """The types of joints that move along or about an axis."""
 DEFAULT_AXIS = "1 0 0"
+FLOATING = "floating"
+"""The type of a joint between the world and a base that floats, which is one without it as well."""
 
 _DIGITS = 1e-3  # that the length of a unit vector in a file may be off by its digits
 
@@ -36,6 +38,11 @@ def read_robot(path: Path, text: str) -> ReadUrdf:
     if changed:
         line = f"axes of another length than 1 are directions alone: {listed(changed)}"
         left_out = (*left_out, LeftOut("axis", line))
+    floating = [joint for joint in robot.findall("joint") if joint.get("type") == FLOATING]
+    for joint in floating:
+        joint.set("type", "fixed")
+        line = f"joint '{joint.get('name')}' is that of the floating base"
+        left_out = (*left_out, LeftOut(FLOATING, line))
     return ReadUrdf(robot, left_out)
 
 

@@ -304,3 +304,43 @@ def test_a_name_space_of_xacro_alone_is_no_xacro(tmp_path: Path) -> None:
     text = arm().replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
 
     assert loaded(tmp_path, text).layout.size == 1
+
+
+# The joint of a floating base
+
+
+@pytest.mark.parametrize("base", ["world", "odom"])
+def test_a_floating_joint_from_the_world_is_that_of_the_floating_base(
+    tmp_path: Path, base: str
+) -> None:
+    """As files for other programs have it: the same robot as without the two."""
+    rest = link("trunk"), link("arm"), joint("hinge", "trunk", "arm")
+    floating = joint("free", base, "trunk", "floating", limit="")
+
+    character = loaded(tmp_path, robot(link(base, ""), floating, *rest))
+    plain = loaded(tmp_path, robot(*rest))
+
+    assert character.layout.dof_names == plain.layout.dof_names
+    assert character.layout.has_floating_base
+    assert character.mass == plain.mass
+    assert character.frame_names == {base, "trunk", "arm"}
+    assert "joint 'free' is that of the floating base" in character.warnings
+
+
+def test_a_floating_joint_elsewhere_is_refused(tmp_path: Path) -> None:
+    free = joint("free", "a", "b", "floating", limit="")
+
+    line = refusal(write_character(tmp_path, robot(link("a"), link("b"), free)))
+
+    assert "joint 'free' is of type floating" in line
+
+
+def test_a_slider_that_moves_an_inertia_without_mass_is_fixed(tmp_path: Path) -> None:
+    """Nothing would resist its effort."""
+    wheel = SWINGING.replace(f'value="{MASS}"', 'value="0"')
+    slider = joint("s", "arm", "wheel", "prismatic", limit='<limit upper="1" effort="1"/>')
+
+    character = loaded(tmp_path, arm(more=link("wheel", wheel) + slider))
+
+    assert character.layout.size == 1
+    assert "joints that move no mass are fixed at 0: s" in character.warnings
