@@ -318,11 +318,11 @@ def test_a_floating_joint_from_the_world_is_that_of_the_floating_base(
     floating = joint("free", base, "trunk", "floating", limit="")
 
     character = loaded(tmp_path, robot(link(base, ""), floating, *rest))
-    plain = loaded(tmp_path, robot(*rest))
+    without = loaded(tmp_path, robot(*rest))
 
-    assert character.layout.dof_names == plain.layout.dof_names
+    assert character.layout.dof_names == without.layout.dof_names
     assert character.layout.has_floating_base
-    assert character.mass == plain.mass
+    assert character.mass == without.mass
     assert character.frame_names == {base, "trunk", "arm"}
     assert "joint 'free' is that of the floating base" in character.warnings
 
