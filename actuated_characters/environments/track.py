@@ -267,9 +267,9 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
                 self._camera.close()
 
     def __reduce__(self) -> NoReturn:
-        raise ConfigurationError(
-            "an environment cannot be copied or pickled; make another one with the same options "
-            "and give it this one's get_state()"
+        raise SimulationError(
+            "an environment can be neither copied nor pickled; make another one with the same "
+            "options and give it this one's get_state()"
         )
 
     @property
