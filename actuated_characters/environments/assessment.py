@@ -54,11 +54,10 @@ class Assessment:
         seen = np.empty(self.size)
         if self._floats:
             axes = frames.axes(frames.quaternion(state.position[3:_BASE].tolist()))
-            linear, angular = np.split(state.velocity[:_BASE], 2)
             seen[0] = state.position[2]
             seen[1:4] = frames.to_child(axes, _DOWN)
-            seen[4:7] = frames.to_child(axes, linear.tolist())
-            seen[7:base] = angular
+            seen[4:7] = frames.to_child(axes, state.velocity[:3].tolist())
+            seen[7:base] = state.velocity[3:_BASE]
         seen[base:position] = state.position[self._joints]
         seen[position:velocity] = state.velocity[self._joints]
         seen[velocity:error] = self._error(state, ahead)
