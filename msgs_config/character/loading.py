@@ -23,6 +23,7 @@ from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import (
     ROOT_TORQUE,
     Character,
+    ClipFormat,
     Gains,
     Joint,
     Link,
@@ -86,7 +87,7 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         links=tuple(links),
         gains=_merge_gains(file, layout),
         rest_position=_place_rest_pose(file, layout, links),
-        clips=file.clips,
+        clips=_clip_format(file, layout),
         feet=file.feet,
         planning=file.planning,
         warnings=(
@@ -100,6 +101,13 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         frames=repairs.frames,
     )
     return add_defaults(character, file)
+
+
+def _clip_format(file: CharacterFile, layout: JointLayout) -> ClipFormat:
+    """How clips of the character are written; without `clips` in its file by all of its joints."""
+    if file.clips.joints:
+        return file.clips
+    return replace(file.clips, joints=tuple(layout.actuated_joint_names))
 
 
 def _load_links(robot: ElementTree.Element, file: CharacterFile) -> list[Link]:

@@ -57,10 +57,14 @@ def add_motion_import(commands: "Commands[argparse.ArgumentParser]") -> None:
         "--map",
         type=Path,
         metavar="YAML",
-        help="joints by role, such as 'left_knee: LeftLeg', where names do not tell",
+        help="joints by role, such as 'left_knee: LeftLeg', where names do not tell; those of the "
+        "character under 'target'",
     )
     command.add_argument("--up", choices=AXES, metavar="AXIS", help="x, y, z, -x, -y or -z")
     command.add_argument("--units", choices=[*UNITS], help="the unit of length")
+    command.add_argument(
+        "--ground", action="store_true", help="put feet that float, as of a suit, on the ground"
+    )
     command.add_argument(
         "--from", dest="start", type=float, default=0.0, metavar="S", help="start, s (0)"
     )
@@ -72,7 +76,7 @@ def add_motion_import(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 def _import(options: argparse.Namespace) -> int:
     from actuated_characters.motion.retargeting.retargeting import RetargetingSettings
-    from actuated_characters.motion.retargeting.skeleton_map import read_map
+    from actuated_characters.motion.retargeting.skeleton_map import GivenJoints, read_map
     from actuated_characters.motion.retargeting.target_body import TargetBody
     from msgs_config.character.loading import load_character
 
@@ -83,9 +87,9 @@ def _import(options: argparse.Namespace) -> int:
         picture = _picture(conversion)
         if not (options.no_picture or options.overwrite) and picture.exists():
             raise RecordingError(f"{picture} exists already; --overwrite replaces it")
-    joints = None if options.map is None else read_map(options.map)
-    settings = RetargetingSettings(joints, options.up, options.units)
-    target = TargetBody(load_character(options.character))
+    given = GivenJoints({}, {}) if options.map is None else read_map(options.map)
+    settings = RetargetingSettings(given.source, options.up, options.units, options.ground)
+    target = TargetBody(load_character(options.character), given.target)
     several = len(conversions) > 1
     done, failed = [], 0
     for conversion in conversions:
@@ -157,6 +161,8 @@ def _report(options: argparse.Namespace, conversion: Conversion, made: "Imported
     }
     console = Console()
     console.print(make_facts_table(str(conversion.output), facts.items()))
+    for remark in made.remarks:
+        console.print("remark:", remark, soft_wrap=True, markup=False, highlight=False)
     if not options.no_picture:
         print(f"picture: {_picture(conversion)}")
     words = f"actuated_characters run --clip {shlex.quote(str(conversion.output))}"
@@ -192,4 +198,9 @@ def _print_table(
             )
         )
     title = f"clips of {Path(options.character).stem}"
-    Console().print(make_table(title, columns, rows))
+    console = Console()
+    console.print(make_table(title, columns, rows))
+    for conversion, made in done:
+        for remark in made.remarks:
+            line = f"remark: {conversion.output}: {remark}"
+            console.print(line, soft_wrap=True, markup=False, highlight=False)

@@ -84,6 +84,7 @@ def _facts(character: "Character", source: str) -> dict[str, Any]:
 
 def _bvh_facts(path: Path) -> Iterator[tuple[str, Any]]:
     from actuated_characters.motion.bvh.reading import read_bvh
+    from actuated_characters.motion.retargeting.plausibility import doubts_of_human
     from actuated_characters.motion.retargeting.retargeting import (
         RetargetingSettings,
         read_body,
@@ -102,6 +103,8 @@ def _bvh_facts(path: Path) -> Iterator[tuple[str, Any]]:
         return
     yield "conventions", conventions.described()
     yield "leg length", f"{body.leg_length:.3f} m"
+    doubts = doubts_of_human(body)
+    yield "a human", "no doubt" if not doubts else "; ".join(doubts)
     for role, index in sorted(body.map.joints.items()):
         yield role, skeleton.names[index]
 
@@ -143,6 +146,13 @@ def describe_quality(quality: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "feet in the ground", f"{1e3 * max(quality['feet_in_ground_m'], 0.0):.1f} mm"
         deepest = f"{1e3 * quality['deepest_m']:.1f} mm, {quality['deepest_link']}"
         yield "deepest in the ground", deepest
+    if "overlap_m" in quality:
+        share = f"{100 * quality['overlap_share']:.0f} % of the frames"
+        pair = f", {quality['overlap_pair']}, {share}" if quality["overlap_m"] > 0.0 else ""
+        yield "deepest overlap", f"{1e3 * quality['overlap_m']:.1f} mm{pair}"
+        yield "a foot stands", f"{100 * quality['standing_share']:.0f} % of the frames"
+    if quality.get("swing_clearance_m") is not None:
+        yield "swinging feet clear", f"{1e3 * quality['swing_clearance_m']:.1f} mm or more"
     if quality.get("skating_mean_m_s") is not None:
         mean, most = (1e2 * quality[f"skating_{key}_m_s"] for key in ("mean", "p95"))
         yield "skating of standing feet", f"{mean:.2f} cm/s, 95 % below {most:.2f} cm/s"

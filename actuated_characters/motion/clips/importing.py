@@ -11,7 +11,12 @@ import numpy as np
 from actuated_characters.motion.bvh.reading import read_bvh
 from actuated_characters.motion.bvh.skeleton import BvhMotion
 from actuated_characters.motion.clips.motion_clip import MotionClip
-from actuated_characters.motion.clips.quality import ClipQuality, link_poses, measure_quality
+from actuated_characters.motion.clips.quality import (
+    ClipQuality,
+    describe_shortcomings,
+    link_poses,
+    measure_quality,
+)
 from actuated_characters.motion.retargeting.inverse_kinematics import Progress
 from actuated_characters.motion.retargeting.retargeting import (
     RetargetedMotion,
@@ -36,6 +41,7 @@ class ImportedClip:
     worst_joint: str  # a role, such as `left_elbow`
     worst_mean_rad: float  # mean angle between the segment and the captured one
     worst_max_rad: float
+    remarks: tuple[str, ...]  # on the capture and on the clip, a sentence each
 
 
 def import_bvh(
@@ -77,7 +83,9 @@ def import_bvh(
         "worst_joint_mean_rad": round(mean, 4),
         "worst_joint_max_rad": round(most, 4),
     }
-    return ImportedClip(replace(clip, quality=content), made, quality, worst, mean, most)
+    remarks = (*made.remarks, *describe_shortcomings(content))
+    whole = replace(clip, quality=content | ({"remarks": remarks} if remarks else {}))
+    return ImportedClip(whole, made, quality, worst, mean, most, remarks)
 
 
 def _source(path: Path, motion: BvhMotion, made: RetargetedMotion, licence: str) -> dict[str, Any]:

@@ -1,11 +1,13 @@
 """How good a clip is: feet in the ground, feet that slide, limits that are touched, speeds."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from actuated_characters.motion.clips.motion_clip import MotionClip
+from actuated_characters.motion.retargeting.contacts import spans
 from actuated_characters.motion.retargeting.skeleton_map import SIDES
 from actuated_characters.motion.retargeting.target_body import TargetBody
 from msgs_config.arrays import FloatArray
@@ -13,6 +15,9 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import rotations
 
 _AT_LIMIT = 0.03  # rad
+_SHORTEST_SWING = 0.2  # s
+_OVERLAPS, _IN_GROUND, _CLEARANCE = 0.005, 0.01, 0.01  # m beyond which there is a remark
+_SKATING, _STANDING = 0.05, 0.05  # m/s, and of the frames
 _DIGITS = 4
 
 
@@ -26,6 +31,10 @@ class ClipQuality:
     skating_mean_m_s: float | None  # of the parts of soles that stand; None if none does
     skating_p95_m_s: float | None
     standing_share: float  # of the time in which a foot stands
+    swing_clearance_m: float | None  # the least of all swings, in their middle; None without one
+    overlap_m: float  # the deepest of two shapes in each other
+    overlap_pair: str
+    overlap_share: float  # of the frames
     limits_touched: dict[str, float]  # by degree of freedom, the share of frames at a limit
     fastest_joint: str
     fastest_joint_rad_s: float
@@ -46,11 +55,13 @@ def measure_quality(target: TargetBody, clip: MotionClip) -> ClipQuality:
     """
     character, layout = target.character, target.character.layout
     origins, turns = link_poses(target, clip)
+    overlaps, overlapping = _overlaps(target, origins, turns)
     surface = target.surface
     arms = rotations.rotate(turns[:, surface.links], surface.offsets)
     depths = surface.radii - origins[:, surface.links, 2] - arms[..., 2]
     deepest = int(np.argmax(depths.max(axis=0)))
     sink, speeds, stands = 0.0, [np.empty(0)], np.zeros(len(clip.times), dtype=np.bool_)
+    clearances: list[float] = []
     durations = np.diff(clip.times)
     for side in SIDES:
         link = target.map[f"{side}_ankle"]
@@ -58,6 +69,7 @@ def measure_quality(target: TargetBody, clip: MotionClip) -> ClipQuality:
             turns[:, link, np.newaxis], target.soles(f"{side}_ankle")
         )
         sink = max(sink, float(-corners[..., 2].min()))
+        clearances += _swing_clearances(clip, side, corners[..., 2].min(axis=1))
         for part, pair in (("toe", slice(0, 2)), ("heel", slice(2, 4))):
             touches = clip.touching(f"{side}_{part}")
             middle = corners[:, pair, :2].mean(axis=1)
@@ -75,10 +87,66 @@ def measure_quality(target: TargetBody, clip: MotionClip) -> ClipQuality:
         skating_mean_m_s=float(skating.mean()) if len(skating) else None,
         skating_p95_m_s=float(np.percentile(skating, 95)) if len(skating) else None,
         standing_share=float(stands.mean()),
+        swing_clearance_m=min(clearances, default=None),
+        overlap_m=float(overlaps.max()),
+        overlap_pair=overlapping,
+        overlap_share=float((overlaps > _OVERLAPS).mean()),
         limits_touched=_limits_touched(target, clip),
         fastest_joint=layout.dof_names[6 + fastest],
         fastest_joint_rad_s=float(fast[:, fastest].max()),
     )
+
+
+def _overlaps(target: TargetBody, origins: FloatArray, turns: FloatArray) -> tuple[FloatArray, str]:
+    """The depth (f,) in m of the two shapes that are deepest in each other, and which these are."""
+    capsules, links = target.capsules, target.character.links
+    if not len(capsules.pairs):
+        return np.zeros(len(origins)), ""
+    depths = -capsules.nearest(origins, rotations.matrix(turns)).distance
+    worst = capsules.pairs[int(np.argmax(depths.max(axis=0)))]
+    pair = " and ".join(links[int(capsules.links[each])].name for each in worst)
+    return np.maximum(depths.max(axis=1), 0.0), pair
+
+
+def _swing_clearances(clip: MotionClip, side: str, heights: FloatArray) -> list[float]:
+    """The least height of a sole (f,) over the ground in the middle of each of its swings, m.
+
+    A swing lies between two times in which the foot stands; its middle is half of it.
+    """
+    stands = clip.touching(f"{side}_heel") | clip.touching(f"{side}_toe")
+    swings = [span for span in spans(~stands) if span[0] > 0 and span[1] < len(stands)]
+    found = []
+    for first, end in swings:
+        quarter = (end - first) // 4
+        if clip.times[end] - clip.times[first] > _SHORTEST_SWING:
+            found.append(float(heights[first + quarter : end - quarter].min()))
+    return found
+
+
+def describe_shortcomings(quality: Mapping[str, Any]) -> list[str]:
+    """Remarks on a clip's figures that are beyond their bounds, a sentence each."""
+    bounds = (
+        ("overlap_m", _OVERLAPS, "shapes overlap by up to {:.1f} mm", 1e3),
+        ("feet_in_ground_m", _IN_GROUND, "soles are in the ground by up to {:.1f} mm", 1e3),
+        ("skating_mean_m_s", _SKATING, "standing feet skate at {:.1f} cm/s", 1e2),
+    )
+    remarks = []
+    for name, bound, text, factor in bounds:
+        value = quality.get(name)
+        if value is not None and value > bound:
+            remarks.append(f"{text.format(factor * value)}, more than {factor * bound:g}")
+    clearance = quality.get("swing_clearance_m")
+    if clearance is not None and clearance < _CLEARANCE:
+        remarks.append(
+            f"a foot that swings clears the ground by {1e3 * clearance:.1f} mm, less than "
+            f"{1e3 * _CLEARANCE:g}: it will scuff where the body hangs lower"
+        )
+    share = quality.get("standing_share")
+    if share is not None and share < _STANDING:
+        remarks.append(
+            f"a foot stands in {100 * share:.0f} % of the frames, fewer than {100 * _STANDING:g} %"
+        )
+    return remarks
 
 
 def link_poses(target: TargetBody, clip: MotionClip) -> tuple[FloatArray, FloatArray]:

@@ -30,7 +30,8 @@ def free_goals(body: CapturedBody, target: TargetBody, turns: SegmentTurns) -> G
     wanted = np.stack([turns.turns_xyzw[role] for role in roles], axis=1)
     weights = np.stack([_turn_weights(role, turns, body.frames) for role in roles], axis=1)
     ankles = [f"{side}_ankle" for side in SIDES]
-    names, offsets = ["pelvis", *ankles], [hips_in_pelvis(target), np.zeros(3), np.zeros(3)]
+    names = ["pelvis", *ankles]
+    offsets = [hips_in_pelvis(target), *(target.offset(ankle) for ankle in ankles)]
     places = np.stack([body.middle("hip"), *(body.part(role) for role in ankles)], axis=1)
     place_weights = np.tile(
         np.array([_PELVIS, *([_ANKLE] * 3 for _ in ankles)]), (body.frames, 1, 1)

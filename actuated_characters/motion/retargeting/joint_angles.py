@@ -9,14 +9,17 @@ from msgs_config.character.layout import GeneralizedPosition, JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import elementary, rotations
 
+_ITERATIONS, _DAMPING, _LARGEST = 30, 1e-3, 0.5  # rad of a step
+
 
 def joint_angles(
     character: Character, base: tuple[FloatArray, FloatArray], turns: Mapping[int, FloatArray]
 ) -> GeneralizedPosition:
     """Positions (f, n) in which links have turns, joint by joint from the base on.
 
-    A hinge takes the part of the turn that is about its axis, within its limits; a joint whose link
-    has no turn stays at zero.
+    A hinge takes the part of the turn that is about its axis, within its limits; hinges that follow
+    each other, of which the last link alone has a turn, share it. A joint whose link has no turn,
+    and no such link below, stays at zero.
 
     Args:
         character: With a floating base.
@@ -32,7 +35,10 @@ def joint_angles(
         joint, wanted = link.joint, turns.get(index)
         own = np.array(joint.pose_in_parent.orientation_xyzw)
         frame = rotations.multiply(world[link.parent], own)
-        if wanted is not None and joint.type is not JointType.FIXED:
+        row = _row_of_hinges(character, index, turns)
+        if wanted is not None and len(row) > 1:
+            frame = _shared(character, row, world, wanted, positions)
+        elif wanted is not None and joint.type is not JointType.FIXED:
             entries = layout.joint(joint.name).entries
             relative = rotations.multiply(rotations.conjugate(frame), wanted)
             if joint.type is JointType.SPHERICAL:
@@ -46,6 +52,67 @@ def joint_angles(
                 frame = rotations.multiply(frame, rotations.exp(angle[:, np.newaxis] * axis))
         world.append(frame)
     return layout.configuration(positions)
+
+
+def _row_of_hinges(character: Character, index: int, turns: Mapping[int, FloatArray]) -> list[int]:
+    """The links with hinges from a link upwards, until one that has a turn; from above on."""
+    row, links = [], character.links
+    while index > 0:
+        joint = links[index].joint
+        if joint.type is JointType.REVOLUTE:
+            row.append(index)
+        elif joint.type is not JointType.FIXED:
+            break
+        index = links[index].parent
+        if index in turns:
+            break
+    return row[::-1]
+
+
+def _shared(
+    character: Character,
+    row: list[int],
+    world: list[FloatArray],
+    wanted: FloatArray,
+    positions: FloatArray,
+) -> FloatArray:
+    """The turn (f, 4) that a row of hinges reaches of a wanted one; sets their positions.
+
+    By damped Gauss-Newton from the middle of their ranges nearest to zero.
+    """
+    lower, upper = character.position_bounds()
+    entries = [character.layout.joint(character.links[k].joint.name).start for k in row]
+    low, high = lower[entries], upper[entries]
+    angles = np.tile(np.clip(0.0, low, high), (len(wanted), 1))
+    above = world[character.links[row[0]].parent]
+    for _ in range(_ITERATIONS):
+        turn, axes = _turned_by(character, row, above, angles)
+        missing = rotations.log(rotations.multiply(wanted, rotations.conjugate(turn)))
+        normal = np.matmul(axes, axes.swapaxes(-1, -2)) + _DAMPING * np.eye(len(row))
+        gradient = np.matmul(axes, missing[..., np.newaxis])
+        step = np.linalg.solve(normal, gradient)[..., 0]
+        angles = np.clip(angles + np.clip(step, -_LARGEST, _LARGEST), low, high)
+    positions[:, entries] = angles
+    return _turned_by(character, row, above, angles)[0]
+
+
+def _turned_by(
+    character: Character, row: list[int], above: FloatArray, angles: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The turn (f, 4) of the last link of a row of hinges, and their axes (f, k, 3), world."""
+    turn, axes = above, []
+    line = [row[-1]]
+    while line[0] != row[0]:
+        line.insert(0, character.links[line[0]].parent)
+    for index in line:
+        joint = character.links[index].joint
+        turn = rotations.multiply(turn, np.array(joint.pose_in_parent.orientation_xyzw))
+        if index in row:
+            axis = np.array(joint.axis_in_child)
+            axes.append(rotations.rotate(turn, axis))
+            angle = angles[:, len(axes) - 1, np.newaxis]
+            turn = rotations.multiply(turn, rotations.exp(angle * axis))
+    return turn, np.stack(axes, axis=1)
 
 
 def _angle_about(axis: FloatArray, turns_xyzw: FloatArray) -> FloatArray:

@@ -19,6 +19,10 @@ _HELPERS = re.compile(
     r"twist|roll|nub|dummy|helper|pole|phys|thumb|index|middle|ring|pinky|little|finger|prop|eye|jaw"
 )
 
+_OF_ROBOTS = re.compile(  # words of hinges, which say their axis, or that there is one
+    r"link|joint|motor|dof|actuator|drive|servo|body|pitch|roll|yaw|[xyz]|rx|ry|rz|fe|aa|ie|fork|cross"
+)
+
 PartWeights = Mapping[str, float]
 
 LEG: tuple[tuple[str, PartWeights], ...] = (
@@ -41,7 +45,7 @@ LEG: tuple[tuple[str, PartWeights], ...] = (
         {"knee": 1, "calf": 1, "shin": 1, "tibia": 1, "lowleg": 1, "lowerleg": 1, "lleg": 1}
         | {"shank": 1, "leglower": 1, "leg": 0.9, "kneejoint": 1},
     ),
-    ("ankle", {"ankle": 1, "foot": 0.9, "anklejoint": 1}),
+    ("ankle", {"ankle": 1, "foot": 0.9, "anklejoint": 1, "talus": 1}),
     ("toe", {"toe": 1, "toes": 1, "toebase": 1, "ball": 1, "toejoint": 1, "foot": 0.4}),
 )
 """The joints of a leg from the trunk on, with the parts that they are called by, and how surely."""
@@ -55,7 +59,7 @@ ARM: tuple[tuple[str, PartWeights], ...] = (
     (
         "shoulder",
         {"upperarm": 1, "uparm": 1, "uarm": 1, "humerus": 1, "shldr": 1, "arm": 0.9}
-        | {"shoulder": 0.7, "shoulderjoint": 1, "armupper": 1},
+        | {"shoulder": 0.7, "shoulderjoint": 1, "armupper": 1, "bicep": 1},
     ),
     (
         "elbow",
@@ -69,16 +73,19 @@ HEAD = frozenset({"head"})
 _PARTS = {part for chain in (LEG, ARM) for _, parts in chain for part in parts} | NECK | HEAD
 
 
-def side_and_part(name: str) -> tuple[str, str]:
+def side_and_part(name: str, *, of_robot: bool = False) -> tuple[str, str]:
     """The side that a joint's name says, `left`, `right` or empty, and the part; empty for none.
 
-    Helpers such as fingers and joints of twist are no parts.
+    Helpers such as fingers and joints of twist are no parts; of a robot, whose hinges are called
+    `left_hip_roll_joint`, axes are left out.
     """
     last = re.split(r"[:|/]", name.strip())[-1]
     found = " ".join(_WORDS.findall(last)).lower()
     words = " ".join(
         _SIDE_AND_WORD.sub(r"\1 \2", w) if len(w) == 2 else w for w in found.split()
     ).split()
+    if of_robot:
+        words = [word for word in words if not _OF_ROBOTS.fullmatch(word)]
     if _HELPERS.search("".join(words)):
         return "", ""
     if len(words) > 1 and words[0] == "joint":

@@ -28,6 +28,11 @@ from actuated_characters.motion.retargeting.conventions import (
 from actuated_characters.motion.retargeting.goals import first_guess, free_goals
 from actuated_characters.motion.retargeting.inverse_kinematics import InverseKinematics, Progress
 from actuated_characters.motion.retargeting.own_skeleton import own_motion
+from actuated_characters.motion.retargeting.plausibility import (
+    describe_floating,
+    doubts_of_human,
+    ground_drift,
+)
 from actuated_characters.motion.retargeting.segments import SegmentTurns, segment_turns
 from actuated_characters.motion.retargeting.skeleton_map import SIDES, ancestors, find_map
 from actuated_characters.motion.retargeting.stances import with_stances
@@ -48,6 +53,7 @@ class RetargetingSettings:
     joints: Mapping[str, str] | None = None  # of the skeleton, by role
     up: str | None = None  # an axis
     unit: str | None = None  # a key of `UNITS`
+    ground: bool = False  # whether feet that float are put on the ground
 
 
 @dataclass(frozen=True)
@@ -60,6 +66,7 @@ class RetargetedMotion:
     contacts: Mapping[str, tuple[Contact, ...]]  # by point, such as `left_heel`
     turns: SegmentTurns  # that were to be shown
     motion: GeneralizedPosition  # (f, n), (f, k, 4)
+    remarks: tuple[str, ...] = ()  # on the capture, a sentence each
 
 
 def read_body(
@@ -117,9 +124,18 @@ def retarget(
     Raises:
         ClipError: joints are missing, or the motion is too short.
     """
-    body, conventions = read_body(place, motion, settings or RetargetingSettings())
+    settings = settings or RetargetingSettings()
+    body, conventions = read_body(place, motion, settings)
+    remarks = _human_remarks(body)
     scale = target.leg_length / body.leg_length
-    body = _on_ground(body.scaled(scale), target)
+    body = body.scaled(scale)
+    if settings.ground:
+        down = np.zeros((body.frames, 3))
+        down[:, 2] = -ground_drift(body)
+        body = body.moved(down)
+    elif floating := describe_floating(body):
+        remarks = (*remarks, floating)
+    body = _on_ground(body, target)
     contacts = body_contacts(body)
     flat = {f"{side}_ankle": flat_frames(contacts, side, body.frames) for side in SIDES}
     turns = segment_turns(body, target, flat)
@@ -137,7 +153,12 @@ def retarget(
         shown = GeneralizedPosition(own.position[rows], own.orientations_xyzw[rows])
         conventions = replace(conventions, is_own=True)
     unit = scale * conventions.unit_length
-    return RetargetedMotion(body, conventions, unit, contacts, turns, shown)
+    return RetargetedMotion(body, conventions, unit, contacts, turns, shown, remarks)
+
+
+def _human_remarks(body: CapturedBody) -> tuple[str, ...]:
+    doubts = doubts_of_human(body)
+    return (f"is this a human? {'; '.join(doubts)}",) if doubts else ()
 
 
 def _on_ground(body: CapturedBody, target: TargetBody) -> CapturedBody:

@@ -13,7 +13,7 @@ import numpy as np
 from actuated_characters.motion.retargeting.captured_body import CapturedBody
 from actuated_characters.motion.retargeting.conventions import quaternion, rest_up
 from actuated_characters.motion.retargeting.skeleton_map import SIDES
-from actuated_characters.motion.retargeting.target_body import TargetBody
+from actuated_characters.motion.retargeting.target_body import BELOW, TargetBody
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.geometry import rotations
 
@@ -75,15 +75,29 @@ def _turn_of_link(target: TargetBody, role: str, frame: Frame) -> FloatArray:
     """The turn (f, 4) of a character's link whose directions at rest have become a frame."""
     side = role.partition("_")[0]
     part = role.removeprefix(f"{side}_") if side in SIDES else role
-    below = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist"}.get(part)
-    if below and f"{side}_{below}" in target.map:
-        first = target.origin(f"{side}_{below}") - target.origin(role)
+    if part in BELOW:
+        first, second = target.bone(role), _bend_axis(target, side, part)
     else:
-        first = {"pelvis": _LEFT, "chest": _UP, "head": _UP, "ankle": _AHEAD}.get(part, -_UP)
-    second = {"pelvis": _UP, "ankle": _UP, "shoulder": -_LEFT, "elbow": -_LEFT}.get(part, _LEFT)
+        first = {"pelvis": _LEFT, "chest": _UP, "head": _UP}.get(part, _AHEAD)
+        second = {"pelvis": _UP, "ankle": _UP}.get(part, _LEFT)
     at_rest = _axes((first, second))
     turn = quaternion(_axes(frame) @ at_rest.swapaxes(-1, -2))
     return rotations.normalised(rotations.multiply(turn, target.turns_xyzw[target.map[role]]))
+
+
+def _bend_axis(target: TargetBody, side: str, part: str) -> FloatArray:
+    """The axis (3,) at rest about which a character's knee or elbow bends, of a leg or an arm.
+
+    A knee bends backwards and an elbow to the front, as far as the hinge's axis leaves it open.
+    """
+    upper, middle = ("hip", "knee") if part in ("hip", "knee") else ("shoulder", "elbow")
+    bone = target.bone(f"{side}_{upper}")
+    usual = np.cross(bone, -_AHEAD if middle == "knee" else _AHEAD)
+    axis = target.bend_axis(side, middle)
+    if axis is None:
+        return _unit(usual)
+    along = float(_unit(usual) @ axis)
+    return axis if along >= 0.0 else -axis
 
 
 def _pelvis(body: CapturedBody, up_at_rest: FloatArray | None) -> Frame:

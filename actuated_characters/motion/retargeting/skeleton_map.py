@@ -23,14 +23,13 @@ _LIMB = ("hip", "knee", "ankle", "toe", "collar", "shoulder", "elbow", "wrist")
 _TRUNK = ("pelvis", "chest", "neck", "head")
 ROLES = (*_TRUNK, *(f"{side}_{part}" for part in _LIMB for side in SIDES))
 """What a joint can be. A pelvis carries both hips, a chest both arms."""
-_NEEDED = [
-    f"{side}_{part}"
-    for part in ("hip", "knee", "ankle", "shoulder", "elbow")
-    for side in SIDES
-]  # fmt: skip
+_LEGS = [f"{side}_{part}" for part in ("hip", "knee", "ankle") for side in SIDES]
+_NEEDED = [*_LEGS, *(f"{side}_{part}" for part in ("shoulder", "elbow") for side in SIDES)]
 _SHOWN_NAMES = 40
 
 Chain = Sequence[tuple[str, PartWeights]]
+Parts = Sequence[Sequence[tuple[str, str]]]
+"""Of each joint, the side and the part that each of its names says."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,9 @@ def find_map(
     names: Sequence[str],
     parents: Sequence[int],
     given: Mapping[str, str] | None = None,
+    *,
+    parts: Parts | None = None,
+    arms: bool = True,
 ) -> SkeletonMap:
     """The map of a skeleton of j joints.
 
@@ -69,11 +71,14 @@ def find_map(
         names: Of the joints (j,).
         parents: Index of each joint's parent, -1 of the root; parents come first.
         given: Joints by role, which take precedence over what the names say.
+        parts: Of each joint, the sides and parts that it may be, where names have more to say.
+        arms: Whether arms are needed.
 
     Raises:
         ClipError: a joint that is needed is not found, or one that is given does not exist.
     """
-    parts = [side_and_part(name) for name in names]
+    if parts is None:
+        parts = [(side_and_part(name),) for name in names]
     found: dict[str, int] = {}
     for side in SIDES:
         for chain in (LEG, ARM):
@@ -83,7 +88,8 @@ def find_map(
         if name not in names:
             raise ClipError(f"{place}: map: {role}: {one_of('joint', name, list(names))}")
         found[role] = list(names).index(name)
-    missing = [role for role in _NEEDED if role not in found]
+    needed = _NEEDED if arms else _LEGS
+    missing = [role for role in needed if role not in found]
     if missing:
         raise ClipError(
             f"{place}: no joint found for {', '.join(missing)}; name them in a file for --map, "
@@ -92,16 +98,33 @@ def find_map(
     return SkeletonMap(_with_trunk(found, parts, parents))
 
 
-def read_map(path: Path) -> dict[str, str]:
+@dataclass(frozen=True)
+class GivenJoints:
+    """What a file says of joints by role: of a captured skeleton, and of a character."""
+
+    source: Mapping[str, str]
+    target: Mapping[str, str]  # links, or joints
+
+
+def read_map(path: Path) -> GivenJoints:
     """A YAML file of joints by role, such as `left_knee: LeftLeg`.
+
+    Those of the character are under `target`; those of the capture at the top, or under `source`.
 
     Raises:
         ClipError: it is malformed, or names a role that does not exist.
     """
     content = files.parse_yaml_mapping(path, files.read_text(path, ClipError), ClipError)
     reader = MappingReader(path, content, ClipError)
-    reader.check_keys(ROLES)
-    return {role: reader.text(role) for role in content}
+    reader.check_keys((*ROLES, "source", "target"))
+    source, target = reader.part("source"), reader.part("target")
+    for part in (source, target):
+        part.check_keys(ROLES)
+    at_top = {role: reader.text(role) for role in content if role in ROLES}
+    return GivenJoints(
+        source=at_top | {role: source.text(role) for role in source.content},
+        target={role: target.text(role) for role in target.content},
+    )
 
 
 def ancestors(joint: int, parents: Sequence[int]) -> list[int]:
@@ -119,21 +142,20 @@ def common_ancestor(joints: Sequence[int], parents: Sequence[int]) -> int:
     return next(joint for joint in lines[0] if all(joint in line for line in lines))
 
 
-def _best_chain(
-    chain: Chain, side: str, parts: Sequence[tuple[str, str]], parents: Sequence[int]
-) -> dict[str, int]:
+def _best_chain(chain: Chain, side: str, parts: Parts, parents: Sequence[int]) -> dict[str, int]:
     """The joints of a limb: one line from the trunk on whose names fit its parts best.
 
     Of joints that fit equally well, the one nearest to the trunk.
     """
     best: list[list[tuple[float, tuple[tuple[str, int], ...]]]] = []
     nothing: tuple[float, tuple[tuple[str, int], ...]] = (0.0, ())
-    for joint, (own_side, part) in enumerate(parts):
+    for joint, names in enumerate(parts):
+        own = {part for own_side, part in names if own_side == side}
         above = best[parents[joint]] if parents[joint] >= 0 else [nothing] * (len(chain) + 1)
         row = list(above)
-        if own_side == side:
+        if own:
             for level, (role, weights) in enumerate(chain):
-                weight = weights.get(part, 0.0)
+                weight = max(weights.get(part, 0.0) for part in own)
                 if weight > 0.0:
                     score, taken = max(above[: level + 1], key=lambda each: each[0])
                     if score + weight > row[level + 1][0]:
@@ -143,20 +165,22 @@ def _best_chain(
     return dict(max(ends, key=lambda each: each[0], default=nothing)[1])
 
 
-def _with_trunk(
-    found: dict[str, int], parts: Sequence[tuple[str, str]], parents: Sequence[int]
-) -> dict[str, int]:
+def _with_trunk(found: dict[str, int], parts: Parts, parents: Sequence[int]) -> dict[str, int]:
     """The joints with those of the trunk, which the tree says better than names do."""
     hips, arms = (
-        [found[f"{side}_{part}"] for side in SIDES] for part in ("hip", "shoulder")
-    )  # fmt: skip
-    pelvis, chest = common_ancestor(hips, parents), common_ancestor(arms, parents)
-    if parts[chest][1] in NECK and parents[chest] >= 0:  # as where a biped's collars hang
+        [found[f"{side}_{part}"] for side in SIDES if f"{side}_{part}" in found]
+        for part in ("hip", "shoulder")
+    )
+    pelvis = common_ancestor(hips, parents)
+    chest = common_ancestor(arms, parents) if len(arms) == len(SIDES) else pelvis
+    if (
+        any(part in NECK for _, part in parts[chest]) and parents[chest] >= 0
+    ):  # as where a biped's collars hang
         chest = parents[chest]
     result = {"pelvis": pelvis, "chest": chest}
     for role, words in (("neck", NECK), ("head", HEAD)):
-        for joint, (_, part) in enumerate(parts):
-            if part in words and chest in ancestors(joint, parents):
+        for joint, names in enumerate(parts):
+            if any(part in words for _, part in names) and chest in ancestors(joint, parents):
                 result.setdefault(role, joint)
     if "head" not in result and "neck" in result:
         result["head"] = result["neck"]

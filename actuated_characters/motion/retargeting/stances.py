@@ -63,7 +63,7 @@ def with_stances(
         touching = [mask(tuple(each), frames) for each in parts]
         _hold_foot(points, target, loose, f"{side}_ankle", parts, frame_time)
         lift = _swing_clearance(touching[0] | touching[1], clearance[side], frame_time)
-        foot = goals.surface.links == target.map[f"{side}_ankle"]
+        foot = np.isin(goals.surface.links, target.below(f"{side}_ankle"))
         lifted[:, foot] += lift[:, np.newaxis]
         if contacts[f"{side}_hand"] and f"{side}_wrist" in target.map:
             _hold_hand(points, target, loose, f"{side}_wrist", contacts[f"{side}_hand"], frame_time)

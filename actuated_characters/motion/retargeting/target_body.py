@@ -1,5 +1,6 @@
 """The body of a character as retargeting sees it: which link is which, bones, soles, limits."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,7 +8,8 @@ import numpy as np
 
 from actuated_characters.motion.retargeting.capsules import Capsules, make_capsules
 from actuated_characters.motion.retargeting.shape_points import balls, corners
-from actuated_characters.motion.retargeting.skeleton_map import SIDES, SkeletonMap, find_map
+from actuated_characters.motion.retargeting.skeleton_map import SIDES, SkeletonMap
+from actuated_characters.motion.retargeting.target_joints import find_target_joints
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.layout import JointType
@@ -16,6 +18,9 @@ from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
 _INSIDE = 0.02  # rad by which solutions keep away from the soft limits of ball joints
+
+BELOW = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist"}
+"""Of each segment of a limb, the one below."""
 
 
 @dataclass(frozen=True)
@@ -30,29 +35,74 @@ class SurfacePoints:
 class TargetBody:
     """A character that stands on two legs, with its links by role.
 
-    Raises ClipError where it is no such character, or has no clips.
+    Raises ClipError where it is no such character.
     """
 
-    def __init__(self, character: Character) -> None:
+    def __init__(self, character: Character, given: Mapping[str, str] | None = None) -> None:
+        """Take a character, with links or joints by role that its names do not tell."""
         self.character = character
         layout = character.layout
-        if not (layout.has_floating_base and character.clips.joints):
-            raise ClipError(
-                f"character '{character.name}' has no floating base, or no clips: its file has no "
-                "key 'clips'"
-            )
-        parents = [link.parent for link in character.links]
-        names = [link.name for link in character.links]
-        self.map: SkeletonMap = find_map(f"character '{character.name}'", names, parents)
+        if not layout.has_floating_base:
+            raise ClipError(f"character '{character.name}' has no floating base: it stands nowhere")
+        found = find_target_joints(character, given)
+        self.map: SkeletonMap = found.map
         rest = np.zeros(layout.size)
         rest[:6] = character.rest_position[:6]
-        self._at_rest = still_model(character, rest)
-        self.origins, self.turns_xyzw = self._at_rest.link_poses()
+        self.origins, self.turns_xyzw = still_model(character, rest).link_poses()
+        self._joints = found
 
     def origin(self, role: str) -> FloatArray:
-        """Where a link's frame is (3,) in the pose with all joints at zero, upright, m."""
-        place: FloatArray = self.origins[self.map[role]]
-        return place
+        """Where a segment's joint is (3,) in the pose with all joints at zero, upright, m."""
+        return self._joints.centre(role, self.character.links, self.origins, self.turns_xyzw)
+
+    def offset(self, role: str) -> FloatArray:
+        """Where a segment's joint is (3,) in the frame of its link, m."""
+        link = self.map[role]
+        back = rotations.conjugate(self.turns_xyzw[link])
+        return rotations.rotate(back, self.origin(role) - self.origins[link])
+
+    def bone(self, role: str) -> FloatArray:
+        """From a limb's segment's joint to the one below (3,) at rest, m.
+
+        Where there is none below, to the centre of mass of what hangs on it.
+        """
+        side, _, part = role.partition("_")
+        below = BELOW[part]
+        if f"{side}_{below}" in self.map:
+            return self.origin(f"{side}_{below}") - self.origin(role)
+        links = [(row, self.character.links[row]) for row in self.below(role)]
+        moments = [
+            link.mass
+            * (
+                self.origins[row]
+                + rotations.rotate(self.turns_xyzw[row], np.array(link.inertial_pose.position))
+                - self.origin(role)
+            )
+            for row, link in links
+        ]
+        bone: FloatArray = np.sum(moments, axis=0) / max(sum(link.mass for _, link in links), 1e-9)
+        return bone
+
+    def bend_axis(self, side: str, part: str) -> FloatArray | None:
+        """The axis (3,) at rest about which a knee or an elbow bends; None if it is no hinge.
+
+        Of several hinges, as where a forearm turns, too, it is the one most across the upper bone.
+        """
+        links, upper = self.character.links, {"knee": "hip", "elbow": "shoulder"}[part]
+        bone = self.bone(f"{side}_{upper}")
+        axes = [
+            rotations.rotate(self.turns_xyzw[row], np.array(links[row].joint.axis_in_child))
+            for row in self._joints.hinges(links, f"{side}_{part}")
+        ]
+        return max(axes, key=lambda axis: float(np.linalg.norm(np.cross(axis, bone))), default=None)
+
+    def below(self, role: str) -> list[int]:
+        """The link of a segment and those that hang on it."""
+        found: list[int] = []
+        for row, link in enumerate(self.character.links):
+            if row == self.map[role] or link.parent in found:
+                found.append(row)
+        return found
 
     def length(self, start: str, end: str) -> float:
         """Distance between the origins of two links in m, in the pose with all joints at zero."""
@@ -69,9 +119,9 @@ class TargetBody:
     @property
     def ankle_height(self) -> float:
         """Height of the ankles over the soles in m, of a foot that stands flat."""
-        link = self.map[f"{SIDES[0]}_ankle"]
-        points = self.soles(f"{SIDES[0]}_ankle")
-        return float(-rotations.rotate(self.turns_xyzw[link], points)[:, 2].min())
+        ankle = f"{SIDES[0]}_ankle"
+        points = self.soles(ankle) - self.offset(ankle)
+        return float(-rotations.rotate(self.turns_xyzw[self.map[ankle]], points)[:, 2].min())
 
     def foot_up(self, ankle: str) -> FloatArray:
         """The direction (3,) in a foot's link that is up while it stands flat."""
@@ -85,24 +135,32 @@ class TargetBody:
         """
         link = self.map[ankle]
         turn = self.turns_xyzw[link]
-        points = np.concatenate(
-            [corners(shape) for shape in self.character.links[link].collision_shapes]
+        upright = np.concatenate(
+            [
+                self.origins[row]
+                + rotations.rotate(self.turns_xyzw[row], corners(shape))
+                - self.origins[link]
+                for row in self.below(ankle)
+                for shape in self.character.links[row].collision_shapes
+            ]
             or [np.zeros((1, 3))]
         )
-        upright = rotations.rotate(turn, points)
         low, high = upright.min(axis=0), upright.max(axis=0)
         sole = np.array([(x, y, low[2]) for x in (high[0], low[0]) for y in (high[1], low[1])])
         return rotations.rotate(rotations.conjugate(turn), sole)
 
     @cached_property
     def surface(self) -> SurfacePoints:
-        """Balls for all shapes that collide: the ends of capsules, corners of boxes, spheres."""
+        """Balls for all shapes that collide: the ends of capsules, corners of boxes, spheres.
+
+        Of a character that collides with nothing they are the origins of its links.
+        """
         rows = [
             (index, point, radius)
             for index, link in enumerate(self.character.links)
             for shape in link.collision_shapes
             for point, radius in balls(shape)
-        ]
+        ] or [(index, np.zeros(3), 0.0) for index in range(len(self.character.links))]
         links, points, radii = zip(*rows, strict=True) if rows else ((), (), ())
         return SurfacePoints(
             np.array(links, dtype=np.intp),

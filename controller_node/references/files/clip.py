@@ -111,10 +111,13 @@ def clip_path(character: Character, name_or_path: str) -> Path:
     other = "" if is_file else describe_no_clip(path)
     if other:
         raise ClipError(f"{path}: not a clip but {other}")
-    if not character.clips.pattern:
-        raise ClipError(f"character '{character.name}' has no clips: its file has no key 'clips'")
     if is_file:
         return path
+    if not character.clips.pattern:
+        raise ClipError(
+            f"character '{character.name}' has no clips by name: its file has no key 'clips'; give "
+            "the path of a .json or .txt file"
+        )
     clips = available_clips(character)
     if name_or_path not in clips:
         raise ClipError(

@@ -85,7 +85,7 @@ def test_odd_names_come_from_a_file(tmp_path: Path) -> None:
 
     with pytest.raises(ClipError, match=r"no joint found for left_hip.*--map.*joints: a, Leg0"):
         find_map("a.bvh", names, parents)
-    found = find_map("a.bvh", names, parents, read_map(file))
+    found = find_map("a.bvh", names, parents, read_map(file).source)
 
     assert found["left_knee"] == 2 and found["right_elbow"] == 10 and found["pelvis"] == 0
 
