@@ -15,8 +15,8 @@ from actuated_characters.runs.execution import run_in_process, run_over_topics
 from actuated_characters.runs.plan import choose_reference, make_plan
 from actuated_characters.runs.run_directory import prepare_directory, read_metrics
 from controller_node import parameters as controller_parameters
+from controller_node.behaviours.factory import make_motion
 from controller_node.references.base import Reference
-from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, SimulationError

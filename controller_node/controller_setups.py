@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.behaviours.factory import make_motion
 from controller_node.controller import Controller
 from controller_node.parameters import commanded_joints, make_controller, make_settings
-from controller_node.references.factory import make_motion
 from msgs_config.arrays import IntArray
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character

@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from controller_node import parameters as controller_parameters
-from controller_node.behaviours.factory import choose_behaviour
+from controller_node.behaviours.factory import choose_behaviour, make_motion
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_installed, check_planning
 from controller_node.planner.settings import PREDICTIVE
 from controller_node.references.base import Motion, Reference
-from controller_node.references.factory import make_motion
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character

@@ -10,6 +10,7 @@ from geometry_msgs.msg import TwistStamped
 
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_files import Planned, read_planned
+from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import VelocityCommand
 from msgs_config.errors import ConfigurationError
@@ -45,17 +46,19 @@ def plan_velocities(plan: RunPlan, text: str) -> tuple[RunPlan, list[PlannedVelo
     """The velocities of a text `X,Y,TURN@S X,Y,TURN@S ...`, and a plan whose reference has them.
 
     Numbers are m/s ahead and to the left, rad/s to the left, and s since the first state. Each is
-    repeated until the next one, or it would time out.
+    repeated until the next one, or it would time out. What is beyond the limits of a state machine
+    is taken as far as they go, and said in the plan's warnings.
 
     Raises:
         ConfigurationError: the text is not of that form, a time is beyond the run or not after the
-            one before, a velocity is beyond the limits, or the reference is not steered.
+            one before, the reference is not steered, or a velocity is beyond its limits.
     """
     reference, rate = plan.reference, plan.simulator.integer("rate")
     if not isinstance(reference, SteeredReference):
         raise ConfigurationError("--cmd-vel steers; it goes with --reference steered")
     commands = [_parse(part, rate) for part in text.split()]
-    _check(plan, reference, commands)
+    _check_times(plan, commands)
+    commands, warnings = _allowed(plan, reference, commands)
     repeated: list[VelocityCommand] = []
     for command, following in zip(commands, [*commands[1:], None], strict=True):
         end = plan.ticks if following is None else following.tick
@@ -69,7 +72,7 @@ def plan_velocities(plan: RunPlan, text: str) -> tuple[RunPlan, list[PlannedVelo
         PlannedVelocity(clock.stamp_ns(1 + each.tick), each.forward, each.left, each.turn)
         for each in repeated
     ]
-    return replace(plan, reference=reference), planned
+    return replace(plan, reference=reference, warnings=plan.warnings + warnings), planned
 
 
 def _parse(text: str, rate_hz: int) -> VelocityCommand:
@@ -87,8 +90,8 @@ def _parse(text: str, rate_hz: int) -> VelocityCommand:
     return VelocityCommand(round(time * rate_hz), forward, left, turn)
 
 
-def _check(plan: RunPlan, reference: SteeredReference, commands: Sequence[VelocityCommand]) -> None:
-    """Raise ConfigurationError unless the commands are in order, within run and limits."""
+def _check_times(plan: RunPlan, commands: Sequence[VelocityCommand]) -> None:
+    """Raise ConfigurationError unless there are commands, in order and within the run."""
     rate = plan.simulator.integer("rate")
     if not commands:
         raise ConfigurationError(
@@ -96,19 +99,35 @@ def _check(plan: RunPlan, reference: SteeredReference, commands: Sequence[Veloci
         )
     before = -1
     for command in commands:
-        time = command.tick / rate
         if not before < command.tick < plan.ticks:
             raise ConfigurationError(
-                f"--cmd-vel: a velocity at {time:g} s; times must rise, from 0 s to less than "
-                f"{plan.ticks / rate:g} s"
+                f"--cmd-vel: a velocity at {command.tick / rate:g} s; times must rise, from 0 s to "
+                f"less than {plan.ticks / rate:g} s"
             )
         before = command.tick
-        allowed = reference.limits.clamped(command)
-        if allowed != command:
+
+
+def _allowed(
+    plan: RunPlan, reference: SteeredReference, commands: Sequence[VelocityCommand]
+) -> tuple[list[VelocityCommand], tuple[str, ...]]:
+    """The commands within the limits, and a line for each that was not, where a machine goes.
+
+    Raises:
+        ConfigurationError: one is beyond the limits, and no machine goes.
+    """
+    rate, warnings = plan.simulator.integer("rate"), []
+    allowed = [reference.limits.clamped(command) for command in commands]
+    for asked, taken in zip(commands, allowed, strict=True):
+        if asked == taken:
+            continue
+        said = f"--cmd-vel: {_text(asked)} at {asked.tick / rate:g} s is more than"
+        if plan.controller.text("behaviour") != STATE_MACHINE:
             raise ConfigurationError(
-                f"--cmd-vel: {_text(command)} at {time:g} s is more than it can, which is at most "
-                f"{_text(allowed)} (see controller_node.steering.*)"
+                f"{said} it can, which is at most {_text(taken)} (see controller_node.steering.*)"
             )
+        machine = plan.controller.text("machine")
+        warnings.append(f"{said} the machine {machine} takes; it is taken as {_text(taken)}")
+    return allowed, tuple(warnings)
 
 
 def _text(command: VelocityCommand) -> str:

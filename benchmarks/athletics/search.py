@@ -53,7 +53,9 @@ SEARCHED = (
 """Where numbers are in the file, and how far they are first moved."""
 
 FALL, SPEED, DRIFT, HEADING, EFFORT = 10.0, 4.0, 4.0, 2.0, 0.1  # of the cost's parts
-SECONDS = 8.0  # of a trial
+SECONDS = 9.0  # of a trial
+MOST_SPEED, MOST_ASIDE, MOST_TURN = 1.2, 0.3, 0.5  # m/s, m/s, rad/s, of commands
+AHEAD, ASIDE = 100.0, 50.0  # N, of pushes
 
 
 def place_of(content: dict[str, Any], path: str) -> tuple[dict[str, Any], str]:
@@ -87,23 +89,30 @@ def changed(
 
 
 def trials(rng: np.random.Generator, count: int, rate: int) -> list[Trial]:
-    """Trials at random speeds and turns, each pushed once from a random side."""
-    drawn = []
-    for number in range(count):
-        speed = float(rng.choice((0.3, 0.6, 0.9, 1.2)))
-        turn = float(rng.uniform(-0.3, 0.3)) * (number % 2)
-        angle, at = float(rng.uniform(0.0, 2.0 * np.pi)), float(rng.uniform(4.0, 5.0))
-        x, y = 120.0 * np.cos(angle), 60.0 * np.sin(angle)
-        drawn.append(
-            Trial(
-                SECONDS,
-                f"{speed:g},0,{turn:.3f}@0.5",
-                (f"root:{x:.2f},{y:.2f},0@{at:.4f}",),
-                rate,
-                {"wrench_duration": 0.2},
-            )
-        )
-    return drawn
+    """Trials at random velocities that change once, each pushed once from a random side."""
+    return [_trial(rng, rate) for _ in range(count)]
+
+
+def _trial(rng: np.random.Generator, rate: int) -> Trial:
+    first, second = _velocity(rng), _velocity(rng)
+    changes, pushed = float(rng.uniform(3.0, 6.0)), float(rng.uniform(3.0, 6.5))
+    angle = float(rng.uniform(0.0, 2.0 * np.pi))
+    x, y = AHEAD * np.cos(angle), ASIDE * np.sin(angle)
+    return Trial(
+        SECONDS,
+        f"{first}@0.5 {second}@{changes:.2f}",
+        (f"root:{x:.2f},{y:.2f},0@{pushed:.4f}",),
+        rate,
+        {"wrench_duration": 0.2},
+    )
+
+
+def _velocity(rng: np.random.Generator) -> str:
+    """A velocity as of `--cmd-vel`, of those that a machine is to walk at."""
+    speed, left, turn = rng.uniform(
+        (0.0, -MOST_ASIDE, -MOST_TURN), (MOST_SPEED, MOST_ASIDE, MOST_TURN)
+    )
+    return f"{speed:.3f},{left:.3f},{turn:.3f}"
 
 
 def cost_of(walk: Walk, seconds: float) -> float:

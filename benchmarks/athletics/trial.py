@@ -23,12 +23,21 @@ from controller_node.references.steering.reference import Course, SteeredReferen
 from msgs_config.arrays import FloatArray
 from msgs_config.character.effort_limits import EffortLimits
 from msgs_config.errors import SimulationError
+from msgs_config.geometry.single_rotations import (
+    QuaternionXyzw,
+    about_x,
+    conjugate,
+    exp,
+    multiply,
+    rotate,
+    yaw,
+)
 from msgs_config.messages.clock import TickClock
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup
 from sim_node.simulation_factory import make_settings as make_simulation_settings
 
-FALLEN = 0.55  # m: a root below it
+FALLEN, TILTED = 0.55, 1.0  # m, and rad: a root below the one, or tilted more than the other
 
 
 @dataclass(frozen=True)
@@ -100,7 +109,8 @@ def moments(trial: Trial, machine: Machine, plan: RunPlan | None = None) -> Iter
             loads = (float(contacts[feet[0], 2]), float(contacts[feet[1], 2]))
             name = str(output.phase.facts["state"])
             yield Moment(time, state.position, state.velocity, effort, course, name, loads)
-            if simulated.state.position[2] < FALLEN:
+            position = simulated.state.position
+            if position[2] < FALLEN or tilt(position) > TILTED:
                 return
 
 
@@ -112,7 +122,7 @@ class Walk:
     fell: bool
     speed: float  # m/s, mean, ahead, of the time looked at
     wanted: float  # m/s
-    drift: float  # m/s, mean, to the left
+    drift: float  # m/s, mean, to the left, beside the commanded velocity
     heading_error: float  # rad, mean size, of the way that the root faces
     effort: float  # mean of squares of efforts over limits
 
@@ -136,7 +146,7 @@ def walked(
         cosine, sine = math.cos(moment.course.heading), math.sin(moment.course.heading)
         vx, vy = moment.velocity[:2].tolist()
         ahead += cosine * vx + sine * vy
-        aside += cosine * vy - sine * vx
+        aside += cosine * vy - sine * vx - moment.course.left
         wanted += moment.course.forward
         turned += abs(_heading_error(moment))
         effort += float(np.sum(moment.effort[6:] ** 2)) / 1e4
@@ -145,11 +155,20 @@ def walked(
     return Walk(last, fell, ahead * mean, wanted * mean, aside * mean, turned * mean, effort * mean)
 
 
-def _heading_error(moment: Moment) -> float:
-    from msgs_config.geometry.single_rotations import about_x, conjugate, exp, multiply, yaw
+def _against_standing(position: FloatArray) -> QuaternionXyzw:
+    """How the humanoid's root (n,) is turned against standing, facing along x."""
+    x, y, z = position[3:6].tolist()
+    return multiply(exp((x, y, z)), conjugate(about_x(0.5 * math.pi)))
 
-    x, y, z = moment.position[3:6].tolist()
-    facing = yaw(multiply(exp((x, y, z)), conjugate(about_x(0.5 * math.pi))))
+
+def tilt(position: FloatArray) -> float:
+    """The angle of the humanoid's root (n,) from upright, rad."""
+    _, _, up = rotate(_against_standing(position), (0.0, 0.0, 1.0))
+    return math.acos(min(max(up, -1.0), 1.0))
+
+
+def _heading_error(moment: Moment) -> float:
+    facing = yaw(_against_standing(moment.position))
     return math.remainder(facing - moment.course.heading, math.tau)
 
 

@@ -2,7 +2,9 @@
 
 from controller_node.behaviours import reaction_factory  # noqa: F401  registers its own
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
-from controller_node.behaviours.state_machine import factory as state_machine  # noqa: F401  as well
+from controller_node.behaviours.state_machine import factory as state_machine
+from controller_node.references import factory
+from controller_node.references.base import Motion
 from msgs_config.character.model import Character
 from msgs_config.parameters import Parameter, Values
 
@@ -16,6 +18,15 @@ BEHAVIOUR_PARAMETERS = [
     ),
     *BEHAVIOURS.parameters,
 ]
+
+
+def make_motion(character: Character, values: Values) -> Motion:
+    """The motion that the parameters' values name, commanded as far as the behaviour can go.
+
+    Raises:
+        ActuatedCharactersError: a file or a name does not exist, or does not fit the character.
+    """
+    return state_machine.limited(factory.make_motion(character, values), values)
 
 
 def choose_behaviour(character: Character, values: Values) -> BehaviourChoice:

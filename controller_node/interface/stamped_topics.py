@@ -29,7 +29,7 @@ class StampedTopics:
     def __init__(
         self, node: Node, controller: Controller, outputs: Publishers, logger: OnceLogger
     ) -> None:
-        self._outputs = outputs
+        self._outputs, self._logger = outputs, logger
         self._subscribe = partial(StampedSubscription, node, rejection="refused ", logger=logger)
         self._trajectories = self._subscribe(topics.JOINT_TRAJECTORY, use=self._set_trajectory)
         self._velocities: list[StampedSubscription] = []
@@ -106,12 +106,17 @@ class StampedTopics:
         clock = self._controller.clock
         start_ns = clock.stamp_ns(clock.first_tick_from(start_ns))
         linear, angular = velocity.linear, velocity.angular
+        asked = (linear.x, linear.y, angular.z)
         command = self._controller.steer(
-            (linear.x, linear.y, angular.z),
-            start_ns=start_ns,
-            now_ns=self._now_ns,
-            episode_ns=self._episode_ns,
+            asked, start_ns=start_ns, now_ns=self._now_ns, episode_ns=self._episode_ns
         )
+        taken = (command.forward, command.left, command.turn)
+        if taken != asked:
+            self._logger.log_once(
+                f"cmd_vel: {_listed(asked)} is more than it can, and is taken as {_listed(taken)} "
+                "(m/s ahead, m/s and rad/s to the left); others beyond its limits likewise",
+                kind="clamped",
+            )
         self._outputs.publish_velocity(command, start_ns)
 
     def _set_strengths(self, raw: bytes) -> None:
@@ -121,3 +126,7 @@ class StampedTopics:
         strengths = strengths_of(layout, tuple(message.name), tuple(message.effort), start_ns)
         self._controller.set_strengths(strengths, episode_ns=self._episode_ns)
         self._outputs.publish_strengths(strengths)
+
+
+def _listed(velocity: tuple[float, float, float]) -> str:
+    return ", ".join(f"{number:g}" for number in velocity)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from controller_node.behaviours.state_machine.support import Bounds
+from controller_node.references.steering.velocity import VelocityRegion
 from msgs_config.geometry.single_rotations import Vector
 
 STANCE, SWING = "stance", "swing"
@@ -19,6 +20,8 @@ HIP, CENTRE = "hip", "centre"
 
 BALANCE = "balance"
 """The effort of a stance hip that keeps the torso, by SIMBICON's balance of torques."""
+
+_WITHOUT_LIMITS = VelocityRegion()
 
 Gains = tuple[float, float]
 """Of an error and of its rate: 1/s^2 and 1/s of the root, N m/rad and N m s/rad of a joint."""
@@ -168,6 +171,13 @@ class State:
     tracks: bool = False  # by the control law and its gains, not by inverse dynamics
 
     @property
+    def step_time(self) -> float:
+        """When a foot that steps meets an even ground, s: later where its way ends above it."""
+        placement = self.placement
+        late = -placement.depth / placement.descent if placement.descent > 0.0 else 0.0
+        return self.duration + max(late, 0.0)
+
+    @property
     def standing(self) -> tuple[str, ...]:
         """The roles of the feet that carry."""
         return tuple(role for role in (STANCE, SWING) if self.feet[role] == STAND)
@@ -182,7 +192,7 @@ class Machine:
     start: str
     states: dict[str, State]
     acceleration: float = 1e9  # m/s^2, at which it takes over commanded velocities
-    speed: float = 1e9  # m/s, ahead and sideways, the largest that it takes over
+    limits: VelocityRegion = _WITHOUT_LIMITS  # of the velocities that it takes
 
     def joint(self, name: str, stance: str) -> str:
         """The character's joint of a name in a target, where a side is the stance side."""

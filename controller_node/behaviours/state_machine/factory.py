@@ -1,5 +1,6 @@
 """The behaviour `state_machine`, as the parameters' values say."""
 
+from dataclasses import replace
 from functools import partial
 
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
@@ -12,6 +13,8 @@ from controller_node.behaviours.state_machine.leg import make_leg, standing_fram
 from controller_node.behaviours.state_machine.machine import MachineKit, StateMachine
 from controller_node.behaviours.state_machine.pose import PoseMaker
 from controller_node.planner.settings import NO_PLANNER
+from controller_node.references.base import Motion
+from controller_node.references.steering.reference import SteeredReference
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
@@ -29,6 +32,19 @@ def _state_machine(character: Character, values: Values) -> BehaviourChoice:
     _check(character, values)
     kit = make_kit(character, values)
     return BehaviourChoice(partial(StateMachine, kit), needs_contacts=True, makes_effort=True)
+
+
+def limited(motion: Motion, values: Values) -> Motion:
+    """A motion for the behaviour of the values: a machine's limits are those of its commands.
+
+    Raises:
+        ConfigurationError: there is no such machine, or its file is wrong.
+    """
+    steered = motion.reference
+    if values.text("behaviour") != STATE_MACHINE or not isinstance(steered, SteeredReference):
+        return motion
+    machine = read_machine(values.text("machine"))
+    return replace(motion, reference=steered.within(machine.limits))
 
 
 def make_kit(character: Character, values: Values) -> MachineKit:

@@ -3,6 +3,7 @@
 `docs/state_machines.md` has its keys.
 """
 
+import math
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from controller_node.behaviours.state_machine.description import (
 )
 from controller_node.behaviours.state_machine.laws import PLACEMENT_LAWS
 from controller_node.behaviours.state_machine.support import Bounds
+from controller_node.references.steering.velocity import VelocityRegion
 from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.file_kinds import refuse_other_kind
@@ -37,7 +39,7 @@ from msgs_config.mappings import MappingReader
 
 MACHINES_DIRECTORY = Path(__file__).parent / "data"
 _KEYS = [
-    *("sides", "start", "includes", "joins", "acceleration", "speed", "gains", "bounds"),
+    *("sides", "start", "includes", "joins", "acceleration", "limits", "gains", "bounds"),
     "states",
 ]
 _STATE_KEYS = [
@@ -115,8 +117,20 @@ def make_machine(path: Path, content: dict[str, Any], depth: int = _DEPTH) -> Ma
     acceleration = reader.number("acceleration", 1e9, 1e-3, 1e9)
     if not states:
         raise reader.wrong("states", content.get("states"), "a mapping of one state or more")
-    speed = reader.number("speed", 1e9, 1e-3, 1e9)
-    return Machine(path, sides, reader.text("start"), states, acceleration, speed)
+    limits = _limits(reader.part("limits"))
+    return Machine(path, sides, reader.text("start"), states, acceleration, limits)
+
+
+def _limits(reader: MappingReader) -> VelocityRegion:
+    """The velocities that a machine takes, m/s and rad/s; what is not said has no limit."""
+    names = [field.name for field in fields(VelocityRegion)]
+    reader.check_keys(names)
+    return VelocityRegion(
+        *(
+            reader.number(name, 0.0, 0.0, 1e3) if name in reader.content else math.inf
+            for name in names
+        )
+    )
 
 
 def _beside(path: Path, name: str) -> Path:

@@ -13,6 +13,11 @@ from controller_node.behaviours.state_machine.description import (
 )
 from controller_node.behaviours.state_machine.leg import FootPose, Leg
 from controller_node.behaviours.state_machine.situation import Situation
+from controller_node.behaviours.state_machine.stepping import (
+    landing_offset,
+    least_beside,
+    nominal_centre,
+)
 from controller_node.behaviours.state_machine.support import Contact
 from controller_node.references.steering.velocity import within
 from msgs_config.geometry.single_rotations import (
@@ -51,21 +56,14 @@ def _limits(leg: Leg, sole: float) -> tuple[float, float]:
 
 def _pressure_on_one(state: State, at: Situation, time: float) -> tuple[float, float]:
     """The centre of pressure that leads the extrapolated centre of mass back to its course."""
-    wanted, rate, step_time = state.pressure, at.rate, state.duration
-    grown = math.exp(rate * min(time, step_time))
-    course, width = at.course, state.placement.width
-    nominal = (
-        laws.offset_of_speed(course.forward, step_time, rate) * grown,
-        (
-            at.mirror * laws.offset_of_width(width, step_time, rate)
-            + laws.offset_of_speed(course.left, step_time, rate)
-        )
-        * grown,
+    wanted, nominal, there = (
+        state.pressure,
+        nominal_centre(state, at.course, at.rate, at.mirror, time),
+        at.extrapolated,
     )
-    there = at.extrapolated
-    x = wanted.ahead + wanted.gain * (there[0] - nominal[0])
-    x += wanted.speed_gain * (at.velocity[0] - state.placement.pace * course.forward)
-    y = -at.mirror * wanted.outward + wanted.side_gain * (there[1] - nominal[1])
+    x = wanted.ahead + wanted.gain * (there[0] - nominal.real)
+    x += wanted.speed_gain * (at.velocity[0] - state.placement.pace * at.course.forward)
+    y = -at.mirror * wanted.outward + wanted.side_gain * (there[1] - nominal.imag)
     return x, y
 
 
@@ -95,13 +93,13 @@ def _on_both(
 
 def landing(state: State, at: Situation, time: float, pressure: Vector) -> tuple[float, float]:
     """Where the swing foot is to land; from the stance sole, as is the centre of pressure."""
-    law, step_time, rate, course = state.placement, state.duration, at.rate, at.course
+    law, step_time, rate, course = state.placement, state.step_time, at.rate, at.course
     (x, vx), (y, vy) = at.later(pressure, step_time - time)
     forward = law.pace * course.forward
     if law.law == "extrapolated":
-        x += vx / rate - laws.offset_of_speed(forward, step_time, rate)
-        y += vy / rate - laws.offset_of_speed(course.left, step_time, rate)
-        y += at.mirror * laws.offset_of_width(law.width, step_time, rate)
+        offset = landing_offset(state, course, rate, -at.mirror)
+        offset *= laws.turned(max(step_time - time, 0.0) * course.turn)
+        x, y = x + vx / rate - offset.real, y + vy / rate - offset.imag
     elif law.law == "neutral":
         x += laws.neutral_placement(vx, forward, step_time, law.gain)
         y += laws.neutral_placement(vy, course.left, step_time, law.gain)
@@ -117,7 +115,7 @@ def landing(state: State, at: Situation, time: float, pressure: Vector) -> tuple
 
 def reachable(law: Placement, x: float, y: float, mirror: float) -> tuple[float, float]:
     """The nearest place at which the feet neither cross nor straddle."""
-    beside = min(max(mirror * y, law.least_width), law.most_width)
+    beside = min(max(mirror * y, least_beside(law, x)), law.most_width)
     return min(max(x, -law.most_behind), law.most_ahead), mirror * beside
 
 
@@ -143,11 +141,26 @@ class SwingFoot:
         low += law.clearance * laws.clearance(share)
         low -= law.descent * max(time - state.duration, 0.0)
         place = [self.start[axis] + moved * (end[axis] - self.start[axis]) for axis in (0, 1)]
-        turn = self._yaw(at, moved, max(state.duration - time, 0.0))
+        away = self._way_around(at, law, goal) * laws.clearance(moved)
+        aside = in_world(at.course.heading, (0.0, at.mirror * away, 0.0))
+        place = [place[axis] + aside[axis] for axis in (0, 1)]
+        turn = self._yaw(at, moved, max(state.step_time - time, 0.0) + 0.5 * state.step_time)
         return FootPose((place[0], place[1], low), about_z(turn))
 
+    def _way_around(self, at: Situation, law: Placement, goal: tuple[float, float]) -> float:
+        """How far from the straight way it goes at its middle, m, to pass the stance leg."""
+        x, y, _ = at.local(self.start)
+        share = x / (x - goal[0]) if x * goal[0] < 0.0 else 0.0
+        if not 0.0 < share < 1.0:
+            return 0.0
+        beside = at.mirror * (y + share * (goal[1] - y))
+        return max(law.least_width - beside, 0.0) / max(laws.clearance(share), 0.5)
+
     def _yaw(self, at: Situation, moved: float, rest: float) -> float:
-        """The way that the foot faces, rad, on its way to the heading that will be."""
+        """The way that the foot faces, rad, on its way to the heading `rest` s from now.
+
+        That is the middle of the time that it will stand: its hip then turns to either side.
+        """
         there = at.course.heading + rest * at.course.turn
         return _turned(self.start_yaw, there, moved)
 

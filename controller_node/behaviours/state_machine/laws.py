@@ -81,20 +81,44 @@ def extrapolated_later(centre: float, support: float, rate: float, time: float) 
     return support + (centre - support) * math.exp(rate * time)
 
 
-def offset_of_speed(speed: float, step_time: float, rate: float) -> float:
-    """How far behind the extrapolated centre of mass a foot lands to walk at a speed, m.
+def offset_of_velocity(
+    velocity: complex,  # m/s: ahead + 1j * to the left
+    turn: float,  # rad/s, to the left
+    step_time: float,  # s
+    rate: float,  # 1/s
+) -> complex:
+    """How far off a foot the extrapolated centre of mass is as it lands, m, to go on like that.
 
-    `b = v T / (exp(w T) - 1)`. Source: Hof 2008, equation 14.
+    Axes are ahead (real) and to the left (imaginary) of the heading at that moment. Each step turns
+    the heading by `r = exp(i omega T)` and goes `s`, the chord of the body's way; the offset `c`
+    is that of the next step as well, turned with it: `c exp(w T) - r c = s`, so
+    `c = s / (exp(w T) - r)`. Without a turn it is `v T / (exp(w T) - 1)`.
+    Source: Hof 2008, equations 5 and 14, in axes that turn.
     """
-    return speed * step_time / (math.exp(rate * step_time) - 1.0)
+    angle = turn * step_time
+    chord = velocity * step_time * _sinc(0.5 * angle) * turned(0.5 * angle)
+    return chord / (math.exp(rate * step_time) - turned(angle))
 
 
-def offset_of_width(width: float, step_time: float, rate: float) -> float:
-    """How far outside the extrapolated centre of mass a foot lands to walk with a step width, m.
+def offset_of_width(width: float, turn: float, step_time: float, rate: float) -> complex:
+    """How far inside of a foot the extrapolated centre of mass is as it lands, m, by a step width.
 
-    `b = w / (exp(w T) + 1)`. Source: Hof 2008, equation 17.
+    Axes and source as of `offset_of_velocity`, for a right foot; a left one has the other sign. The
+    feet are beside the heading of the middle of their time on the ground: `d exp(w T) + r d = s`.
+    Without a turn it is `i w / (exp(w T) + 1)`: Hof 2008, equation 17.
     """
-    return width / (math.exp(rate * step_time) + 1.0)
+    angle = turn * step_time
+    apart = 1j * width * math.cos(0.5 * angle) * turned(angle)
+    return apart / (math.exp(rate * step_time) + turned(angle))
+
+
+def turned(angle: float) -> complex:
+    """What turns a horizontal direction, as a complex number, by an angle in rad to the left."""
+    return complex(math.cos(angle), math.sin(angle))
+
+
+def _sinc(angle: float) -> float:
+    return math.sin(angle) / angle if abs(angle) > 1e-6 else 1.0
 
 
 def arrival_acceleration(way: float, speed: float, last_speed: float, time: float) -> float:

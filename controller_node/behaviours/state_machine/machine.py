@@ -115,24 +115,20 @@ class StateMachine:
         return BehaviourOutput(self._phase, self._target, gains, effort)
 
     def _followed(self, course: Course) -> Course:
-        """A course whose velocity is taken over as far and as fast as the machine can."""
-        machine, before = self._kit.machine, self._course
-        most = machine.acceleration * self._kit.period
-        forward = within(course.forward, machine.speed)
-        left = within(course.left, machine.speed)
+        """A course whose velocity is taken over as fast as the machine can."""
+        before, most = self._course, self._kit.machine.acceleration * self._kit.period
         return replace(
             course,
-            forward=before.forward + within(forward - before.forward, most),
-            left=before.left + within(left - before.left, most),
+            forward=before.forward + within(course.forward - before.forward, most),
+            left=before.left + within(course.left - before.left, most),
         )
 
     def _go_on(self, now: float, at: Situation) -> Situation:
         """Go over to the next state if the present one ends: once a tick at most."""
         kit, time = self._kit, now - self._since
-        progress = time / self._state.duration
 
         def holds(condition: Condition) -> bool:
-            return condition.holds(quantity(condition.quantity, at, time, progress, kit.legs))
+            return condition.holds(quantity(condition.quantity, at, self._state, time, kit.legs))
 
         for end in self._state.ends:
             if all(map(holds, end.conditions)):

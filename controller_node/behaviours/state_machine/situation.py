@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 from controller_node.behaviours.state_machine import laws
 from controller_node.behaviours.state_machine.body import Body, Foot, in_frame, in_world
+from controller_node.behaviours.state_machine.description import STEP, State
 from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.behaviours.state_machine.stepping import sway_of_course
 from controller_node.references.steering.reference import Course
 from msgs_config.geometry.single_rotations import Vector, add, subtract
 
@@ -89,14 +91,14 @@ def situation_of(body: Body, course: Course, stance: str, swing: str, gravity: f
     )
 
 
-def quantity(name: str, at: Situation, time: float, progress: float, legs: dict[str, Leg]) -> float:
+def quantity(name: str, at: Situation, state: State, time: float, legs: dict[str, Leg]) -> float:
     """A quantity of `QUANTITIES` in a situation, `time` s after its state began."""
     stance, swing = at.foot(at.stance), at.foot(at.swing)
     course = at.course
     if name == "time":
         return time
     if name == "progress":
-        return progress
+        return time / state.duration
     if name == "stance_load":
         return stance.load
     if name == "swing_load":
@@ -116,8 +118,16 @@ def quantity(name: str, at: Situation, time: float, progress: float, legs: dict[
     if name == "command_ahead":
         return course.forward
     if name == "sway":
-        return at.extrapolated[1] * at.mirror
+        return _sway(at, state, time)
     return _imbalance(at, legs[at.stance])
+
+
+def _sway(at: Situation, state: State, time: float) -> float:
+    """The extrapolated centre of mass from the stance sole towards the other, as of going ahead."""
+    sway = at.extrapolated[1] * at.mirror
+    if STEP in state.feet.values():
+        sway -= sway_of_course(state, at.course, at.rate, at.mirror, time)
+    return sway
 
 
 def _imbalance(at: Situation, leg: Leg) -> float:

@@ -9,7 +9,12 @@ import numpy as np
 
 from controller_node.references.base import ReferenceState
 from controller_node.references.steering.gait import Gait
-from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
+from controller_node.references.steering.velocity import (
+    SteeringLimits,
+    VelocityCommand,
+    VelocityRegion,
+    within,
+)
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
@@ -117,6 +122,11 @@ class SteeredReference:
             commands=[*before, command],
         )
         return Steered(reference, command, self._end_of_likeness(command))
+
+    def within(self, region: VelocityRegion) -> "SteeredReference":
+        """One that has no command yet, and takes them within a region."""
+        limits = self.limits.narrowed(region)
+        return SteeredReference(self._character, self._gait, limits, rate_hz=self._rate)
 
     def _end_of_likeness(self, command: VelocityCommand) -> int:
         """The first tick at which a command makes a difference."""

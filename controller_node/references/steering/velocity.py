@@ -1,5 +1,6 @@
 """Commanded velocities, and the limits that they are kept within."""
 
+import math
 from dataclasses import dataclass, replace
 
 _BACKWARD, _SIDEWAYS = 0.6, 0.3  # m/s, at most
@@ -20,6 +21,16 @@ class VelocityCommand:
 
 
 @dataclass(frozen=True)
+class VelocityRegion:
+    """The largest velocities that a character can go at, all of them together."""
+
+    ahead: float = math.inf  # m/s
+    back: float = math.inf  # m/s
+    aside: float = math.inf  # m/s, to either side
+    turn: float = math.inf  # rad/s, likewise
+
+
+@dataclass(frozen=True)
 class SteeringLimits:
     """How fast it may go, how fast that changes, and how long a command holds."""
 
@@ -29,15 +40,30 @@ class SteeringLimits:
     turn_rate: float  # rad/s
     turn_acceleration: float  # rad/s^2
     timeout: float  # s
+    region: VelocityRegion = VelocityRegion(back=_BACKWARD, aside=_SIDEWAYS)
 
     def clamped(self, command: VelocityCommand) -> VelocityCommand:
         """The nearest command within the limits."""
         return VelocityCommand(
             command.tick,
-            min(max(command.forward, -min(_BACKWARD, self.speed)), self.speed),
-            within(command.left, min(_SIDEWAYS, self.speed)),
-            within(command.turn, self.turn_rate),
+            min(
+                max(command.forward, -min(self.region.back, self.speed)),
+                min(self.region.ahead, self.speed),
+            ),
+            within(command.left, min(self.region.aside, self.speed)),
+            within(command.turn, min(self.region.turn, self.turn_rate)),
         )
+
+    def narrowed(self, region: VelocityRegion) -> "SteeringLimits":
+        """The limits that keep a command within a region as well."""
+        own = self.region
+        both = VelocityRegion(
+            min(own.ahead, region.ahead),
+            min(own.back, region.back),
+            min(own.aside, region.aside),
+            min(own.turn, region.turn),
+        )
+        return replace(self, region=both)
 
     def approach(self, speed: float, wanted: float, period: float) -> float:
         """The speed in m/s that is nearest to a wanted one after a period in s."""

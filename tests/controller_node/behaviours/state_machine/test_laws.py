@@ -1,5 +1,6 @@
 """The laws of balance, against the motion of the pendulum that they are made for."""
 
+import cmath
 import math
 
 import numpy as np
@@ -11,9 +12,10 @@ GRAVITY, HEIGHT, STEP_TIME = 9.81, 0.85, 0.4
 RATE = laws.pendulum_rate(HEIGHT, GRAVITY)
 
 
-def falls(place: float, speed: float, foot: float, time: float) -> tuple[float, float]:
+def falls(
+    place: float, speed: float, foot: float, time: float, count: int = 20_000
+) -> tuple[float, float]:
     """Place and speed of a linear inverted pendulum after a time, by small steps."""
-    count = 20_000
     step = time / count
     for _ in range(count):
         half = speed + 0.5 * step * RATE * RATE * (place - foot)
@@ -41,24 +43,35 @@ def test_the_extrapolated_centre_is_where_the_pendulum_takes_it() -> None:
     assert laws.extrapolated_centre(place, speed, RATE) == pytest.approx(later, rel=1e-6)
 
 
-@pytest.mark.parametrize("speed", [0.0, 0.4, 1.2])
-def test_steps_by_the_offsets_of_speed_and_width_repeat(speed: float) -> None:
-    """A pendulum that steps by them goes on at the speed, however it began: Hof's two results."""
-    width, x, y = 0.2, (0.0, 0.9), (0.05, -0.1)
-    foot, side = (0.0, 0.0), 1.0
-    track: list[tuple[float, float]] = []
-    for _ in range(40):
-        x, y = falls(*x, foot[0], STEP_TIME), falls(*y, foot[1], STEP_TIME)
-        foot = (
-            laws.extrapolated_centre(*x, RATE) - laws.offset_of_speed(speed, STEP_TIME, RATE),
-            laws.extrapolated_centre(*y, RATE)
-            + side * laws.offset_of_width(width, STEP_TIME, RATE),
-        )
-        track.append(foot)
+@pytest.mark.parametrize("turn", [0.0, 0.5, -1.0])
+@pytest.mark.parametrize("velocity", [0j, 0.4 + 0j, 1.2 + 0.3j, -0.3 - 0.2j])
+def test_steps_by_the_offsets_of_velocity_and_width_repeat_along_the_bend(
+    velocity: complex, turn: float
+) -> None:
+    """A pendulum that steps by them goes on like that, however it began.
+
+    Hof's two results, and their like where the heading turns at an even rate.
+    """
+    width, steps = 0.2, 30
+    x, y, feet, side = (0.0, 0.9), (0.05, -0.1), [0j], 1.0
+
+    def heading(step: float) -> complex:
+        return cmath.exp(1j * turn * STEP_TIME * step)
+
+    for step in range(1, steps + 1):
+        x = falls(*x, feet[-1].real, STEP_TIME, 1000)
+        y = falls(*y, feet[-1].imag, STEP_TIME, 1000)
+        centre = laws.extrapolated_centre(*x, RATE) + 1j * laws.extrapolated_centre(*y, RATE)
+        offset = laws.offset_of_velocity(velocity, turn, STEP_TIME, RATE)
+        offset -= side * laws.offset_of_width(width, turn, STEP_TIME, RATE)
+        feet.append(centre - heading(step) * offset)
         side = -side
-    length = track[-1][0] - track[-2][0]
-    assert length / STEP_TIME == pytest.approx(speed, abs=1e-4)
-    assert abs(track[-1][1] - track[-2][1]) == pytest.approx(width, abs=1e-4)
+
+    # between the last two landings, of which the first one's foot is on `side`
+    way = velocity * sum(STEP_TIME / 1000 * heading(steps - 1 + k / 1000) for k in range(1000))
+    beside = side * 0.5j * width
+    across = beside * (heading(steps - 0.5) + heading(steps + 0.5))
+    assert abs(feet[-1] - feet[-2] - (way - across)) < 2e-4
 
 
 def test_the_neutral_point_keeps_the_speed() -> None:
