@@ -18,6 +18,7 @@ from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import make_motion
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
+from msgs_config.character.followers import check_undriven
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedReference, StampedState
@@ -286,7 +287,8 @@ class Simulation:
         """Apply an effort (n,) for one tick, clipped to its limits; the state that follows.
 
         Raises:
-            ConfigurationError: the effort has another shape, or is not of numbers.
+            ConfigurationError: the effort has another shape, is not of numbers, or drives a joint
+                that mimics another.
             SimulationError: the state has diverged; the message names the degree of freedom.
             ClosedError: the simulation is closed.
         """
@@ -298,6 +300,7 @@ class Simulation:
                 f"({self.character.layout.size},), one entry a degree of freedom"
             )
         (one,) = self._simulation.characters
+        check_undriven(self.character, effort)
         if one.state.effort is None:
             self._hash.add(one.state)
         pushes = self._pushes.take(self._simulation.tick)

@@ -280,7 +280,7 @@ class Controller:
             self.planner.change_reference(since)
 
     def _effort(self, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-        """The effort (n,) of law, behaviour and balance, within the limits."""
+        """The effort (n,) of law, behaviour and balance, within the limits; a follower has none."""
         effort = self._law(tracking, gains)
         if tracking.effort is not None:
             effort = effort + tracking.effort
@@ -290,6 +290,8 @@ class Controller:
             effort = effort + self._balance.effort(
                 self._model, self._settings.balance, with_bias=bias
             )
+        if self._character.coupling:
+            effort = self._character.coupling.effort(effort)
         if self._limits.values is not gains.effort_limits:
             self._limits = EffortLimits(self.layout, gains.effort_limits)
         return self._limits.clipped(effort)

@@ -111,6 +111,8 @@ def character_parameters(
     parameters = []
     planned = character.planning.gains if given.get("planner", NO_PLANNER) != NO_PLANNER else {}
     for name, limit in zip(character.vector_names, character.effort_limits(), strict=True):
+        if name in character.layout.followers:
+            continue  # no motor drives it
         gains = planned.get(name, character.gains[name])
         for kind, (field, description, unit) in _GAINS.items():
             described = description.format(name)
@@ -144,25 +146,28 @@ def character_parameters(
 
 def make_gains(character: Character, values: Values) -> GainArrays:
     """The gains of the law, scaled, and the effort limits that the parameters' values say."""
-    names = character.vector_names
+    names, followers = character.vector_names, character.layout.followers
     scales = {"p": values.number("gain_scale.p"), "d": values.number("gain_scale.d"), "i": 1.0}
     root = float(_assists(values))
     gains = {}
     for kind, (field, _, _) in _GAINS.items():
         scaled = [
             (root if name in _ROOT_VECTORS else scales[kind])
-            * values.number(f"gains.{name}.{kind}")
+            * (0.0 if name in followers else values.number(f"gains.{name}.{kind}"))
             for name in names
         ]
         gains[field] = np.repeat(np.array(scaled), character.layout.vector_lengths)
-    limits = [values.number(f"effort_limit.{name}") for name in names]
+    limits = [
+        np.inf if name in followers else values.number(f"effort_limit.{name}") for name in names
+    ]
     return GainArrays(**gains, effort_limits=np.array(limits))
 
 
 def make_settings(character: Character, values: Values) -> ControllerSettings:
     """Law, gains and limits that the parameters' values say."""
+    undriven = {*_ROOT_VECTORS, *character.layout.followers}
     strengths = [
-        1.0 if name in _ROOT_VECTORS else values.number(f"strength.{name}")
+        1.0 if name in undriven else values.number(f"strength.{name}")
         for name in character.vector_names
     ]
     balance = None

@@ -101,9 +101,20 @@ class TrackedReference:
         """The reference's states from a tick on, at least its own."""
         if self._together is None:
             time = self.time(tick)
-            return [(time, self._reference.sample(time))]
+            return [(time, self._coupled(self._reference.sample(time)))]
         times = [self.time(each) for each in range(tick, tick + _TOGETHER)]
-        return list(zip(times, self._together.samples(times), strict=True))
+        return list(zip(times, map(self._coupled, self._together.samples(times)), strict=True))
+
+    def _coupled(self, state: ReferenceState) -> ReferenceState:
+        """A state of the reference with the followers where their leaders are."""
+        coupling, configuration = self._character.coupling, state.configuration
+        if not coupling:
+            return state
+        return ReferenceState(
+            replace(configuration, position=coupling.position(configuration.position)),
+            coupling.velocity(state.velocity),
+            coupling.velocity(state.acceleration),
+        )
 
     def desired(self, time: float, own: ReferenceState) -> ReferenceState:
         """The state to track, where the reference's own at that time is known."""
@@ -115,7 +126,7 @@ class TrackedReference:
     def desired_at(self, tick: int) -> ReferenceState:
         """The state to track at a tick, counted from the episode's first state."""
         time = self._clock.time_after(tick)
-        return self.desired(time, self._reference.sample(time))
+        return self.desired(time, self._coupled(self._reference.sample(time)))
 
 
 def _sampled_together(reference: Reference) -> SampledTogether | None:

@@ -28,7 +28,7 @@ from sim_node.interface.simulator_publisher import SimulatorPublisher
 from sim_node.interface.world_interface import WorldInterface
 from sim_node.node_settings import make_node_settings
 from sim_node.parameters import SimulatorParameters, load_parameters
-from sim_node.physics.probe import probe_engine
+from sim_node.physics.probe import measure_probe
 from sim_node.simulation_factory import change_world, make_simulation
 from sim_node.timing.flow_control import FlowControl
 from sim_node.timing.lockstep import CommandStatus
@@ -71,11 +71,10 @@ class SimNode(ComposableNode):
         self._run_services = Services(self, self._control, self._resume, self._reset)
 
     def _build_simulation(self, loaded: SimulatorParameters) -> None:
-        """Build the world, with the inverse mass matrices that the probes of the engine measure."""
+        """Build the world, and probe the engine."""
         gravity = loaded.values.number("gravity")
-        probes = [probe_engine(each.character, gravity) for each in loaded.characters]
-        self._samples = [sample for sample, _ in probes]
-        self._simulation = make_simulation(loaded, [inverse_mass for _, inverse_mass in probes])
+        self._samples = [measure_probe(each.character, gravity) for each in loaded.characters]
+        self._simulation = make_simulation(loaded)
         self._initial_states = InitialStates(self, self._simulation.characters, loaded)
 
     def _open_topics(self) -> None:

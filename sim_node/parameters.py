@@ -185,7 +185,7 @@ def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
         values = resolve(PARAMETERS + character_parameters(character), given)
         check_given(values, given)
         FrameNames.of(values).check(character)
-        character.layout.mask(values.texts("commanded_joints"))  # they exist
+        character.check_driven(values.texts("commanded_joints"))
     except (ConfigurationError, LayoutError) as error:
         raise ConfigurationError(f"character '{name}': {error}" if name else str(error)) from error
     return CharacterParameters(name, character, values)

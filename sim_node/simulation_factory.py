@@ -1,11 +1,9 @@
 """Makes the simulation that the parameters of `sim_node` say."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from msgs_config import files
-from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.character.urdf.check import check_urdf
 from msgs_config.character.urdf.source import read_urdf_text
@@ -14,44 +12,32 @@ from msgs_config.parameters import Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
 from sim_node.initial_state import POSITION, VELOCITY
 from sim_node.parameters import SimulatorParameters
-from sim_node.physics.probe import measure_inverse_mass
 from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.world import WorldSettings
 from sim_node.world_parameters import CONTACT_BREAKING_THRESHOLD
 
 
-def make_simulation(
-    parameters: SimulatorParameters, inverse_masses: Sequence[FloatArray | None] | None = None
-) -> Simulation:
-    """The simulation of all characters; `inverse_masses` as `make_character_setup` takes them.
+def make_simulation(parameters: SimulatorParameters) -> Simulation:
+    """The simulation of all characters.
 
     Raises:
         CharacterError: the engine rejects a character, or the terrain's URDF cannot be read.
     """
-    characters = parameters.characters
     setups = [
-        make_character_setup(each.character, each.values, each.name, inverse_mass)
-        for each, inverse_mass in zip(
-            characters, inverse_masses or [None] * len(characters), strict=True
-        )
+        make_character_setup(each.character, each.values, each.name)
+        for each in parameters.characters
     ]
     return Simulation(setups, make_settings(parameters.values))
 
 
-def make_character_setup(
-    character: Character, values: Values, name: str = "", inverse_mass: FloatArray | None = None
-) -> CharacterSetup:
-    """The character's part in the simulation that the parameters' values say.
-
-    `inverse_mass` (n, n) is the inverse mass matrix near the rest pose, if it was measured before.
-    """
+def make_character_setup(character: Character, values: Values, name: str = "") -> CharacterSetup:
+    """The character's part in the simulation that the parameters' values say."""
     return CharacterSetup(
         character=character,
         commanded_joints=values.texts("commanded_joints"),
         initial_position=values.numbers(POSITION),
         initial_velocity=values.numbers(VELOCITY),
-        inverse_mass=measure_inverse_mass(character) if inverse_mass is None else inverse_mass,
         name=name,
     )
 

@@ -22,7 +22,6 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from sim_node.physics.passive_forces import PassiveForces
-from sim_node.physics.probe import measure_inverse_mass
 from sim_node.physics.wrenches import ExternalWrench
 
 _NEAR = 1e-4
@@ -38,7 +37,7 @@ class MotionResidual:
     applied: FloatArray  # f
     contact: FloatArray  # J^T w
     pushed: FloatArray  # J^T p
-    limited: BoolArray  # (n,) whether the joint is at its limit at the tick's end
+    limited: BoolArray  # (n,) whether it is at its limit at the tick's end, rubs or is coupled
 
     @property
     def residual(self) -> FloatArray:
@@ -72,7 +71,8 @@ class EquationOfMotion:
         self._model = DynamicsModel(character, gravity)
         self._damping = character.passive_damping()
         self._lower, self._upper = character.position_bounds()
-        self._passive = PassiveForces(character, self._period, measure_inverse_mass(character))
+        self._passive = PassiveForces(character, self._period, gravity)
+        self._constrained = _constrained(character)
         poses = [link.inertial_pose for link in character.links]
         self._offsets = np.array([pose.position for pose in poses])  # (links, 3) m, link frames
 
@@ -89,8 +89,8 @@ class EquationOfMotion:
         model = self._model
         model.update(position, velocity)
         acceleration = self._acceleration(position, velocity, next_velocity)
-        # the simulator's own passive forces: its damping may be bounded, and it has soft limits
-        passive = self._passive.effort(position, velocity)
+        # the simulator's own passive forces: damping and friction are implicit, limits soft
+        passive = self._passive.effort(position, velocity, effort, pushes)
         reached = position + self._period * next_velocity  # where it counts, of hinges and sliders
         return MotionResidual(
             inertial=model.mass_matrix() @ acceleration,
@@ -98,7 +98,9 @@ class EquationOfMotion:
             applied=effort,
             contact=self._generalised(contacts),
             pushed=self._generalised(self._at_centres(pushes)),
-            limited=(reached < self._lower + _NEAR) | (reached > self._upper - _NEAR),
+            limited=(reached < self._lower + _NEAR)
+            | (reached > self._upper - _NEAR)
+            | self._constrained,
         )
 
     def _acceleration(
@@ -143,3 +145,11 @@ class EquationOfMotion:
         for link in np.flatnonzero(wrenches.any(axis=1)).tolist():
             force += self._model.link_jacobian(link).T @ wrenches[link]
         return force
+
+
+def _constrained(character: Character) -> BoolArray:
+    """Which entries (n,) have friction or a coupling, by which the engine answers to contacts."""
+    joints, coupling = character.moving_joints, character.coupling
+    mask = character.layout.mask(joint.name for joint in joints if joint.friction)
+    mask[coupling.followers] = mask[coupling.leaders] = True
+    return mask

@@ -152,7 +152,7 @@ def _simulator_values(character: Character, given: Mapping[str, object], duratio
     own = simulator_parameters.character_parameters(character)
     values = resolve(parameters + own, {**RUN_DEFAULTS, **given})
     values["max_ticks"] = count_ticks(duration, values.integer("rate"))
-    character.layout.mask(values.texts("commanded_joints"))  # they exist
+    character.check_driven(values.texts("commanded_joints"))
     return values
 
 

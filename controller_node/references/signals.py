@@ -156,6 +156,8 @@ def _chosen(
             raise MotionError(one_of("degree of freedom", name, list(names)))
         if chosen[names.index(name)]:
             raise MotionError(f"degree of freedom '{name}' is named twice; once is enough")
+        if name in character.leaders:
+            raise MotionError(f"'{name}' mimics '{character.leaders[name]}'; name that one")
         chosen[names.index(name)] = 1.0
     _check_limits(character, chosen, sizes, signal)
     return chosen

@@ -46,7 +46,7 @@ def automatic_gains(
     bearing = _bearing_links(character, heights)
     gains = {}
     for index, link in enumerate(character.links):
-        if link.joint.type in (JointType.FIXED, JointType.FLOATING):
+        if link.joint.type in (JointType.FIXED, JointType.FLOATING) or link.joint.mimic is not None:
             continue
         entries = character.layout.joint(link.joint.name).entries
         own = float(alone[entries].max())
@@ -68,23 +68,33 @@ def automatic_gains(
 
 
 def _inertia_alone(character: Character, mass_matrix: FloatArray) -> FloatArray:
-    """The inertia (n,) of each entry: over a fixed base all others locked, else the base free."""
-    diagonal = np.diag(mass_matrix)
+    """The inertia (n,) of each entry: over a fixed base all others locked, else the base free.
+
+    A leader moves its followers as well.
+    """
     if not character.layout.has_floating_base:
-        return diagonal
+        return np.diag(_coupled(character, mass_matrix))
     freed = mass_matrix.copy()
     for entry in range(_ROOT_ENTRIES):  # eliminated one by one, which leaves the Schur complement
         row = freed[entry].copy()
         if row[entry] > 0.0:
             freed -= row[:, np.newaxis] * row / row[entry]
-    return np.diag(freed)
+    return np.diag(_coupled(character, freed))
+
+
+def _coupled(character: Character, inertia: FloatArray) -> FloatArray:
+    """The inertia G^T M G (n, n) of a matrix M where followers move with their leaders."""
+    if not character.coupling:
+        return inertia
+    matrix = character.coupling.matrix(len(inertia))
+    return fixed_order.product(fixed_order.product(matrix.T, inertia), matrix)
 
 
 def describe_weak_joints(character: Character, model: DynamicsModel) -> tuple[str, ...]:
     """A warning if the effort limits of a fixed character do not hold its model's pose, at rest."""
     if character.layout.has_floating_base:
         return ()
-    needed = character.layout.norms(model.gravity_force())
+    needed = character.layout.norms(character.coupling.effort(model.gravity_force()))
     weak = [
         f"{name} ({need:.3g} of at most {limit:.3g})"
         for name, need, limit in zip(

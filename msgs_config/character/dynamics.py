@@ -35,6 +35,7 @@ class DynamicsModel:
         self._mass_matrix = np.zeros((self._layout.size, self._layout.size))
         self._damping = character.passive_damping()
         self._is_damped = bool(self._damping.any())
+        self._coupling = character.coupling.rows(self._layout.size) if character.coupling else None
         # M is stored by rows of its lower triangle, the diagonal last
         self._diagonal = self._model.M_rowadr + self._model.M_rownnz - 1
         # no position at all: no distance, no angle, and as quaternions (wxyz) no turn
@@ -91,10 +92,18 @@ class DynamicsModel:
         mujoco.mj_fullM(self._model, self._data, self._mass_matrix)
         return self._mass_matrix.copy()
 
-    def solve(self, force: FloatArray, added: FloatArray, period: float) -> FloatArray:
+    def solve(
+        self,
+        force: FloatArray,
+        added: FloatArray,
+        period: float,
+        rate: FloatArray | float = 0.0,
+    ) -> FloatArray:
         """The acceleration `a` (n,) of `(M + D h + diag(added)) a = force` over a period h in s.
 
-        The passive damping D is then that of the velocity at the period's end. The factorisation
+        The passive damping D is then that of the velocity at the period's end, and followers
+        accelerate as their leaders do, by an effort that does no work (`J a` is `rate`, with
+        the J of `Coupling.rows`). The factorisation
         `L' D L` follows the tree of the links (Featherstone 2008, section 6.5), and uses no BLAS.
         """
         data, mass, diagonal = self._data, self._mass, self._diagonal
@@ -106,7 +115,30 @@ class DynamicsModel:
         mass.put(diagonal, without)
         acceleration: FloatArray = np.empty(self._layout.size)
         mujoco.mj_solveM(self._model, data, acceleration[np.newaxis], force[np.newaxis])
-        return acceleration
+        if self._coupling is None:
+            return acceleration
+        return acceleration + self._coupled(fixed_order.apply(self._coupling, acceleration) - rate)
+
+    def coupling_correction(self, violation: FloatArray) -> FloatArray:
+        """The change (n,) of a velocity that takes a violation J v (k,) of the coupling away.
+
+        In the position taken over: `-M^-1 J^T (J M^-1 J^T)^-1 J v`, which impulses between leaders
+        and followers lead to. It takes kinetic energy alone (Gauss' principle; Udwadia and Kalaba
+        1992). As of a violation of positions.
+        """
+        mujoco.mj_factorM(self._model, self._data)
+        return self._coupled(violation)
+
+    def _coupled(self, violation: FloatArray) -> FloatArray:
+        """`coupling_correction` with the mass matrix that was factorised last."""
+        rows = self._coupling
+        assert rows is not None
+        yielding = np.empty_like(rows)
+        mujoco.mj_solveM(self._model, self._data, yielding, rows)
+        delassus = fixed_order.product(rows, yielding.T)
+        impulses = fixed_order.solve(delassus, violation[:, np.newaxis])[:, 0]
+        correction: FloatArray = -fixed_order.apply(yielding.T, impulses)
+        return correction
 
     def delassus_matrix(self, rows: FloatArray) -> FloatArray:
         """`J M^-1 J^T` (m, m) of rows J (m, n): how the force on each row accelerates each.

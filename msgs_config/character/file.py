@@ -29,14 +29,18 @@ AUTOMATIC_GAINS_HZ = 5.0
 """Of a URDF alone: a joint sags by g / (length w^2), which for 0.5 m is 0.02 rad."""
 _NO_GAINS = Gains()
 _GAIN_KEYS = ("stiffness", "damping", "integral")
-_JOINT_KEYS = (*_GAIN_KEYS, "effort_limit", "lower", "upper", "passive_damping", "soft_limit")
+_PASSIVE_KEYS = ("passive_damping", "friction", "soft_limit")
+_JOINT_KEYS = (*_GAIN_KEYS, "effort_limit", "lower", "upper", *_PASSIVE_KEYS)
 _CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets")
 _URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision", "collision")
 _SOURCE_KEYS = ("xacro", "left_out")
-_POSE_KEYS = ("joint_damping", "rest_pose", "on_ground", "joints", "automatic_gains")
+_POSE_KEYS = (
+    *("joint_damping", "joint_friction", "rest_pose", "on_ground", "joints", "automatic_gains"),
+)
 _KEYS = (
     *_URDF_KEYS,
     *_SOURCE_KEYS,
+    "joint_mimic",
     *_POSE_KEYS,
     "root_assistance",
     "clips",
@@ -68,6 +72,8 @@ class CharacterFile:
     effort_limits: dict[str, float]  # joint name -> N m or N
     urdf_damping: bool  # whether the URDF's passive damping of hinges and sliders counts
     passive_damping: dict[str, float]  # joint name -> N m s/rad or N s/m
+    urdf_friction: bool  # whether the URDF's friction of hinges and sliders counts
+    friction: dict[str, float]  # joint name -> N m or N
     soft_limits: dict[str, SoftLimit]  # ball joint name -> its limit
     assistance: dict[str, Gains]
     clips: ClipFormat
@@ -151,6 +157,8 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
         effort_limits=_read_numbers(joints, "effort_limit"),
         urdf_damping=reader.choice("joint_damping", ["file", "none"]) == "file",
         passive_damping=_read_numbers(joints, "passive_damping"),
+        urdf_friction=reader.choice("joint_friction", ["file", "none"]) == "file",
+        friction=_read_numbers(joints, "friction"),
         soft_limits={
             name: _read_soft_limit(joint.part("soft_limit"))
             for name, joint in joints.items()
@@ -207,6 +215,7 @@ def _read_urdf(
         fill_inertia=inertia == "filled",
         self_collision=reader.flag("self_collision"),
         collisions=reader.choice("collision", ["file", "none"]) == "file",
+        mimics=reader.choice("joint_mimic", ["file", "none"]) == "file",
     )
     return loading, (misread,) if misread else ()
 

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree
 
-from msgs_config.character.urdf.joints import read_bounds
+from msgs_config.character.urdf.limits import read_bounds
 from msgs_config.errors import CharacterError
 
 Bounds = tuple[float | None, float | None]

@@ -31,6 +31,9 @@ class JointType(Enum):
         return _SUFFIXES[self]
 
 
+SCALAR = (JointType.REVOLUTE, JointType.PRISMATIC)
+"""The types whose position is one number, rad or m."""
+
 _SUFFIXES = {
     JointType.FIXED: (),
     JointType.REVOLUTE: ("",),
@@ -90,7 +93,14 @@ class JointLayout:
     Positions are message form: a rotation is a rotation vector, see docs/design.md.
     """
 
-    def __init__(self, joints: Iterable[tuple[str, JointType]]) -> None:
+    def __init__(
+        self, joints: Iterable[tuple[str, JointType]], followers: Iterable[str] = ()
+    ) -> None:
+        """Place joints in order; `followers` are those of them that mimic others.
+
+        Raises:
+            LayoutError: two joints or degrees of freedom have the same name.
+        """
         placed: list[LayoutJoint] = []
         start = 0
         for name, joint_type in joints:
@@ -99,6 +109,8 @@ class JointLayout:
             placed.append(LayoutJoint(name, joint_type, start))
             start += len(joint_type.suffixes)
         self.joints = tuple(placed)
+        self.followers = frozenset(followers)
+        """The joints that no motor drives, because they mimic others."""
         self.dof_names = tuple(dof for joint in placed for dof in joint.dof_names)
         self.size = start
         self._index = {name: index for index, name in enumerate(self.dof_names)}
@@ -119,8 +131,12 @@ class JointLayout:
 
     @property
     def actuated_joint_names(self) -> list[str]:
-        """All joints but the floating base, which no motor drives."""
-        return [joint.name for joint in self.joints if joint.type is not JointType.FLOATING]
+        """All joints but the floating base and followers, which no motor drives."""
+        return [
+            joint.name
+            for joint in self.joints
+            if joint.type is not JointType.FLOATING and joint.name not in self.followers
+        ]
 
     def joint(self, name: str) -> LayoutJoint:
         """The joint of that name.

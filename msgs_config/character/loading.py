@@ -17,7 +17,8 @@ import numpy as np
 from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
 from msgs_config.character.file_defaults import add_defaults
-from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.character.followers import add_mimics, check_followers, couple_rest_pose
+from msgs_config.character.layout import ROOT, SCALAR, JointLayout, JointType
 from msgs_config.character.link_order import sort_depth_first
 from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import (
@@ -70,12 +71,13 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
         file = replace(file, loading=replace(file.loading, collisions=False))
     robot, missing = resolve_meshes(file.loading)
     repairs = repair_urdf(robot, file.loading)
-    links = _load_links(robot, file)
+    links, led = add_mimics(_load_links(robot, file), file.loading)
     try:
         layout = JointLayout((link.joint.name, link.joint.type) for link in links)
     except LayoutError as error:
         raise CharacterError(f"{file.loading.urdf_path}: {error}") from error
     _check_names(file, layout, repairs.fixed)
+    check_followers(file, links)
     _check_rest_pose(file, links)
     has_shapes = {link.name: bool(link.collision_shapes) for link in links}
     check_sensors(file.path, file.sensors, has_shapes)
@@ -94,13 +96,14 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
             *_collect_warnings(file, layout, links),
             *missing,
             *repairs.warnings,
+            *led,
             *(each.line for each in file.loading.remarks if each.kind not in file.left_out),
         ),
         sensors=file.sensors,
         up_axis=file.up_axis,
         frames=repairs.frames,
     )
-    return add_defaults(character, file)
+    return add_defaults(couple_rest_pose(character, file), file)
 
 
 def _clip_format(file: CharacterFile, layout: JointLayout) -> ClipFormat:
@@ -142,13 +145,20 @@ def _read_links(client: Engine, body: int, file: CharacterFile) -> list[Link]:
 
 
 def _apply_file(joint: Joint, file: CharacterFile) -> Joint:
-    """The URDF's joint with the character's own effort limit, damping and soft limit."""
+    """The URDF's joint with the character's own effort limit, passive forces and soft limit."""
     name = joint.name
     damping = joint.damping if file.urdf_damping else 0.0
-    if not 0.0 <= damping < math.inf:
+    friction = joint.friction if file.urdf_friction else 0.0
+    for kind, value in (("damping", damping), ("friction", friction)):
+        if not 0.0 <= value < math.inf:
+            raise CharacterError(
+                f"{file.loading.urdf_path}: joint '{name}' has a {kind} of {value:g}; it must be 0 "
+                f"or more, or not count ('joint_{kind}: none' in {file.path.name})"
+            )
+    if name in file.friction and joint.type not in SCALAR:
         raise CharacterError(
-            f"{file.loading.urdf_path}: joint '{name}' has a damping of {damping:g}; it must be 0 "
-            f"or more, or not count ('joint_damping: none' in {file.path.name})"
+            f"{file.path}: joints.{name}.friction: it is for hinges and sliders, this joint is "
+            f"{joint.type.value}"
         )
     if name in file.soft_limits and joint.type is not JointType.SPHERICAL:
         raise CharacterError(
@@ -159,6 +169,7 @@ def _apply_file(joint: Joint, file: CharacterFile) -> Joint:
         joint,
         effort_limit=file.effort_limits.get(name, joint.effort_limit),
         damping=file.passive_damping.get(name, damping),
+        friction=file.friction.get(name, friction),
         soft_limit=file.soft_limits.get(name),
     )
 
@@ -184,7 +195,7 @@ def _read_joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Po
     )
     x, y, z = rotations.rotate(child_turn, axis).tolist()
     joint_type = _JOINT_TYPES[info[2]]
-    is_scalar = joint_type in (JointType.REVOLUTE, JointType.PRISMATIC)
+    is_scalar = joint_type in SCALAR
     limited = is_scalar and info[8] <= info[9]
     return Joint(
         name=info[1].decode(),
@@ -195,6 +206,7 @@ def _read_joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Po
         upper=float(info[9]) if limited else math.inf,
         effort_limit=float(info[10]) if info[10] > 0.0 else math.inf,
         damping=float(info[6]) if is_scalar else 0.0,
+        friction=float(info[7]) if is_scalar else 0.0,
     )
 
 
@@ -225,7 +237,8 @@ def _check_names(file: CharacterFile, layout: JointLayout, fixed: frozenset[str]
             if name not in known:
                 raise CharacterError(f"{file.path}: {key}: {one_of(what, name, known)}")
 
-    joints, clips = layout.actuated_joint_names, file.clips
+    joints = [name for name in layout.joint_names if name != ROOT]
+    clips = file.clips
     check("joints", [name for name in file.gains if name not in fixed], "joint", joints)
     check("clips.joints", clips.joints, "joint", joints)
     check("planner.sigma", file.planning.sigma, "joint", joints)
@@ -278,7 +291,9 @@ def _nearest_to_zero(file: CharacterFile, links: list[Link]) -> dict[str, float]
     return {
         joint.name: min(max(0.0, joint.lower), joint.upper)
         for joint in (link.joint for link in links)
-        if joint.name not in file.rest_pose and not joint.lower <= 0.0 <= joint.upper
+        if joint.name not in file.rest_pose
+        and joint.mimic is None
+        and not joint.lower <= 0.0 <= joint.upper
     }
 
 

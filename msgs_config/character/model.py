@@ -5,6 +5,7 @@ model of the dynamics. All frames are URDF link frames; lengths in m, masses in 
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -14,10 +15,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from msgs_config.arrays import FloatArray
+from msgs_config.character.coupling import Coupling
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.sensors import Sensor
+from msgs_config.character.urdf.mimic import Mimic
 from msgs_config.character.urdf.reading import ReadUrdf, read_robot
 from msgs_config.character.urdf.vocabulary import LeftOut
+from msgs_config.errors import LayoutError
 from msgs_config.geometry import fixed_order, rotations
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 
@@ -110,6 +114,8 @@ class Joint:
     upper: float = np.inf
     effort_limit: float = np.inf  # N m or N, of the vector's norm for a ball joint
     damping: float = 0.0  # passive; N m s/rad or N s/m
+    friction: float = 0.0  # passive, of a hinge or slider; the most that it has, N m or N
+    mimic: Mimic | None = None  # of a hinge or slider that follows another, which follows none
     soft_limit: SoftLimit | None = None  # of a ball joint
 
 
@@ -188,6 +194,7 @@ class UrdfOptions:
     self_collision: bool = False
     fill_inertia: bool = False  # of links that have a mass but no inertia, see `repair_urdf`
     collisions: bool = True  # else nothing of it collides, and meshes may be missing
+    mimics: bool = True  # else joints that mimic others are joints as any
 
     @cached_property
     def _read(self) -> ReadUrdf:
@@ -251,7 +258,40 @@ class Character:
     @cached_property
     def layout(self) -> JointLayout:
         """The order of the character's degrees of freedom."""
-        return JointLayout((link.joint.name, link.joint.type) for link in self.links)
+        joints = [link.joint for link in self.links]
+        return JointLayout(
+            ((joint.name, joint.type) for joint in joints),
+            (joint.name for joint in joints if joint.mimic is not None),
+        )
+
+    @cached_property
+    def coupling(self) -> Coupling:
+        """The joints that follow others."""
+        joints = self.moving_joints
+        return Coupling(self.layout, {j.name: j.mimic for j in joints if j.mimic is not None})
+
+    @property
+    def leaders(self) -> dict[str, str]:
+        """The leader of each joint that mimics one, by the follower's name."""
+        return {j.name: j.mimic.leader for j in self.moving_joints if j.mimic is not None}
+
+    def check_driven(self, names: Iterable[str]) -> None:
+        """Raise LayoutError unless all joints named exist and none mimics another."""
+        names = tuple(names)
+        self.layout.mask(names)
+        for name, leader in self.leaders.items():
+            if name in names:
+                raise LayoutError(
+                    f"commanded_joints: '{name}' mimics '{leader}' and has no motor; leave it out"
+                )
+
+    def without_constraints(self) -> "Character":
+        """The character without friction and coupling of its joints, which the engine solves."""
+        links = [
+            replace(link, joint=replace(link.joint, friction=0.0, mimic=None))
+            for link in self.links
+        ]
+        return replace(self, links=tuple(links))
 
     @property
     def frame_names(self) -> set[str]:

@@ -54,6 +54,7 @@ def describe(
         "name": name,
         "characters": list(characters),
         "joints": [{"name": j.name, "type": j.type.value} for j in character.layout.joints],
+        "followers": sorted(character.layout.followers),
         "effort_limits": [_finite(limit) for limit in character.effort_limits().tolist()],
         "mass": character.mass,
         **_describe_urdf(_TERRAIN, terrain),
@@ -102,7 +103,8 @@ def parse(text: str) -> RunConfiguration:
     try:
         content = json.loads(text)
         joints = [(joint["name"], JointType(joint["type"])) for joint in content["joints"]]
-        layout, probe = JointLayout(joints), content.get("probe")
+        followers = [str(name) for name in content.get("followers", ())]
+        layout, probe = JointLayout(joints, followers), content.get("probe")
         return RunConfiguration(
             character=str(content["character"]),
             layout=layout,

@@ -45,15 +45,14 @@ class CharacterInterface:
         self._of = f" for '{self.name}'" if self.name else ""
         self._own_session = own_session
         self._once_logger = logger
-        for warning in character.warnings:
-            node.get_logger().warning(f"{character.setup.prefix}{warning}")
         self.publishers = Publishers(node, character, settings, own_session.session)
         self.commands: LockstepBarrier | ZeroOrderHold
         names, commanded = character.layout.dof_names, character.commanded
+        leaders = character.character.leaders
         if settings.is_realtime:
-            self.commands = ZeroOrderHold(names, commanded, settings.command_timeout_ns)
+            self.commands = ZeroOrderHold(names, commanded, settings.command_timeout_ns, leaders)
         else:
-            self.commands = LockstepBarrier(names, commanded)
+            self.commands = LockstepBarrier(names, commanded, leaders)
         self.last_effort = self.commands.effort
         self._decoder = JointStateDecoder()
         self._torque_messages = DirectSubscription(node, self.torques)

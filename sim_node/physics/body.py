@@ -6,7 +6,7 @@ joint's rotation `q` in the engine is `o q o^-1` here, its velocity `w` is `o w`
 orientation `q` in the engine is `q o^-1` here.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -17,6 +17,7 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Pose
 from msgs_config.geometry import fixed_order, frames, rotations
 from sim_node.physics.engine_defaults import remove_motors, set_link_dynamics
+from sim_node.physics.joint_constraints import couple_joints, set_friction
 from sim_node.physics.touches import TouchedLinks, net_wrenches
 
 _QUATERNION = 4  # numbers; the engine has one for a ball joint
@@ -64,6 +65,12 @@ class Body:
         pairs = zip(self._joints, self._axes, strict=True)
         balls = [number for number, axes in pairs if axes is not None]
         remove_motors(client, self._body, self._joints, balls)
+        names = [j.name for j in self._layout.joints if j.type is not JointType.FLOATING]
+        numbers = dict(zip(names, self._joints, strict=True))
+        rubbing = [joint.name for joint in character.moving_joints if joint.friction]
+        self._rubbing = [numbers[name] for name in rubbing]
+        self._rubbing_entries = [self._layout.joint(name).start for name in rubbing]
+        couple_joints(client, self._body, character, numbers)
         if not self._floating:
             pose = character.links[0].joint.pose_in_parent
             self._place_base(np.array(pose.position), np.array(pose.orientation_xyzw))
@@ -119,11 +126,7 @@ class Body:
         if self._floating:
             self._place_base(position[:3], rotations.exp(position[3:6]))
             self._set_base_velocity(velocity[:3], velocity[3:6])
-        for index, entries, axes in zip(self._joints, self._entries, self._axes, strict=True):
-            value, speed = position[entries].tolist(), velocity[entries].tolist()
-            if axes is not None:
-                value = rotations.exp(np.array(frames.to_child(axes, value))).tolist()
-                speed = frames.to_child(axes, speed)
+        for index, value, speed in self._engine_motion(position, velocity):
             pybullet.resetJointStateMultiDof(
                 self._body,
                 index,
@@ -131,6 +134,30 @@ class Body:
                 targetVelocity=speed,
                 physicsClientId=self._client,
             )
+
+    def _engine_motion(
+        self, position: FloatArray, velocity: FloatArray
+    ) -> Iterator[tuple[int, Sequence[float], Sequence[float]]]:
+        """The engine's number of each joint, its position and its velocity there."""
+        for index, entries, axes in zip(self._joints, self._entries, self._axes, strict=True):
+            value, speed = position[entries].tolist(), velocity[entries].tolist()
+            if axes is not None:
+                value = rotations.exp(np.array(frames.to_child(axes, value))).tolist()
+                speed = frames.to_child(axes, speed)
+            yield index, value, speed
+
+    def set_motion(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Set the joints' positions and all velocities, as of `set_state`; the base stays."""
+        if self._floating:
+            self._set_base_velocity(velocity[:3], velocity[3:6])
+        motion = list(self._engine_motion(position, velocity))
+        pybullet.resetJointStatesMultiDof(  # of lists alone, tuples crash it
+            self._body,
+            [index for index, _, _ in motion],
+            targetValues=[value for _, value, _ in motion],
+            targetVelocities=[speed for _, _, speed in motion],
+            physicsClientId=self._client,
+        )
 
     def forget_reading(self) -> None:
         """Forget what was read last: the engine's state is set to another one."""
@@ -155,6 +182,12 @@ class Body:
         self._base_read = None  # the engine's next step moves it
         if self._floating:
             self._base_centre = None
+
+    def set_friction(self, friction: FloatArray) -> None:
+        """Set the friction (n,) that joints oppose to contacts in the engine's next step."""
+        if self._rubbing:
+            values = friction[self._rubbing_entries].tolist()
+            set_friction(self._client, self._body, self._rubbing, values)
 
     def _apply_to_base(self, force: Sequence[float], torque_in_base: Sequence[float]) -> None:
         """Apply a force (N, world) at the base link's origin, and a torque (N m, base frame)."""

@@ -1,4 +1,4 @@
-"""Passive forces of a character's joints: damping, and the soft limits of ball joints.
+"""Passive forces of a character's joints: soft limits of ball joints, and `joint_resistance`.
 
 A soft limit is a spring and a damper outside of bounds on the components of a joint's rotation
 vector r. With e the excess of a component over its bound, the force against it is
@@ -27,44 +27,45 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, SoftLimit
 from msgs_config.geometry import fixed_order, frames
 from msgs_config.geometry.frames import Triple
+from sim_node.physics.joint_resistance import JointResistance
+from sim_node.physics.wrenches import ExternalWrench
 
 _MOST_PIVOTS = 50
+_EXACT = 1e-9  # rad or m, of a coupling
 _ROUNDING = 1e-12  # of a force, that may be wrong without consequence
 
 
 class PassiveForces:
     """The passive forces of one character, for an engine that adds them at each of its steps.
 
-    `active` is true if there are any; `warnings` are for the user.
+    `active` is true if there are any.
     """
 
-    def __init__(self, character: Character, step_s: float, inverse_mass: FloatArray) -> None:
-        """For engine steps of `step_s`; `inverse_mass` (n, n) is that of the rest pose."""
-        self._step_s = step_s
+    def __init__(self, character: Character, step_s: float, gravity: float) -> None:
+        """For engine steps of `step_s`, and a gravity in m/s^2 along -z."""
+        self._step_s, self._coupling = step_s, character.coupling
+        self._has_floating_base = character.layout.has_floating_base
         self._limits = [
             (character.layout.joint(joint.name).entries, joint.soft_limit)
             for joint in character.moving_joints
             if joint.soft_limit is not None
         ]
-        self._model = DynamicsModel(character) if self._limits else None
-        wanted = character.passive_damping()
-        self._damping = bounded_damping(wanted, inverse_mass, step_s)
-        self._undamping = -self._damping  # N m s/rad or N s/m
-        self.active = bool(self._limits or wanted.any())
-        self.warnings = tuple(
-            f"the passive damping of '{name}' is kept at {applied:.3g} of {asked:.3g}: more would "
-            f"be unstable at engine steps of {1e3 * step_s:.3g} ms, substeps make them shorter"
-            for name, asked, applied in zip(
-                character.layout.dof_names, wanted, self._damping, strict=True
-            )
-            if applied < asked
-        )
+        self.resistance = JointResistance(character, step_s)
+        self.active = bool(self._limits or self.resistance.active)
+        self._model = DynamicsModel(character, gravity) if self.active else None
 
-    def effort(self, position: FloatArray, velocity: FloatArray) -> FloatArray:
-        """The passive effort (n,) in a state, message form; N m or N."""
-        effort: FloatArray = self._undamping * velocity
-        if self._model is None:
-            return effort
+    def effort(
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        applied: FloatArray,
+        pushes: Sequence[ExternalWrench] = (),
+    ) -> FloatArray:
+        """The passive effort (n,) in a state, message form; N m or N.
+
+        `applied` (n,) is the effort of all motors in the coming step, which begins with `pushes`.
+        """
+        effort: FloatArray = np.zeros(len(velocity))
         bounds, rows = [], []
         turns, spins = position.tolist(), velocity.tolist()
         for entries, limit in self._near_limits(turns, spins):
@@ -72,12 +73,45 @@ class PassiveForces:
                 bounds.append(bound)
                 rows.append(np.zeros(len(effort)))
                 rows[-1][entries] = bound.row
+        resists = self.resistance.active
+        if self._model is None or not (bounds or resists):
+            return effort
+        self._model.update(position, velocity)
         if bounds:
             jacobian = np.array(rows)
-            self._model.update(position, velocity)
             forces = complementary_forces(bounds, self._model.delassus_matrix(jacobian))
             effort -= fixed_order.apply(jacobian.T, forces)
+        if resists:
+            known = applied + effort + self._pushed(pushes)
+            effort = effort + self.resistance.effort(self._model, position, velocity, known)
         return effort
+
+    def couple(self, position: FloatArray, velocity: FloatArray) -> bool:
+        """Change a state, each (n,), that a step has led to, so that followers follow; if it did.
+
+        The engine's iterative solver leaves a rest where contacts press on light links. It is taken
+        away by impulses between leaders and followers, and by what they would have moved.
+        """
+        moved, rate = self._coupling.violation(position), self._coupling.violation_rate(velocity)
+        if max(np.abs(moved).max(), self._step_s * np.abs(rate).max()) <= _EXACT:
+            return False
+        assert self._model is not None
+        self._model.update(position, velocity)
+        first = 6 * self._has_floating_base  # whose place the correction hardly alters
+        position[first:] += self._model.coupling_correction(moved)[first:]
+        velocity += self._model.coupling_correction(rate)
+        return True
+
+    def _pushed(self, pushes: Sequence[ExternalWrench]) -> FloatArray | float:
+        """The generalised force (n,) of pushes, N m or N."""
+        assert self._model is not None
+        force: FloatArray | float = 0.0
+        for push in pushes:
+            origins, axes = self._model.link_frames(np.array([push.link]))
+            point = origins[0] + fixed_order.apply(axes[0], push.point)
+            jacobian = self._model.point_jacobian(push.link, point)
+            force = force + fixed_order.apply(jacobian.T, push.wrench)
+        return force
 
     def _near_limits(
         self, turns: Sequence[float], spins: Sequence[float]
@@ -213,18 +247,3 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
     for one, other in zip(a, b, strict=True):
         product += one * other
     return product
-
-
-def bounded_damping(damping: FloatArray, inverse_mass: FloatArray, step_s: float) -> FloatArray:
-    """Damping (n,) no larger than an explicit damper may have.
-
-    An explicit damper is unstable where it takes more than twice the velocity away in one step,
-    `h d / m > 2`. Where it would take more than all of it, as seen at the rest pose, it is made as
-    much weaker: d becomes d / R where `R = h sum_j sqrt(d_i d_j) |inverse of M|_ij` is above 1. No
-    eigenvalue of `h inverse(M) D` is above 1 then (Gershgorin 1931), and the other half is left to
-    poses in which the inertia is less.
-    """
-    roots = np.sqrt(damping)
-    taken: FloatArray = step_s * roots * fixed_order.apply(np.abs(inverse_mass), roots)
-    bounded: FloatArray = damping / np.maximum(taken, 1.0)
-    return bounded

@@ -9,7 +9,6 @@ from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
 from msgs_config.messages.probe import DynamicsSample
 from sim_node.physics.body import Body
-from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.world import World, WorldSettings
 
 INSTANT = 1e-7
@@ -28,24 +27,8 @@ def still_settings(gravity: float) -> WorldSettings:
     return WorldSettings(step_s=INSTANT, gravity=gravity, ground=False)
 
 
-def measure_inverse_mass(character: Character) -> FloatArray:
-    """The inverse mass matrix (n, n) near the rest pose, as far as passive forces need it.
-
-    All zeros where no joint has damping or a soft limit.
-    """
-    if any(joint.damping or joint.soft_limit for joint in character.moving_joints):
-        with World(still_settings(gravity=0.0)) as world:
-            return _inverse_mass_matrix(world, _add_without_collisions(world, character), character)
-    return np.zeros((character.layout.size,) * 2)
-
-
 def measure_probe(character: Character, gravity: float) -> DynamicsSample:
-    """The dynamics sample of `probe_engine` alone."""
-    return probe_engine(character, gravity)[0]
-
-
-def probe_engine(character: Character, gravity: float) -> tuple[DynamicsSample, FloatArray]:
-    """What the engine makes of a character: a dynamics sample, and the inverse mass matrix (n, n).
+    """What the engine makes of a character: one dynamics sample.
 
     The sample's state is off the rest pose and within all limits; it moves in every degree of
     freedom but those that passive damping would stop within an instant. Each effort is such as to
@@ -69,20 +52,20 @@ def probe_engine(character: Character, gravity: float) -> tuple[DynamicsSample, 
         effort = rng.uniform(-_ACCELERATION, _ACCELERATION, layout.size) / np.diag(inverse_mass)
         rate = character.passive_damping() * np.diag(inverse_mass)
         velocity[rate * INSTANT > _DAMPED] = 0.0
-        passive = PassiveForces(character, INSTANT, inverse_mass)
         world.set_gravity(gravity)
         body.set_state(position, velocity)
         position, velocity = body.read()  # as the engine has it
         energy = body.kinetic_energy()
-        body.apply(effort + passive.effort(position, velocity))
+        body.apply(effort - character.passive_damping() * velocity)
         world.step()
         acceleration = (body.read()[1] - velocity) / INSTANT
-    return DynamicsSample(position, velocity, effort, energy, acceleration), inverse_mass
+    return DynamicsSample(position, velocity, effort, energy, acceleration)
 
 
 def _add_without_collisions(world: World, character: Character) -> Body:
-    """Put a character into a world, its links passing through each other."""
-    return world.add(replace(character, loading=replace(character.loading, self_collision=False)))
+    """Put a character into a world, its links passing through each other, its joints free."""
+    loading = replace(character.loading, self_collision=False)
+    return world.add(replace(character.without_constraints(), loading=loading))
 
 
 def _inverse_mass_matrix(world: World, body: Body, character: Character) -> FloatArray:

@@ -28,7 +28,6 @@ class CharacterSetup:
     commanded_joints: tuple[str, ...]
     initial_position: tuple[float, ...]  # (n,)
     initial_velocity: tuple[float, ...]  # (n,)
-    inverse_mass: FloatArray  # (n, n) near the rest pose; zeros where no joint has passive forces
     name: str = ""  # where there are several
 
     @property
@@ -88,25 +87,30 @@ class SimulatedCharacter:
         self.saturated_ticks: IntArray = np.zeros(len(self._limits.values), dtype=np.intp)  # (b,)
         links = len(self.character.links)
         self._no_contacts = Contacts(np.zeros((links, 6)), np.zeros(links, dtype=np.bool_))
-        self._position = self._initial("initial_position", setup.initial_position)
-        self._velocity = self._initial("initial_velocity", setup.initial_velocity)
-        self._passive = PassiveForces(setup.character, step_s, setup.inverse_mass)
+        self.begin_in(
+            self._initial("initial_position", setup.initial_position),
+            self._initial("initial_velocity", setup.initial_velocity),
+        )
+        self._step_s = step_s
         self._delay_ticks = delay_ticks
         self.speed_bound = speed_bound(setup.character, step_s, speed_limit)
         # (2, n) largest position and velocity of a sound state
         self._bounds = np.array([[np.finfo(float).max], [speed_limit]]).repeat(self.layout.size, 1)
 
     def begin_in(self, position: FloatArray, velocity: FloatArray) -> None:
-        """Make a state, each (n,), the initial one of every world that it enters from now on."""
-        self._position, self._velocity = position.copy(), velocity.copy()
+        """Make a state, each (n,), the initial one of every world that it enters from now on.
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Where the simulation differs from the character's file."""
-        return self._passive.warnings
+        Followers begin where their leaders say.
+        """
+        coupling = self.character.coupling
+        self._position, self._velocity = coupling.position(position), coupling.velocity(velocity)
 
-    def enter(self, body: Body, balls: Projectiles, stamp_ns: int) -> None:
-        """Enter a world, as the body that was added there, in the initial state."""
+    def enter(self, body: Body, balls: Projectiles, gravity: float, stamp_ns: int) -> None:
+        """Enter a world, as the body that was added there, in the initial state.
+
+        Its gravity is in m/s^2 along -z.
+        """
+        self._passive = PassiveForces(self.character, self._step_s, gravity)
         self._delayed = deque([np.zeros(self.layout.size)] * self._delay_ticks)
         self._body, self.balls = body, balls
         body.set_state(self._position, self._velocity)
@@ -134,7 +138,9 @@ class SimulatedCharacter:
         total = self._applied
         if self._passive.active:
             motion = (self.state.position, self.state.velocity) if first else self._body.read()
-            total = total + self._passive.effort(*motion)
+            position, velocity = motion
+            total = total + self._passive.effort(position, velocity, total, self.pushes)
+            self._body.set_friction(self._passive.resistance.spare)
         self._body.apply(total)
         if self.pushes:
             self._body.push((push.link, push.wrench, push.point) for push in self.pushes)
@@ -153,6 +159,14 @@ class SimulatedCharacter:
         self._contacts = Contacts(
             self._contacts.wrenches + share * wrenches, self._contacts.touching | touching
         )
+
+    def end_substep(self) -> None:
+        """Put followers where their leaders say, if contacts have moved them away."""
+        if self.character.coupling:
+            self.find_contacts()  # which need the links where they were before
+            position, velocity = self._body.read()
+            if self._passive.couple(position, velocity):
+                self._body.set_motion(position, velocity)
 
     @property
     def contacts(self) -> Contacts | None:

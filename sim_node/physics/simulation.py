@@ -149,6 +149,8 @@ class Simulation:
             if self.watches_contacts:
                 for character in self.characters:
                     character.add_contacts(self._world.touched_links, share=1.0 / substeps)
+            for character in self.characters:
+                character.end_substep()
         self.tick += 1
         for character in self.characters:
             character.end_tick(self.stamp_ns)
@@ -256,7 +258,7 @@ class Simulation:
         try:
             for character in self.characters:
                 body = world.add(character.character, character.speed_bound)
-                character.enter(body, world.balls, self.stamp_ns)
+                character.enter(body, world.balls, self.settings.world.gravity, self.stamp_ns)
         except Exception:
             world.close()
             raise

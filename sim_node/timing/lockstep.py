@@ -2,8 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from types import MappingProxyType
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from msgs_config.arrays import BoolArray, FloatArray, IntArray, all_finite
 from msgs_config.errors import CommandError
 
 _REMEMBERED = 1000  # ticks
+NO_LEADERS: Mapping[str, str] = MappingProxyType({})
 
 
 class CommandStatus(StrEnum):
@@ -27,9 +29,11 @@ class CommandStatus(StrEnum):
 class CommandCollector(ABC):
     """Checks and counts commands; a subclass decides which of them make the effort of a tick."""
 
-    def __init__(self, dof_names: Sequence[str], allowed: BoolArray) -> None:
-        """Only entries that are `allowed` (n,) may be commanded."""
-        self._dof_names = tuple(dof_names)
+    def __init__(
+        self, dof_names: Sequence[str], allowed: BoolArray, leaders: Mapping[str, str] = NO_LEADERS
+    ) -> None:
+        """Only entries that are `allowed` (n,) may be commanded; `leaders` are by the follower."""
+        self._dof_names, self._leaders = tuple(dof_names), leaders
         self._allowed = allowed
         self._allowed_indices: IntArray | None = None  # the last ones that were
         self.stamp_ns = 0
@@ -69,6 +73,8 @@ class CommandCollector(ABC):
         if not self._allowed[indices].all():
             name = self._dof_names[indices[int(np.argmin(self._allowed[indices]))]]
             hint = "; root_assistance of controller_node is on" if name.startswith("root_") else ""
+            if name in self._leaders:
+                hint = f"; it mimics '{self._leaders[name]}' and has no motor"
             raise CommandError(f"'{name}' is not among the commanded joints{hint}")
 
 
@@ -89,8 +95,10 @@ class LockstepBarrier(CommandCollector):
     little slower than the first is one too many, and not only late.
     """
 
-    def __init__(self, dof_names: Sequence[str], required: BoolArray) -> None:
-        super().__init__(dof_names, required)
+    def __init__(
+        self, dof_names: Sequence[str], required: BoolArray, leaders: Mapping[str, str] = NO_LEADERS
+    ) -> None:
+        super().__init__(dof_names, required, leaders)
         self._past: dict[int, _Tick] = {}  # by stamp, the oldest first
         self._required = np.count_nonzero(required)
         self._begin()

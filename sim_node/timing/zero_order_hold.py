@@ -1,11 +1,11 @@
 """Real time: the last commands are held while the world goes on by the wall clock."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from sim_node.timing.lockstep import CommandCollector, CommandStatus
+from sim_node.timing.lockstep import NO_LEADERS, CommandCollector, CommandStatus
 
 _NEVER = -1
 
@@ -20,9 +20,15 @@ class ZeroOrderHold(CommandCollector):
     complete = True
     missing: Sequence[str] = ()
 
-    def __init__(self, dof_names: Sequence[str], allowed: BoolArray, timeout_ns: int) -> None:
+    def __init__(
+        self,
+        dof_names: Sequence[str],
+        allowed: BoolArray,
+        timeout_ns: int,
+        leaders: Mapping[str, str] = NO_LEADERS,
+    ) -> None:
         """`allowed` (n,) may be commanded; `timeout_ns` is simulated time."""
-        super().__init__(dof_names, allowed)
+        super().__init__(dof_names, allowed, leaders)
         self._effort = np.zeros(len(allowed))
         self._given_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
         self._stamp_of_command_ns = np.full(len(allowed), _NEVER, dtype=np.int64)

@@ -13,7 +13,7 @@ from msgs_config.character.bullet import pybullet
 from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.messages import configuration
 from sim_node.parameters import load_parameters
-from sim_node.physics.probe import probe_engine
+from sim_node.physics.probe import measure_probe
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_settings
 from tests.support.physics import DATA
@@ -47,11 +47,10 @@ def test_a_urdf_is_parsed_once_and_loaded_to_be_read_probed_and_simulated(
     file = tmp_path / "damped.yaml"
 
     (loaded,) = load_parameters({"character": str(file)}).characters
-    sample, inverse_mass = probe_engine(loaded.character, 9.81)
-    setup = make_character_setup(loaded.character, loaded.values, inverse_mass=inverse_mass)
+    sample = measure_probe(loaded.character, 9.81)
+    setup = make_character_setup(loaded.character, loaded.values)
     with Simulation([setup], make_settings(loaded.values)):
         robot_description(loaded.character)
         configuration.describe(loaded.character, loaded.values, probe=sample)
 
-    assert inverse_mass.any()
     assert counts == {"XMLParser": 1, "loadURDF": 3}

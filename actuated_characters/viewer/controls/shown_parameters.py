@@ -63,6 +63,7 @@ def shown_parameters(character: Character) -> dict[str, tuple[Shown, ...]]:
     strengths = tuple(
         Shown(f"strength.{name}", name, range=(0.0, 1.0, 0.05))
         for name in character.vector_names
+        if name not in character.layout.followers
         if name not in (ROOT, ROOT_TORQUE)
     )
     return {"Controller": _LAW, "Strengths": strengths, AT_RESET: (*motion, *_WORLD)}

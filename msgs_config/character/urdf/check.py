@@ -9,7 +9,7 @@ from msgs_config import files
 from msgs_config.character.urdf.formats import check_root
 from msgs_config.character.urdf.frames import MAX_JOINTS, find_frames, joint_end
 from msgs_config.character.urdf.inertia import LEAST_MOMENT, ROUNDING
-from msgs_config.character.urdf.joints import WITH_BOUNDS, read_bounds
+from msgs_config.character.urdf.limits import WITH_BOUNDS, read_bounds
 from msgs_config.character.urdf.reading import FLOATING, WITH_AXIS, read_axis
 from msgs_config.character.urdf.vocabulary import leave_out_unknown
 from msgs_config.errors import CharacterError
@@ -32,6 +32,7 @@ NUMBERS = {  # by element and attribute: how many, and the least that they may b
         **dict.fromkeys((*MOMENTS, "ixy", "ixz", "iyz"), (1, _ANY)),
     },
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), (1, _ANY)),
+    "mimic": dict.fromkeys(("multiplier", "offset"), (1, _ANY)),
     "dynamics": dict.fromkeys(("damping", "friction"), (1, _ANY)),
     "box": {"size": (3, _POSITIVE)},
     "sphere": {"radius": (1, _POSITIVE)},

@@ -7,7 +7,7 @@ from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.meshes.triangles import file_for_engine
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf.check import NUMBERS
-from msgs_config.character.urdf.joints import WITH_BOUNDS
+from msgs_config.character.urdf.limits import WITH_BOUNDS
 from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError
 

@@ -71,7 +71,7 @@ class LinkTree:
         heavy = self._with_all_above(name for name, own in inertials.items() if own.mass)
         fixed = []
         for joint in self._joints if moved else ():
-            needed = heavy if joint.get("type") == "prismatic" else moved
+            needed = heavy or moved if joint.get("type") == "prismatic" else moved
             if joint.get("type") != "fixed" and joint_end(joint, "child") not in needed:
                 joint.set("type", "fixed")
                 fixed.append(joint.get("name", ""))

@@ -1,4 +1,4 @@
-"""Limits of a URDF's joints as ROS has them, whatever the text leaves open."""
+"""Joints of a URDF whose limits leave them one position."""
 
 from xml.etree import ElementTree
 
@@ -6,16 +6,10 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Pose
+from msgs_config.character.urdf.limits import WITH_BOUNDS, read_bounds
 from msgs_config.character.urdf.origin import read_origin, write_origin
 from msgs_config.character.urdf.reading import DEFAULT_AXIS
 from msgs_config.geometry import rotations
-
-WITH_BOUNDS = ("revolute", "prismatic")
-
-
-def read_bounds(limit: ElementTree.Element) -> tuple[float, float]:
-    """Lower and upper bound of a hinge or slider, rad or m; one that is not there is 0."""
-    return float(limit.get("lower", "0")), float(limit.get("upper", "0"))
 
 
 def fix_locked_joints(robot: ElementTree.Element) -> dict[str, float]:

@@ -22,6 +22,7 @@ from msgs_config.character.urdf.inertia import (
     write_moments,
 )
 from msgs_config.character.urdf.joints import fix_locked_joints
+from msgs_config.character.urdf.mimic import lock_followers_of_fixed, read_mimics
 from msgs_config.character.urdf.origin import write_origin
 from msgs_config.character.urdf.vocabulary import listed
 from msgs_config.geometry import fixed_order, rotations
@@ -52,6 +53,8 @@ def repair_urdf(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
     shape has 1 kg.
     """
     warnings = _fill_masses(robot, loading) if loading.fill_inertia else []
+    if loading.mimics:
+        lock_followers_of_fixed(robot, read_mimics(loading.urdf_path, robot, scale=1.0))
     locked = fix_locked_joints(robot)
     if locked:
         places = [f"{name} at {position:.4g}" for name, position in locked.items()]

@@ -40,10 +40,10 @@ def _expand(path: Path, arguments: Mapping[str, str]) -> str:
         raise CharacterError(f"{path}: xacro is not done after {_LONGEST_S:g} s") from error
     if done.returncode != 0:
         lines = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason given"]
-        hint = (
+        remedy = (
             "; the key 'xacro' of a .yaml file gives arguments" if "argument" in lines[-1] else ""
         )
-        raise CharacterError(f"{path}: xacro: {lines[-1][:500]}{hint}")
+        raise CharacterError(f"{path}: xacro: {lines[-1][:500]}{remedy}")
     return done.stdout.decode()
 
 

@@ -62,7 +62,7 @@ class PlainRollout:
     def __init__(self, used: GainArrays) -> None:
         self.gains = used
         self.data = mujoco.MjData(MODEL._model)
-        self.passive = PassiveForces(HUMANOID, PERIOD, np.zeros((N, N)))
+        self.passive = PassiveForces(HUMANOID, PERIOD, 9.81)
         self.law_model = DynamicsModel(HUMANOID)
 
     def positions(
@@ -102,7 +102,7 @@ class PlainRollout:
             PERIOD,
         )
         clipped = LAYOUT.clipped(effort, self.gains.effort_limits)
-        return clipped + self.passive.effort(state, mine)
+        return clipped + self.passive.effort(state, mine, clipped)
 
 
 def message_form(position: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.messages.probe import DynamicsSample
-from sim_node.physics.probe import probe_engine
+from sim_node.physics.probe import measure_probe
 from tests.support.urdf import joint, link, refusal, robot, write_character
 
 
@@ -43,7 +43,7 @@ def loaded(directory: Path, *parts: str, yaml: str = "") -> Character:
 
 
 def assert_engines_agree(character: Character) -> None:
-    sample, _ = probe_engine(character, 9.81)
+    sample = measure_probe(character, 9.81)
     model = DynamicsModel(character)
     model.update(sample.position, sample.velocity)
     force = model.mass_matrix() @ sample.acceleration + model.bias_force()
