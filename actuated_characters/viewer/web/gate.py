@@ -19,11 +19,11 @@ _PROTOCOL = f"viser-v{viser.__version__}"
 _MOST_TARGET = 2000  # characters of a path and its query; browsers send no more
 _MOST_SEGMENT = 255  # of a file's name
 
-# viser's page is one file with scripts and styles within, decompresses itself (WebAssembly), keeps
-# pictures and workers in blobs and data, and talks to its own server. None of it needs another one.
+# viser's page is one file with scripts and styles within, decompresses itself (WebAssembly, whose
+# glue evaluates text), keeps pictures and workers in blobs and data, and talks to its own server.
 _POLICY = (
     "default-src 'none'",
-    "script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' blob:",
+    "script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:",
     "style-src 'self' 'unsafe-inline'",
     "connect-src 'self' data: blob:",
     "img-src 'self' data: blob:",
