@@ -133,11 +133,11 @@ class DynamicsModel:
         """`coupling_correction` with the mass matrix that was factorised last."""
         rows = self._coupling
         assert rows is not None
-        yielding = np.empty_like(rows)
-        mujoco.mj_solveM(self._model, self._data, yielding, rows)
-        delassus = fixed_order.product(rows, yielding.T)
+        responses = np.empty_like(rows)
+        mujoco.mj_solveM(self._model, self._data, responses, rows)
+        delassus = fixed_order.product(rows, responses.T)
         impulses = fixed_order.solve(delassus, violation[:, np.newaxis])[:, 0]
-        correction: FloatArray = -fixed_order.apply(yielding.T, impulses)
+        correction: FloatArray = -fixed_order.apply(responses.T, impulses)
         return correction
 
     def delassus_matrix(self, rows: FloatArray) -> FloatArray:

@@ -29,6 +29,7 @@ from msgs_config.character.model import (
     Joint,
     Link,
     Pose,
+    layout_of,
 )
 from msgs_config.character.sensors import check_sensors
 from msgs_config.character.shapes import read_shapes
@@ -73,7 +74,7 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
     repairs = repair_urdf(robot, file.loading)
     links, led = add_mimics(_load_links(robot, file), file.loading)
     try:
-        layout = JointLayout((link.joint.name, link.joint.type) for link in links)
+        layout = layout_of(links)
     except LayoutError as error:
         raise CharacterError(f"{file.loading.urdf_path}: {error}") from error
     _check_names(file, layout, repairs.fixed)

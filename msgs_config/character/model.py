@@ -138,6 +138,15 @@ class Link:
         return fixed_order.product(axes * np.array(self.inertia_diagonal), axes.T)
 
 
+def layout_of(links: Iterable[Link]) -> JointLayout:
+    """The order of the degrees of freedom of links, listed depth-first; raises LayoutError."""
+    joints = [link.joint for link in links]
+    return JointLayout(
+        ((joint.name, joint.type) for joint in joints),
+        (joint.name for joint in joints if joint.mimic is not None),
+    )
+
+
 @dataclass(frozen=True)
 class Gains:
     """Gains of a joint, of its error, of that one's rate, and of its integral over time."""
@@ -258,11 +267,7 @@ class Character:
     @cached_property
     def layout(self) -> JointLayout:
         """The order of the character's degrees of freedom."""
-        joints = [link.joint for link in self.links]
-        return JointLayout(
-            ((joint.name, joint.type) for joint in joints),
-            (joint.name for joint in joints if joint.mimic is not None),
-        )
+        return layout_of(self.links)
 
     @cached_property
     def coupling(self) -> Coupling:

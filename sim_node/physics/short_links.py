@@ -49,9 +49,14 @@ def short_joints(character: Character) -> list[str]:
 def speed_bound(character: Character, step_s: float, speed_limit: float) -> float:
     """The largest speed of any degree of freedom at engine steps of `step_s`, rad/s or m/s.
 
-    At most `speed_limit`, beyond which a speed counts as divergence.
+    At most half of `speed_limit`, beyond which a speed counts as divergence: where a joint mimics
+    another, the coupling may add to a speed.
     """
-    return min(_LARGEST_TURN / step_s, speed_limit) if short_joints(character) else UNLIMITED_SPEED
+    return (
+        min(_LARGEST_TURN / step_s, 0.5 * speed_limit)
+        if short_joints(character)
+        else UNLIMITED_SPEED
+    )
 
 
 def describe_speed_bound(character: Character, values: Values) -> tuple[str, ...]:

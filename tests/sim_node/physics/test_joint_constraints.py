@@ -269,9 +269,9 @@ def test_the_controller_drives_leaders_alone_and_tracks(tmp_path: Path) -> None:
 
 
 def test_the_probe_knows_neither_friction_nor_coupling(tmp_path: Path) -> None:
-    plain = robot(tmp_path, arm("a", "0 1 0"), arm("b", "0 1 0"))
+    free = robot(tmp_path, arm("a", "0 1 0"), arm("b", "0 1 0"))
     coupled = robot(tmp_path, arm("a", "0 1 0", friction(1.0)), arm("b", "0 1 0", mimic("a", 1.0)))
 
     np.testing.assert_array_equal(
-        measure_probe(plain, GRAVITY).acceleration, measure_probe(coupled, GRAVITY).acceleration
+        measure_probe(free, GRAVITY).acceleration, measure_probe(coupled, GRAVITY).acceleration
     )
