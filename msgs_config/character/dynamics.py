@@ -106,27 +106,31 @@ class DynamicsModel:
         the J of `Coupling.rows`). The factorisation
         `L' D L` follows the tree of the links (Featherstone 2008, section 6.5), and uses no BLAS.
         """
-        data, mass, diagonal = self._data, self._mass, self._diagonal
-        without = mass.take(diagonal)
-        if self._is_damped:
-            added = period * self._damping + added
-        mass.put(diagonal, without + added)
-        mujoco.mj_factorM(self._model, data)
-        mass.put(diagonal, without)
+        self._factorise(added, period)
         acceleration: FloatArray = np.empty(self._layout.size)
-        mujoco.mj_solveM(self._model, data, acceleration[np.newaxis], force[np.newaxis])
+        mujoco.mj_solveM(self._model, self._data, acceleration[np.newaxis], force[np.newaxis])
         if self._coupling is None:
             return acceleration
         return acceleration + self._coupled(fixed_order.apply(self._coupling, acceleration) - rate)
 
-    def coupling_correction(self, violation: FloatArray) -> FloatArray:
+    def _factorise(self, added: FloatArray | float, period: float) -> None:
+        """Factorise `M + D h + diag(added)` over a period h in s."""
+        mass, diagonal = self._mass, self._diagonal
+        without = mass.take(diagonal)
+        if self._is_damped:
+            added = period * self._damping + added
+        mass.put(diagonal, without + added)
+        mujoco.mj_factorM(self._model, self._data)
+        mass.put(diagonal, without)
+
+    def coupling_correction(self, violation: FloatArray, period: float) -> FloatArray:
         """The change (n,) of a velocity that takes a violation J v (k,) of the coupling away.
 
         In the position taken over: `-M^-1 J^T (J M^-1 J^T)^-1 J v`, which impulses between leaders
         and followers lead to. It takes kinetic energy alone (Gauss' principle; Udwadia and Kalaba
-        1992). As of a violation of positions.
+        1992). As of a violation of positions. To M counts D h of a period h in s, as in `solve`.
         """
-        mujoco.mj_factorM(self._model, self._data)
+        self._factorise(0.0, period)
         return self._coupled(violation)
 
     def _coupled(self, violation: FloatArray) -> FloatArray:

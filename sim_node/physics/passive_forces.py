@@ -98,8 +98,8 @@ class PassiveForces:
         assert self._model is not None
         self._model.update(position, velocity)
         first = 6 * self._has_floating_base  # whose place the correction hardly alters
-        position[first:] += self._model.coupling_correction(moved)[first:]
-        velocity += self._model.coupling_correction(rate)
+        position[first:] += self._model.coupling_correction(moved, self._step_s)[first:]
+        velocity += self._model.coupling_correction(rate, self._step_s)
         return True
 
     def _pushed(self, pushes: Sequence[ExternalWrench]) -> FloatArray | float:
