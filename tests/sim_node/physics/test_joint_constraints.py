@@ -218,6 +218,20 @@ def test_the_coupling_bears_light_fingers_that_fall(tmp_path: Path) -> None:
     assert np.abs(state.velocity).max() < 0.1  # it lies there
 
 
+def test_a_snapshot_goes_on_to_the_bit_with_friction_coupling_and_contacts(tmp_path: Path) -> None:
+    file = tmp_path / "hand.urdf"
+    dynamics = '<dynamics damping="0.001" friction="0.003"/>'
+    file.write_text(hand_on_a_body(mimics=True, dynamics=dynamics))
+    whole = load_character(str(file))
+    limp = np.zeros(whole.layout.size)
+    with ac.Simulation(whole) as first, ac.Simulation(whole) as second:
+        for _ in range(60):
+            first.step(limp)
+        second._simulation.load_snapshot(first._simulation.snapshot())
+        for _ in range(60):
+            np.testing.assert_array_equal(first.step(limp).position, second.step(limp).position)
+
+
 def test_a_chain_of_followers_follows_its_first_leader(tmp_path: Path) -> None:
     whole = robot(
         tmp_path,
