@@ -26,7 +26,7 @@ _SUFFIX, _CLIPS = ".json", (".json", ".txt")
 
 def add_motion_edits(commands: "Commands[argparse.ArgumentParser]") -> None:
     """Add the commands to those of `actuated_characters motion`."""
-    trim = _add(commands, "trim", _trim, "cut a clip", "motion trim walk.json --from 1 --to 4")
+    trim = _add(commands, "trim", _trim, "cut a clip", "motion trim walk.json --from 0.2 --to 0.8")
     _add_times(trim, "start, s (0)", "end, s (the clip's)")
     loop = _add(
         commands,

@@ -27,6 +27,7 @@ _ENOUGH = 3e-4  # rad or m of the largest step, at which an iteration ends
 _ACTIVE_SETS = 5  # solutions of a step, between which bounds come and go
 _WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and of these solved again
 _NEAR = 0.2  # m between two shapes at first, beyond which a solution does not bring them together
+_LOWEST = 40  # points of the surface a frame that are kept over the ground, the lowest ones
 _NEAREST = 8  # pairs of shapes a frame that are kept apart, the nearest ones
 
 Linear = tuple[FloatArray, FloatArray]
@@ -162,7 +163,7 @@ class InverseKinematics:
             self._places(goals, origins[:, placed], axes[:, placed], jacobians[:, placed]),
         )
         bounded = (
-            self._ground(goals, origins[:, touching], axes[:, touching], jacobians[:, touching]),
+            self._ground(goals, origins[:, touching], axes[:, touching], jacobians, touching),
             _apart(capsules, goals.overlap_weight, origins, axes, jacobians),
             *self._limits(goals, now),
         )
@@ -223,12 +224,20 @@ class InverseKinematics:
         return moving.reshape(frames, -1, size), missing.reshape(frames, -1)
 
     def _ground(
-        self, goals: Goals, origins: FloatArray, axes: FloatArray, jacobians: FloatArray
+        self,
+        goals: Goals,
+        origins: FloatArray,
+        axes: FloatArray,
+        jacobians: FloatArray,
+        links: IntArray,
     ) -> tuple[FloatArray, FloatArray]:
         arms = np.matmul(axes, goals.surface.offsets[..., np.newaxis])[..., 0]
         heights = origins[..., 2] + arms[..., 2] - goals.surface.radii
-        rising = _point_jacobians(jacobians, arms)[:, :, 2]
-        return goals.ground_weight * rising, goals.ground_weight * (goals.clearance - heights)
+        missing = goals.clearance - heights
+        rows = np.arange(len(missing))[:, np.newaxis]
+        lowest = np.argsort(-missing, axis=1, kind="stable")[:, :_LOWEST]
+        rising = _point_jacobians(jacobians[rows, links[lowest]], arms[rows, lowest])[:, :, 2]
+        return goals.ground_weight * rising, goals.ground_weight * missing[rows, lowest]
 
     def _limits(self, goals: Goals, now: GeneralizedPosition) -> tuple[Linear, Linear]:
         """How the coordinates that have bounds go from them inwards, lower ones and upper ones."""
