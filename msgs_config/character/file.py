@@ -6,18 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from msgs_config import files
-from msgs_config.character.joint_bounds import write_bounds
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
 from msgs_config.character.sensors import Sensor, read_sensors
-from msgs_config.character.urdf.check import check_urdf
 from msgs_config.character.urdf.formats import (
     URDF_SUFFIXES,
     YAML_SUFFIXES,
     check_suffix,
     is_urdf,
 )
-from msgs_config.character.urdf.frames import has_massless_base
-from msgs_config.character.urdf.source import read_urdf_text
+from msgs_config.character.urdf_settings import URDF_KEYS, read_urdf_settings, resolve_key
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.mappings import LARGEST, MappingReader
 
@@ -32,22 +29,11 @@ _GAIN_KEYS = ("stiffness", "damping", "integral")
 _PASSIVE_KEYS = ("passive_damping", "friction", "soft_limit")
 _JOINT_KEYS = (*_GAIN_KEYS, "effort_limit", "lower", "upper", *_PASSIVE_KEYS)
 _CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "signs", "offsets")
-_URDF_KEYS = ("urdf", "scale", "up_axis", "fixed_base", "inertia", "self_collision", "collision")
-_SOURCE_KEYS = ("xacro", "left_out")
 _POSE_KEYS = (
     *("joint_damping", "joint_friction", "rest_pose", "on_ground", "joints", "automatic_gains"),
 )
-_KEYS = (
-    *_URDF_KEYS,
-    *_SOURCE_KEYS,
-    "joint_mimic",
-    *_POSE_KEYS,
-    "root_assistance",
-    "clips",
-    "feet",
-    "planner",
-    "sensors",
-)
+_OTHER_KEYS = ("root_assistance", "clips", "feet", "planner", "sensors")
+_KEYS = (*URDF_KEYS, "left_out", "up_axis", *_POSE_KEYS, *_OTHER_KEYS)
 ALONE: dict[str, Any] = {
     "inertia": "filled",
     "on_ground": True,
@@ -143,7 +129,7 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
     reader.part("root_assistance").check_keys(["force", "torque"])
     assistance = reader.parts("root_assistance", _GAIN_KEYS)
     rest_pose = reader.part("rest_pose")
-    loading, misread = _read_urdf(path, reader, joints, urdf)
+    loading, misread = read_urdf_settings(path, reader, joints, urdf)
     return CharacterFile(
         name=_name(path),
         path=path,
@@ -177,73 +163,6 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
 def _name(path: Path) -> str:
     """The name of a file's character: that of `robot.urdf.xacro` is `robot`."""
     return Path(path.stem).stem if Path(path.stem).suffix.lower() == ".urdf" else path.stem
-
-
-def _read_urdf(
-    path: Path,
-    reader: MappingReader,
-    joints: dict[str, MappingReader],
-    known: tuple[Path, str] | None,
-) -> tuple[UrdfOptions, tuple[str, ...]]:
-    """How the URDF is to be read, and lines about its text.
-
-    `known` are its path and its text, bounds and all.
-    """
-    misread = ""
-    if known is None:
-        urdf = _resolve(path, reader, "urdf")
-        text, misread = read_urdf_text(urdf, _read_arguments(reader.part("xacro")))
-    else:
-        urdf, text = known
-    scale = reader.number("scale", default=1.0, minimum=1e-6)
-    inertia = reader.choice("inertia", ["file", "shapes", "filled"])
-    bounds = {
-        name: (_read_bound(joint, "lower"), _read_bound(joint, "upper"))
-        for name, joint in joints.items()
-        if "lower" in joint.content or "upper" in joint.content
-    }
-    if bounds and known is None:
-        check_urdf(urdf, text, limits=False)
-        text = write_bounds(files.parse_xml(urdf, text, CharacterError), bounds, scale, path)
-    robot = check_urdf(urdf, text)
-    loading = UrdfOptions(
-        urdf_path=urdf,
-        urdf_text=text,
-        scale=scale,
-        fixed_base=reader.flag("fixed_base", default=has_massless_base(robot)),
-        inertia_from_file=inertia != "shapes",
-        fill_inertia=inertia == "filled",
-        self_collision=reader.flag("self_collision"),
-        collisions=reader.choice("collision", ["file", "none"]) == "file",
-        mimics=reader.choice("joint_mimic", ["file", "none"]) == "file",
-    )
-    return loading, (misread,) if misread else ()
-
-
-def _read_arguments(xacro: MappingReader) -> dict[str, str]:
-    """The arguments of a xacro, as its texts have them."""
-    texts = {}
-    for name, value in xacro.content.items():
-        if not isinstance(value, str | int | float):
-            raise xacro.wrong(name, value, "a text, a number, true or false")
-        texts[name] = str(value).lower() if isinstance(value, bool) else str(value)
-    return texts
-
-
-def _read_bound(joint: MappingReader, key: str) -> float | None:
-    """The bound of a joint, rad or m; None if the file leaves the URDF's."""
-    return joint.number(key) if key in joint.content else None
-
-
-def _resolve(path: Path, reader: MappingReader, key: str) -> Path:
-    """The path under a key, which may be relative to the folder of the file that names it."""
-    text = reader.text(key)
-    if "\0" in text:
-        raise reader.wrong(key, text, "a path")
-    try:
-        return files.resolve(text, path.parent, CharacterError)
-    except CharacterError as error:
-        raise CharacterError(f"{path}: {key}: {error}") from error
 
 
 def _read_numbers(joints: dict[str, MappingReader], key: str) -> dict[str, float]:
@@ -295,7 +214,7 @@ def _read_clip_format(path: Path, clips: MappingReader) -> ClipFormat:
     if not clips.content:
         return ClipFormat()
     clips.check_keys(_CLIP_KEYS)
-    pattern = _resolve(path, clips, "files")
+    pattern = resolve_key(path, clips, "files")
     if pattern.name.count("*") != 1:
         raise clips.wrong("files", pattern.name, "a path with one '*'")
     signs, offsets = clips.part("signs"), clips.part("offsets")

@@ -110,7 +110,7 @@ def _check_joint(path: Path, joint: ElementTree.Element) -> None:
     if kind not in _TYPES:
         raise CharacterError(
             f"{path}: joint {name!r} is of type {kind!r}; "
-            "it must be revolute, continuous, prismatic, spherical, fixed or, of the base, floating"
+            "it must be revolute, continuous, prismatic, spherical or fixed, or floating of the base"
         )
     if kind in ("revolute", "prismatic") and joint.find("limit") is None:
         raise CharacterError(f"{path}: joint {name!r} is {kind} and has no <limit>")

@@ -11,6 +11,8 @@ from xml.etree import ElementTree
 
 MAX_NAMES = 5
 """Names in a line; of the others there is the number."""
+MAX_NAME = 100
+"""Characters of a name in a line."""
 VELOCITY = "velocity"
 """The kind of the limits that nothing keeps."""
 
@@ -108,13 +110,15 @@ class _Collector:
         self._places: dict[tuple[str, str], list[str]] = {}
 
     def add(self, kind: str, what: str, place: str) -> None:
+        # a line has no other lines in it, whatever the file has for names
+        place = " ".join(place.split())[:MAX_NAME]
         self._places.setdefault((kind, what), []).append(place)
 
     def read(self, element: ElementTree.Element, known: _Known, place: str) -> None:
         """Remove what does not count from an element; `place` is the link or joint round it."""
         for name in element.attrib:
             if name not in known.attributes and name.partition(":")[0] not in _QUIET:
-                self.add(name, f"'{name}' of <{element.tag}>", place)
+                self.add(name, f"'{name[:MAX_NAME]}' of <{element.tag}>", place)
         counted = set[str]()
         for part in list(element):
             name = place or part.get("name") or part.get("reference") or ""
@@ -123,7 +127,7 @@ class _Collector:
                     continue  # it is the shape, which is refused
                 element.remove(part)
                 where = f" in <{element.tag}>" if part.tag in _TAGS else ""
-                self.add(part.tag, f"<{part.tag}>{where}", name)
+                self.add(part.tag, f"<{part.tag[:MAX_NAME]}>{where}", name)
             elif part.tag in counted and part.tag not in known.repeated:
                 element.remove(part)
                 self.add(part.tag, f"all but the first <{part.tag}> of a {element.tag}", name)

@@ -265,6 +265,15 @@ def test_a_line_counts_and_names_some_and_a_file_may_silence_it(tmp_path: Path) 
     assert left_out(silent) == ["left out: <gazebo> (1)"]
 
 
+def test_a_line_stays_one_whatever_the_names(tmp_path: Path) -> None:
+    parts = f'<transmission name="a&#10;b{"c" * 5000}"/><{"x" * 5000}/>'
+
+    lines = left_out(loaded(tmp_path, arm(more=parts)))
+
+    assert lines[0].startswith("left out: <transmission> (1): a bccc")
+    assert all("\n" not in line and len(line) < 300 for line in lines)
+
+
 def test_what_does_not_count_need_not_be_right(tmp_path: Path) -> None:
     """Of what another program reads, numbers are not looked at."""
     text = arm(more='<gazebo><origin xyz="here"/></gazebo>', inside='<axis xyz="0 0 1"/><axis/>')
