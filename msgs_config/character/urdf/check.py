@@ -19,6 +19,10 @@ MAX_POSITION_ENTRIES = 128  # beyond them PyBullet reads states as empty, withou
 MAX_NAME_BYTES = 255
 
 _TYPES = (*WITH_AXIS, "spherical", "fixed", FLOATING)
+_RIGHT_TYPES = (
+    "revolute, continuous, prismatic, spherical or fixed; floating is for the only joint of a base "
+    "link without <inertial>"
+)
 _LARGEST = 1e30  # the engine's single precision ends at 3e38
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _ANY, _POSITIVE = -_LARGEST, 0.0
@@ -109,8 +113,7 @@ def _check_joint(path: Path, joint: ElementTree.Element) -> None:
     name, kind = joint.get("name"), joint.get("type")
     if kind not in _TYPES:
         raise CharacterError(
-            f"{path}: joint {name!r} is of type {kind!r}; "
-            "it must be revolute, continuous, prismatic, spherical or fixed, or floating of the base"
+            f"{path}: joint {name!r} is of type {kind!r}; it must be {_RIGHT_TYPES}"
         )
     if kind in ("revolute", "prismatic") and joint.find("limit") is None:
         raise CharacterError(f"{path}: joint {name!r} is {kind} and has no <limit>")
@@ -126,8 +129,8 @@ def _check_floating(path: Path, robot: ElementTree.Element) -> None:
         is_base = parent not in children and links[parent].find("inertial") is None
         if joint.get("type") == FLOATING and not (is_base and len(sides) == 1):
             raise CharacterError(
-                f"{path}: joint {joint.get('name')!r} is of type floating; that is for the only "
-                "joint of a base link without <inertial>"
+                f"{path}: joint {joint.get('name')!r} is of type floating; it must be "
+                f"{_RIGHT_TYPES}"
             )
 
 
