@@ -9,6 +9,7 @@ from pathlib import Path
 from tests.documented.collecting import ROOT
 from tests.support.capture_makers import MAKERS as CAPTURE_MAKERS
 from tests.support.captures import capture
+from tests.support.hinged_humanoid import write_robot
 
 _PROGRAM = ROOT / ".venv/bin/actuated_characters"
 
@@ -52,6 +53,15 @@ def _cycles(path: Path) -> None:
     _call(path, "motion", "loop", clip, "--output", path / "cycle.json")
 
 
+def _robot(path: Path) -> None:
+    write_robot(path)
+
+
+def _robots(path: Path) -> None:
+    path.mkdir()
+    write_robot(path / "robot.urdf")
+
+
 def _call(path: Path, *words: object) -> None:
     command = [str(_PROGRAM), *map(str, words)]
     subprocess.run(command, cwd=path.parent, check=True, capture_output=True)
@@ -84,6 +94,8 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "clips": _clips,
     "cycles": _cycles,
     "reconstructed.json": _copy_of("tests/data/walk_reconstructed.json"),
+    "robot.urdf": _robot,
+    "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
     "swing.py": _code("README.md", "class Swing"),
     "holder.py": _code("docs/python.md", "ControllerNode"),

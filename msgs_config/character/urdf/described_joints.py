@@ -16,6 +16,7 @@ from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Joint, Link, Pose, Vector
 from msgs_config.character.sensors import Sensor
+from msgs_config.character.urdf.mimic import Mimic
 from msgs_config.frame_names import BASE_FRAME
 from msgs_config.geometry import elementary, rotations
 
@@ -40,6 +41,7 @@ class DescribedJoint:
     lower: float = -math.inf  # rad or m
     upper: float = math.inf
     effort_limit: float = math.inf  # N m or N
+    mimic: Mimic | None = None  # of a joint that follows another
 
 
 class DescribedJoints:
@@ -180,6 +182,7 @@ def _as_it_is(joint: Joint, parent: str, child: str) -> DescribedJoint:
         lower=joint.lower,
         upper=joint.upper,
         effort_limit=joint.effort_limit,
+        mimic=joint.mimic,
     )
 
 

@@ -165,6 +165,10 @@ def _joint(joint: DescribedJoint) -> ElementTree.Element:
             limits |= {"lower": joint.lower, "upper": joint.upper}
         bounded = {n: max(min(value, _UNLIMITED), -_UNLIMITED) for n, value in limits.items()}
         ElementTree.SubElement(element, "limit", {n: repr(v) for n, v in bounded.items()})
+    if joint.mimic is not None:
+        leader, multiplier, offset = joint.mimic
+        numbers = {"multiplier": repr(multiplier), "offset": repr(offset)}
+        ElementTree.SubElement(element, "mimic", {"joint": leader} | numbers)
     return element
 
 

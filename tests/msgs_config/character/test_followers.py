@@ -1,6 +1,7 @@
 """Joints that mimic others: what a URDF may say, and what a character makes of it."""
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from controller_node import parameters as controller_parameters
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
+from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.errors import CharacterError, CommandError, ConfigurationError
 from msgs_config.messages import configuration
 from msgs_config.parameters import Values
@@ -87,6 +89,9 @@ def test_lengths_of_a_scaled_slider_are_scaled(tmp_path: Path) -> None:
 
     mimic = {each.name: each.mimic for each in whole.moving_joints}["b"]
     assert mimic == ("a", pytest.approx(0.2), pytest.approx(0.04))
+    described = ElementTree.fromstring(robot_description(whole)).find("joint[@name='b']/mimic")
+    assert described is not None
+    assert float(described.get("offset", "")) == pytest.approx(0.04)
 
 
 def test_a_leader_rests_where_its_followers_may_be(tmp_path: Path) -> None:
@@ -100,6 +105,12 @@ def test_a_leader_rests_where_its_followers_may_be(tmp_path: Path) -> None:
 
 def test_what_follows_a_fixed_joint_is_fixed_itself(tmp_path: Path) -> None:
     whole = load(tmp_path, joint("a", kind="fixed"), joint("b", 'joint="a"'), joint("c"))
+
+    assert [each.name for each in whole.moving_joints] == ["c"]
+
+
+def test_what_follows_a_joint_without_room_is_fixed_too(tmp_path: Path) -> None:
+    whole = load(tmp_path, joint("a", lower=0, upper=0), joint("b", 'joint="a"'), joint("c"))
 
     assert [each.name for each in whole.moving_joints] == ["c"]
 
