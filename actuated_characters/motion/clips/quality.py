@@ -1,6 +1,6 @@
 """How good a clip is: feet in the ground, feet that slide, limits that are touched, speeds."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from msgs_config.geometry import rotations
 
 _AT_LIMIT = 0.03  # rad
 _SHORTEST_SWING = 0.2  # s
+_BLOCK = 256  # frames
 _OVERLAPS, _IN_GROUND, _CLEARANCE = 0.005, 0.01, 0.01  # m beyond which there is a remark
 _SKATING, _STANDING = 0.05, 0.05  # m/s, and of the frames
 _DIGITS = 4
@@ -56,10 +57,8 @@ def measure_quality(target: TargetBody, clip: MotionClip) -> ClipQuality:
     character, layout = target.character, target.character.layout
     origins, turns = link_poses(target, clip)
     overlaps, overlapping = _overlaps(target, origins, turns)
-    surface = target.surface
-    arms = rotations.rotate(turns[:, surface.links], surface.offsets)
-    depths = surface.radii - origins[:, surface.links, 2] - arms[..., 2]
-    deepest = int(np.argmax(depths.max(axis=0)))
+    depths = _depths(target, origins, turns)
+    deepest = int(np.argmax(depths))
     sink, speeds, stands = 0.0, [np.empty(0)], np.zeros(len(clip.times), dtype=np.bool_)
     clearances: list[float] = []
     durations = np.diff(clip.times)
@@ -82,8 +81,8 @@ def measure_quality(target: TargetBody, clip: MotionClip) -> ClipQuality:
     skating = np.concatenate(speeds)
     return ClipQuality(
         feet_in_ground_m=sink,
-        deepest_m=max(float(depths[:, deepest].max()), 0.0),
-        deepest_link=character.links[int(surface.links[deepest])].name,
+        deepest_m=max(float(depths[deepest]), 0.0),
+        deepest_link=character.links[int(target.surface.links[deepest])].name,
         skating_mean_m_s=float(skating.mean()) if len(skating) else None,
         skating_p95_m_s=float(np.percentile(skating, 95)) if len(skating) else None,
         standing_share=float(stands.mean()),
@@ -97,15 +96,36 @@ def measure_quality(target: TargetBody, clip: MotionClip) -> ClipQuality:
     )
 
 
+def _depths(target: TargetBody, origins: FloatArray, turns: FloatArray) -> FloatArray:
+    """How deep (p,) each point of the surface is in the ground at most, m; below 0 over it."""
+    surface, deepest = target.surface, np.full(len(target.surface.links), -np.inf)
+    for rows in _blocks(len(origins)):
+        arms = rotations.rotate(turns[rows][:, surface.links], surface.offsets)
+        depths = surface.radii - origins[rows][:, surface.links, 2] - arms[..., 2]
+        deepest = np.maximum(deepest, depths.max(axis=0))
+    return deepest
+
+
 def _overlaps(target: TargetBody, origins: FloatArray, turns: FloatArray) -> tuple[FloatArray, str]:
     """The depth (f,) in m of the two shapes that are deepest in each other, and which these are."""
     capsules, links = target.capsules, target.character.links
+    overlaps = np.zeros(len(origins))
     if not len(capsules.pairs):
-        return np.zeros(len(origins)), ""
-    depths = -capsules.nearest(origins, rotations.matrix(turns)).distance
-    worst = capsules.pairs[int(np.argmax(depths.max(axis=0)))]
+        return overlaps, ""
+    deepest = np.full(len(capsules.pairs), -np.inf)
+    for rows in _blocks(len(origins)):
+        depths = -capsules.nearest(origins[rows], rotations.matrix(turns[rows])).distance
+        overlaps[rows] = np.maximum(depths.max(axis=1), 0.0)
+        deepest = np.maximum(deepest, depths.max(axis=0))
+    worst = capsules.pairs[int(np.argmax(deepest))]
     pair = " and ".join(links[int(capsules.links[each])].name for each in worst)
-    return np.maximum(depths.max(axis=1), 0.0), pair
+    return overlaps, pair
+
+
+def _blocks(frames: int) -> Iterator[slice]:
+    """The frames in parts, whose arrays fit into memory where a robot has thousands of points."""
+    for first in range(0, frames, _BLOCK):
+        yield slice(first, first + _BLOCK)
 
 
 def _swing_clearances(clip: MotionClip, side: str, heights: FloatArray) -> list[float]:
