@@ -49,7 +49,7 @@ def describe_foreign_motion(path: Path) -> str:
         with path.open("rb") as file:
             beginning = file.read(64)
     except (OSError, ValueError):
-        pass  # whoever reads it says why
+        pass  # reading it says why
     if beginning.startswith(_LFS_POINTER):
         return "a Git LFS pointer, not the file itself; 'git lfs pull' in its repository gets it"
     suffix = next(

@@ -137,7 +137,7 @@ def _with_segments(links: Sequence[Link], nearest: SkeletonMap, parts: Parts) ->
                 above = segments[role]
     for role, below in (("head", "chest"), ("chest", "pelvis")):
         if role in segments and not _moving_between(links, nearest[below], nearest[role]):
-            del segments[role]  # it has no motion of its own
+            del segments[role]  # it moves with the one below
     return TargetJoints(SkeletonMap(segments), joints)
 
 
