@@ -11,6 +11,7 @@ PACKAGES = {
     "search": ("cma",),
     "video": ("av",),
     "view": ("viser", "websockets"),
+    "xacro": ("xacro",),
 }
 """Python packages of the extras of `setup.py`, by the extras' names."""
 

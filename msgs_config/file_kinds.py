@@ -36,11 +36,7 @@ _KINDS: dict[str, tuple[str, str]] = {  # by suffix: what it is, and what to do
     ".pt": ("a PyTorch file", _NONE_HERE),
     ".onnx": ("a network (ONNX)", _NONE_HERE),
     ".urdf": ("the description of a robot (URDF)", _CHARACTER),
-    ".xacro": (
-        "a xacro file",
-        "'xacro FILE > robot.urdf' makes a URDF of it, which goes where a character does: "
-        "--character",
-    ),
+    ".xacro": ("a xacro file", _CHARACTER),
     ".sdf": ("a model or world of Gazebo (SDF)", "a URDF of it can be a character"),
     ".world": ("a world of Gazebo (SDF)", "a URDF of a robot can be a character"),
     ".mjcf": ("a model of MuJoCo (MJCF)", "a URDF of it can be a character"),

@@ -102,9 +102,9 @@ class DynamicsModel:
         """The acceleration `a` (n,) of `(M + D h + diag(added)) a = force` over a period h in s.
 
         The passive damping D is then that of the velocity at the period's end, and followers
-        accelerate as their leaders do, by an effort that does no work (`J a` is `rate`, with
-        the J of `Coupling.rows`). The factorisation
-        `L' D L` follows the tree of the links (Featherstone 2008, section 6.5), and uses no BLAS.
+        accelerate as their leaders do, by an effort that does no work (`J a` is `rate`, with the J
+        of `Coupling.rows`). The factorisation `L' D L` follows the tree of the links (Featherstone
+        2008, section 6.5), and uses no BLAS.
         """
         self._factorise(added, period)
         acceleration: FloatArray = np.empty(self._layout.size)

@@ -66,9 +66,8 @@ class CharacterFile:
     feet: tuple[str, ...]
     planning: Planning
     sensors: tuple[Sensor, ...]
-    left_out: frozenset[
-        str
-    ]  # kinds of what does not count in the URDF, of which no line is printed
+    # kinds of what does not count in the URDF, of which no line is printed
+    left_out: frozenset[str]
     misread: tuple[str, ...]  # the line that says so if the URDF is not in its encoding
 
 

@@ -156,7 +156,7 @@ def _apply_file(joint: Joint, file: CharacterFile) -> Joint:
                 f"{file.loading.urdf_path}: joint '{name}' has a {kind} of {value:g}; it must be 0 "
                 f"or more, or not count ('joint_{kind}: none' in {file.path.name})"
             )
-    if name in file.friction and joint.type not in SCALAR:
+    if name in file.friction and joint.type is JointType.SPHERICAL:
         raise CharacterError(
             f"{file.path}: joints.{name}.friction: it is for hinges and sliders, this joint is "
             f"{joint.type.value}"

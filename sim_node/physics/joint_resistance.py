@@ -70,11 +70,11 @@ class JointResistance:
                 acceleration = model.solve(given, np.where(locked, heavy, 0.0), step)
             force = np.where(locked, heavy * (wanted - acceleration), slides)
             after = velocity + step * acceleration
-            changed = self._switch(force, after, rests, slides)
+            changed = self._switch(force, after, rests, slides, stopped)
             changed |= _switch_limits(force, after, target, at_limit, side, stopped, self.friction)
             if not changed:
                 break
-        self.spare = np.where(rests, np.maximum(self.friction - np.abs(force), 0.0), 0.0)
+        self.spare = np.where(rests & ~stopped, np.maximum(self.friction - np.abs(force), 0.0), 0.0)
         whole = model.inverse_dynamics(acceleration) - self._damping * velocity - known
         return np.where(self._resisted, whole, 0.0)
 
@@ -87,11 +87,19 @@ class JointResistance:
         return has_friction & ~fast, np.where(fast, -np.sign(velocity) * self.friction, 0.0)
 
     def _switch(
-        self, force: FloatArray, after: FloatArray, rests: BoolArray, slides: FloatArray
+        self,
+        force: FloatArray,
+        after: FloatArray,
+        rests: BoolArray,
+        slides: FloatArray,
+        stopped: BoolArray,
     ) -> bool:
-        """Let joints slide whose friction is too small, and rest which it drives; if there are."""
-        lets_go = rests & (np.abs(force) > self.friction * (1.0 + _ROUNDING))
-        stops = (slides != 0.0) & (slides * after > 0.0)
+        """Let joints slide whose friction is too small, and rest which it drives; if there are.
+
+        One that a limit has stopped stays as it is: the force is the limit's.
+        """
+        lets_go = rests & ~stopped & (np.abs(force) > self.friction * (1.0 + _ROUNDING))
+        stops = (slides != 0.0) & (slides * after > 0.0) & ~stopped
         rests[:] = (rests & ~lets_go) | stops
         slides[:] = np.where(lets_go, np.copysign(self.friction, force), slides)
         slides[stops] = 0.0

@@ -25,7 +25,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, SoftLimit
-from msgs_config.geometry import fixed_order, frames
+from msgs_config.geometry import fixed_order, frames, rotations
 from msgs_config.geometry.frames import Triple
 from sim_node.physics.joint_resistance import JointResistance
 from sim_node.physics.wrenches import ExternalWrench
@@ -45,6 +45,7 @@ class PassiveForces:
         """For engine steps of `step_s`, and a gravity in m/s^2 along -z."""
         self._step_s, self._coupling = step_s, character.coupling
         self._has_floating_base = character.layout.has_floating_base
+        self._rotation_entries = character.layout.rotation_entries[self._has_floating_base :]
         self._limits = [
             (character.layout.joint(joint.name).entries, joint.soft_limit)
             for joint in character.moving_joints
@@ -97,8 +98,13 @@ class PassiveForces:
             return False
         assert self._model is not None
         self._model.update(position, velocity)
-        first = 6 * self._has_floating_base  # whose place the correction hardly alters
-        position[first:] += self._model.coupling_correction(moved, self._step_s)[first:]
+        correction = self._model.coupling_correction(moved, self._step_s)
+        correction[: 6 * self._has_floating_base] = 0.0  # whose place it hardly alters
+        entries = self._rotation_entries
+        turns = rotations.exp(position[entries])
+        position += correction
+        turned = rotations.multiply(turns, rotations.exp(correction[entries]))
+        position[entries] = rotations.log(turned)
         velocity += self._model.coupling_correction(rate, self._step_s)
         return True
 

@@ -50,7 +50,7 @@ def speed_bound(character: Character, step_s: float, speed_limit: float) -> floa
     """The largest speed of any degree of freedom at engine steps of `step_s`, rad/s or m/s.
 
     At most half of `speed_limit`, beyond which a speed counts as divergence: where a joint mimics
-    another, the coupling may add to a speed.
+    another, the coupling may add to a speed. So by its speed alone such a character never diverges.
     """
     return (
         min(_LARGEST_TURN / step_s, 0.5 * speed_limit)

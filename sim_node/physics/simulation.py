@@ -97,10 +97,16 @@ class Simulation:
         """
         if self._is_closed:
             return
-        for character in self.characters:
-            character.find_contacts()
         self._is_closed = True
-        self._world.close()
+        self._end_world()
+
+    def _end_world(self) -> None:
+        """End the engine, after what the last tick has led to was found in it."""
+        try:
+            for character in self.characters:
+                character.find_contacts()
+        finally:
+            self._world.close()
 
     def check_open(self) -> None:
         """Raise ClosedError if it is closed."""
@@ -208,7 +214,7 @@ class Simulation:
         for character in self.characters:
             if (state := states.get(character.setup.name)) is not None:
                 character.begin_in(state.position, state.velocity)
-        self._world.close()  # first: two engines at a time would take twice the memory
+        self._end_world()  # first: two engines at a time would take twice the memory
         self._world = self._fresh_world()
 
     def snapshot(self) -> Snapshot:
@@ -244,7 +250,7 @@ class Simulation:
             self.settings = snapshot.settings
             for character, its in each:
                 character.begin_in(*its.start)
-            self._world.close()
+            self._end_world()
             self._world = self._fresh_world()
         if not is_first:
             self._world.from_bytes(snapshot.world, snapshot.balls)

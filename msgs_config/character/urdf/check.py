@@ -124,10 +124,12 @@ def _check_floating(path: Path, robot: ElementTree.Element) -> None:
     links = {link.get("name"): link for link in robot.findall("link")}
     children = {joint_end(joint, "child") for joint in robot.findall("joint")}
     for joint in robot.findall("joint"):
+        if joint.get("type") != FLOATING:
+            continue
         parent = joint_end(joint, "parent")
         sides = [each for each in robot.findall("joint") if joint_end(each, "parent") == parent]
         is_base = parent not in children and links[parent].find("inertial") is None
-        if joint.get("type") == FLOATING and not (is_base and len(sides) == 1):
+        if not (is_base and len(sides) == 1):
             raise CharacterError(
                 f"{path}: joint {joint.get('name')!r} is of type floating; it must be "
                 f"{_RIGHT_TYPES}"
@@ -140,11 +142,8 @@ def _check_size(path: Path, robot: ElementTree.Element, joints: list[ElementTree
         raise CharacterError(f"{path}: {len(joints)} joints; there can be {MAX_LINKS}")
     frames = find_frames(robot)
     joints = [joint for joint in joints if joint not in frames]
-    widths = {
-        "spherical": 4,
-        "fixed": 0,
-        FLOATING: 0,
-    }  # of a position in the engine, a quaternion for a ball
+    # of a position in the engine, which is a quaternion for a ball joint
+    widths = {"spherical": 4, "fixed": 0, FLOATING: 0}
     entries = 7 + sum(widths.get(joint.get("type", ""), 1) for joint in joints)
     if len(joints) > MAX_JOINTS or entries > MAX_POSITION_ENTRIES:
         raise CharacterError(

@@ -13,6 +13,7 @@ from msgs_config.character.model import Character, Link, Pose, Quadruple, Shape,
 from msgs_config.character.urdf.described_joints import DescribedJoint, DescribedJoints
 from msgs_config.character.urdf.inertia import read_inertial, write_moments
 from msgs_config.character.urdf.joints import fix_locked_joints
+from msgs_config.character.urdf.mimic import Mimic, lock_followers_of_fixed, read_mimics
 from msgs_config.character.urdf.origin import write_numbers, write_origin
 from msgs_config.frame_names import BASE_FRAME
 from msgs_config.geometry import rotations
@@ -33,6 +34,9 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
     joints = DescribedJoints(character, base_frame)
     if character.loading.scale == 1.0 and _is_legal(character.loading.robot):
         robot = resolve_meshes(character.loading).robot
+        if character.loading.mimics:
+            path = character.loading.urdf_path
+            lock_followers_of_fixed(robot, read_mimics(path, robot, scale=1.0))
         fix_locked_joints(robot)
         for mesh in robot.iterfind("link//mesh"):
             mesh.set("filename", Path(mesh.get("filename", "")).as_uri())
@@ -51,16 +55,32 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
 
 
 def _write_joints(robot: ElementTree.Element, joints: DescribedJoints) -> None:
-    """Give joints the type and the effort limit that they have here."""
+    """Give joints the type, the effort limit and the leader that they have here."""
     elements = {joint.get("name"): joint for joint in robot.findall("joint")}
     for joint in joints.fixed:  # also what moves no mass
         if joint.name in elements:
             elements[joint.name].set("type", "fixed")
+            _write_mimic(elements[joint.name], None)
     for joint in joints.moving:
+        _write_mimic(elements[joint.name], joint.mimic)
         limit = elements[joint.name].find("limit")
         effort = min(joint.effort_limit, _UNLIMITED)
-        if limit is not None and float(limit.get("effort", "0")) != effort:
+        if limit is None or joint.mimic is not None:  # no motor drives a follower
+            continue
+        if float(limit.get("effort", "0")) != effort:
             limit.set("effort", repr(effort))
+
+
+def _write_mimic(element: ElementTree.Element, mimic: Mimic | None) -> None:
+    """Let a joint follow what it follows here, or nothing, where its file says otherwise."""
+    own = element.find("mimic")
+    if own is not None:
+        if mimic is None:
+            element.remove(own)
+        elif own.get("joint") != mimic.leader:
+            own.set("joint", mimic.leader)
+            own.set("multiplier", repr(mimic.multiplier))
+            own.set("offset", repr(mimic.offset))
 
 
 def _write_inertia(robot: ElementTree.Element, character: Character) -> None:

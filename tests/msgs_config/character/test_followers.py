@@ -171,3 +171,26 @@ def test_a_command_for_a_follower_is_rejected_in_a_line(tmp_path: Path) -> None:
         barrier.submit(1, np.array([0, 1]), np.zeros(2))
     with pytest.raises(ConfigurationError, match="commanded_joints: 'b' mimics 'a'"):
         load_parameters({"character": str(tmp_path / "robot.urdf"), "commanded_joints": ["a", "b"]})
+
+
+def test_a_follower_of_a_locked_joint_is_described_where_it_is_simulated(tmp_path: Path) -> None:
+    locked = joint("ja", lower=0.5, upper=0.5)
+    whole = load(tmp_path, locked, joint("jb", 'joint="ja"'))
+
+    described = ElementTree.fromstring(robot_description(whole))
+
+    follower = described.find("joint[@name='jb']")
+    assert follower is not None and follower.get("type") == "fixed"
+    assert follower.find("mimic") is None
+    origin = follower.find("origin")
+    assert origin is not None
+    assert [float(n) for n in origin.get("rpy", "").split()] == pytest.approx([0.0, 0.0, 0.5])
+
+
+def test_joints_that_are_apart_here_are_described_so(tmp_path: Path) -> None:
+    joints = (joint("ja"), joint("jb", 'joint="ja"'))
+
+    apart = load(tmp_path, *joints, yaml="joint_mimic: none\n")
+
+    assert "<mimic" not in robot_description(apart)
+    assert "<mimic" in robot_description(load(tmp_path, *joints))

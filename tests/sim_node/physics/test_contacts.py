@@ -5,12 +5,16 @@ its step and the places in which the links were right before it.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import pybullet
+from msgs_config.character.model import UrdfOptions
+from msgs_config.errors import CharacterError
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.body import Body
 from sim_node.physics.simulated_character import Contacts, SimulatedCharacter
@@ -158,3 +162,16 @@ def test_they_can_be_read_after_the_end_and_a_reset_forgets_them() -> None:
             run.advance(np.zeros(run.layout.size))
     assert last.contacts is not None
     assert last.contacts.touching.any()
+
+
+def test_a_reset_that_fails_leaves_what_can_be_closed_with_its_contacts() -> None:
+    with simulation("humanoid") as run:
+        run.watches_contacts = True
+        run.step([np.zeros(run.characters[0].layout.size)])
+        terrain = UrdfOptions(Path("/nowhere.urdf"), "<robot name='r'><link name='l'>", True)
+
+        with pytest.raises(CharacterError):
+            run.reset(replace(run.settings.world, terrain=terrain))
+
+        assert run.characters[0].contacts is not None
+        run.close()

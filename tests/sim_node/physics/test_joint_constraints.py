@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import actuated_characters as ac
+from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, LayoutError
@@ -289,3 +290,24 @@ def test_the_probe_knows_neither_friction_nor_coupling(tmp_path: Path) -> None:
     np.testing.assert_array_equal(
         measure_probe(free, GRAVITY).acceleration, measure_probe(coupled, GRAVITY).acceleration
     )
+
+
+def test_a_hinge_with_friction_that_leans_on_its_limit_is_solved_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Friction and limit must not take turns at letting it go until the trials are over."""
+    limit = '<limit lower="-1" upper="1" effort="100" velocity="9"/>'
+    whole = robot(tmp_path, arm("a", "0 1 0", friction(0.1), limit=limit))
+    solves = []
+    solve = DynamicsModel.solve
+
+    def counted(self: DynamicsModel, *given: object) -> object:
+        solves.append(given)
+        return solve(self, *given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(DynamicsModel, "solve", counted)
+
+    states = simulate(whole, 1.0, {"a_joint": 5.0}, {"a_joint": 0.99})
+
+    assert abs(states[-1].position[0] - 1.0) < 0.01
+    assert len(solves) <= 4 * len(states)
