@@ -74,7 +74,7 @@ setup(
         # `view` and `run --view`: characters in a browser (50 MB with what it needs, MIT; the web
         # client is in the wheel, and works offline). The checks of requests and messages, and how
         # poses are sent, go by what 1.1 is like inside.
-        "view": ["msgspec>=0.19", "viser>=1.1,<1.2", "websockets>=14"],
+        "view": ["msgspec>=0.19", "viser>=1.1,<1.2", "websockets>=16,<17"],
         # Films of recordings. Its wheel (36 MB, BSD-3) carries FFmpeg with libx264, which is GPL.
         "video": ["av>=14,<19"],
         # Pinocchio, which `make robots` compares masses and forces with (BSD-2, 380 MB with what it

@@ -299,14 +299,14 @@ class Simulation:
                 f"an effort has shape {np.shape(effort)}; it must be "
                 f"({self.character.layout.size},), one entry a degree of freedom"
             )
+        if not np.isfinite(effort).all():
+            raise ConfigurationError("an effort has entries that are not finite")
         (one,) = self._simulation.characters
         check_undriven(self.character, effort)
         if one.state.effort is None:
             self._hash.add(one.state)
         pushes = self._pushes.take(self._simulation.tick)
-        wanted = np.asarray(effort, dtype=float)
-        if not self._drives_all:
-            wanted = np.where(one.commanded, wanted, 0.0)
+        wanted = effort if self._drives_all else np.where(one.commanded, effort, 0.0)
         self._simulation.step([wanted], [pushes])
         self._hash.add(one.state)
         return one.state

@@ -1,5 +1,6 @@
 """The numbers that a program hands over, as the arrays that simulation and controller need."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -25,10 +26,14 @@ def finite_state(state: StampedState, size: int) -> StampedState:
 
 
 def has_arrays(state: StampedState, size: int) -> bool:
-    """Whether a state's position and velocity are arrays (size,)."""
-    position, velocity = state.position, state.velocity
-    are_arrays = isinstance(position, np.ndarray) and isinstance(velocity, np.ndarray)
-    return are_arrays and position.shape == velocity.shape == (size,)
+    """Whether a state's position and velocity are arrays (size,) of finite doubles."""
+    return all(
+        isinstance(each, np.ndarray)
+        and each.dtype == np.float64
+        and each.shape == (size,)
+        and math.isfinite(each.sum())
+        for each in (state.position, state.velocity)
+    )
 
 
 def real_array(what: str, numbers: Sequence[float] | FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ begins, with the last message of each latched topic, which say what the states m
 """
 
 import shutil
+from collections import deque
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from actuated_characters.bags.writer import BagWriter
 from actuated_characters.runs.run_directory import EARLIER_BAG
 from msgs_config.errors import RecordingError
 
+_STATIC_SETS = 64  # of static frames, one of each character
+
 
 class LastPartsWriter:
     """A `BagWriter` that keeps at least so many bytes of messages, and at most twice as many."""
@@ -26,7 +29,7 @@ class LastPartsWriter:
         self._earlier = path.with_name(EARLIER_BAG)
         self._custom_data: dict[str, str] = {}
         self._topics: dict[str, tuple[type, QoSProfile]] = {}
-        self._latched: dict[str, tuple[bytes, int | None]] = {}
+        self._latched: dict[str, deque[tuple[bytes, int | None]]] = {}
         self._size = 0  # of the messages in the newer file
         self._bag = BagWriter(path, **options)
 
@@ -49,7 +52,10 @@ class LastPartsWriter:
         self._bag.write(topic, raw, log_time_ns, published_ns)
         self._size += len(raw)
         if self._topics[topic][1].durability is DurabilityPolicy.TRANSIENT_LOCAL:
-            self._latched[topic] = raw, published_ns
+            # each character of a world has static frames of its own on the one topic
+            most = _STATIC_SETS if topic == "/tf_static" else 1
+            latched = self._latched.setdefault(topic, deque(maxlen=most))
+            latched.append((raw, published_ns))
 
     def flush(self) -> None:
         """Hand all that was written to the operating system. Raises as `BagWriter`."""
@@ -76,8 +82,9 @@ class LastPartsWriter:
             self._bag.set_custom_data(name, text)
         for topic, (message_type, qos) in self._topics.items():
             self._bag.add_topic(topic, message_type, qos)
-        for topic, (raw, published_ns) in self._latched.items():
-            self._bag.write(topic, raw, log_time_ns, published_ns)
+        for topic, latched in self._latched.items():
+            for raw, published_ns in latched:
+                self._bag.write(topic, raw, log_time_ns, published_ns)
 
 
 def _join(earlier: Path, bag: Path) -> None:

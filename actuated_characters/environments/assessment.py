@@ -30,13 +30,22 @@ class Assessment:
     """Observations (k,) and rewards of one character's states, by a model of its dynamics."""
 
     def __init__(
-        self, character: Character, model: DynamicsModel, step_rate_hz: float, terrain: Terrain
+        self,
+        character: Character,
+        model: DynamicsModel,
+        step_rate_hz: float,
+        terrain: Terrain,
+        *,
+        falls: bool,
     ) -> None:
-        """For steps at a rate, on a terrain; the model is in another state after each call."""
+        """For steps at a rate, on a terrain; without gravity nothing `falls`.
+
+        The model is in another state after each call.
+        """
         self._model = model
-        reader = reader_for(character, terrain)
+        reader = reader_for(character, terrain) if falls else None
         self.fall = None if reader is None else FallWatch(reader, step_rate_hz)
-        """Watches the states that are judged for a fall; None for a fixed base."""
+        """Watches the states that are judged for a fall; None where there is none."""
         self._floats = character.layout.has_floating_base
         self._joints = slice(_BASE if self._floats else 0, None)
         size = character.layout.size
@@ -78,10 +87,10 @@ class Assessment:
 
     def _is_over(self, state: StampedState, desired: ReferenceState, away: FloatArray) -> bool:
         """Whether an episode ends: it fell, or its centre of mass is far, by `away` (3,) m."""
-        if self.fall is None:
-            return False
-        fell = self.fall.has_fallen(state.position, desired.configuration.position)
-        return fell or bool(fixed_order.norm(away) > FARTHEST)
+        fell = self.fall is not None and self.fall.has_fallen(
+            state.position, desired.configuration.position
+        )
+        return fell or (self._floats and bool(fixed_order.norm(away) > FARTHEST))
 
     def _error(self, state: StampedState, desired: ReferenceState) -> FloatArray:
         """The error (n,) from a state to a desired one: `JointLayout.difference`."""

@@ -134,7 +134,11 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         )
         terrain = self._simulation.settings.world.terrain
         self._assessment = Assessment(
-            self._character, model, clock.rate_hz / ticks_per_step, terrain
+            self._character,
+            model,
+            clock.rate_hz / ticks_per_step,
+            terrain,
+            falls=values.number("gravity") > 0.0,
         )
         self.observation_space = gymnasium.spaces.Box(
             -np.inf, np.inf, (self._assessment.size,), dtype=np.float64

@@ -93,7 +93,9 @@ def limit_shares(sizes: FloatArray, limits: FloatArray) -> FloatArray:
     return shares
 
 
-def follows_state(errors: FloatArray, moved: FloatArray, before: BoolArray) -> BoolArray:
+def follows_state(
+    errors: FloatArray, moved: FloatArray, before: BoolArray, begins: BoolArray
+) -> BoolArray:
     """Where (r, b) a reference is made of the state that it should judge.
 
     It is the state, though that has moved: nothing that is controlled is exact as it moves. Where
@@ -103,16 +105,19 @@ def follows_state(errors: FloatArray, moved: FloatArray, before: BoolArray) -> B
         errors: Distance of each vector from its reference, rad or m; NaN without a reference.
         moved: Distance of each vector from where it was a tick before, rad or m.
         before: Whether each vector (b,) followed in the tick before the first.
+        begins: Where (r,) an episode begins, into which nothing has moved.
     """
     exact = errors <= _EXACT
-    follows: BoolArray = exact & (moved > _EXACT)
+    follows: BoolArray = exact & (moved > _EXACT) & ~begins[:, np.newaxis]
     resting = exact & ~follows
     if resting.any() and (before.any() or follows.any()):
         rows = range(len(follows))
         for row in rows:
-            follows[row] |= resting[row] & (follows[row - 1] if row else before)
+            if not begins[row]:
+                follows[row] |= resting[row] & (follows[row - 1] if row else before)
         for row in reversed(rows[:-1]):
-            follows[row] |= resting[row] & follows[row + 1]
+            if not begins[row + 1]:
+                follows[row] |= resting[row] & follows[row + 1]
     return follows
 
 

@@ -13,7 +13,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import CharacterError
-from msgs_config.geometry import rotations
+from msgs_config.geometry import elementary, fixed_order, rotations
 from msgs_config.geometry.single_rotations import Vector, exp, rotate
 from sim_node.physics.ground import Ground
 
@@ -83,9 +83,7 @@ class PostureReader:
 def tilts(up: FloatArray, desired: FloatArray) -> FloatArray:
     """Angle (r,) in rad between upward axes (r, 3) and desired ones; NaN: the vertical is."""
     wanted = np.where(np.isnan(desired), _UP, desired)
-    cosine = np.clip(np.sum(up * wanted, axis=1), -1.0, 1.0)
-    angles: FloatArray = np.arccos(cosine)
-    return angles
+    return elementary.arccos(np.clip(fixed_order.dot(up, wanted), -1.0, 1.0))
 
 
 def is_down(body: Posture, desired: Posture, standing_height: float) -> BoolArray:

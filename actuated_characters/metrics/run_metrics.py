@@ -212,12 +212,12 @@ class Measurement:
         pairs = [series[position] - series[reference] for position, reference, _ in names]
         return np.abs(np.array(pairs))
 
-    def _follows(self, position: FloatArray, errors: FloatArray) -> BoolArray:
-        """Where (r, b) the reference of the next r ticks follows the state."""
+    def _follows(self, position: FloatArray, errors: FloatArray, begins: BoolArray) -> BoolArray:
+        """Where (r, b) the reference of the next r ticks follows the state; see `follows_state`."""
         before = np.vstack([position[:1] if self._before is None else self._before, position[:-1]])
         self._before = position[-1:]
         moved = distances(self._layout, before, position)
-        follows = follows_state(errors, moved, self._followed)
+        follows = follows_state(errors, moved, self._followed, begins)
         self._followed = follows[-1]
         return follows
 
@@ -248,7 +248,8 @@ class Measurement:
         columns = dict(zip(self._columns, rows.T, strict=True))
         columns["time_s"][:] = stamps / NANOSECONDS_PER_SECOND
         errors = distances(self._layout, position, desired)
-        follows = self._follows(position, errors)
+        begins = np.array([tick.state.effort is None for tick in block], dtype=np.bool_)
+        follows = self._follows(position, errors, begins)
         errors[follows] = np.nan  # of a reference that is the state, no error is known
         if self._kinds.rotating.any():
             columns["joint_error_mean_rad"][:] = _rows(np.mean, errors[:, self._kinds.rotating])

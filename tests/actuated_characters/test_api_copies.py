@@ -169,7 +169,7 @@ def test_a_copied_model_computes_with_its_own_state(
 @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
 def test_a_world_says_that_it_cannot_be_copied(duplicate: Callable[[object], object]) -> None:
     with ac.Simulation(character("pendulum")) as simulation:
-        with pytest.raises(SimulationError, match="neither copied nor pickled; make another"):
+        with pytest.raises(SimulationError, match="neither copied nor pickled; its snapshot"):
             duplicate(simulation)
         with pytest.raises(SimulationError, match="neither copied nor pickled"):
             duplicate(simulation._simulation._world._client)

@@ -102,7 +102,7 @@ def _run(text: str, place: Path, promise: Promise) -> tuple[int, str, bool]:
     log = place / "said.txt"
     with log.open("wb") as stream:
         process = subprocess.Popen(
-            ["bash", "-m", "-c", text] if "&" in text else ["bash", "-c", f"exec {text}"],
+            ["bash", "-m", "-c", text] if "\n" in text else ["bash", "-c", f"exec env {text}"],
             cwd=place,
             env=environment,
             stdin=subprocess.DEVNULL,

@@ -34,7 +34,7 @@ def counts(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
         monkeypatch.setattr(owner, name, call)
 
-    counted(files.ElementTree, "XMLParser")
+    counted(files.expat, "ParserCreate")
     counted(pybullet, "loadURDF")
     return found
 
@@ -53,4 +53,4 @@ def test_a_urdf_is_parsed_once_and_loaded_to_be_read_probed_and_simulated(
         robot_description(loaded.character)
         configuration.describe(loaded.character, loaded.values, probe=sample)
 
-    assert counts == {"XMLParser": 1, "loadURDF": 3}
+    assert counts == {"ParserCreate": 1, "loadURDF": 3}

@@ -31,19 +31,6 @@ def test_a_simulator_that_lacks_subscribers_says_how_many_once_and_begins_when_t
     assert len(lines_with(node, "subscribers")) == 1
 
 
-def test_a_damping_that_is_too_strong_for_the_step_is_a_warning(
-    processes: Processes, client: SimulatorClient, tmp_path: Path
-) -> None:
-    strong = '<axis xyz="0 1 0"/><dynamics damping="10000"/>'
-    urdf = robot(link("base"), link("rod"), joint("hinge", "base", "rod", inside=strong))
-
-    node = processes.simulator(str(write_character(tmp_path, urdf)))
-    client.first_state()
-
-    (line,) = lines_with(node, "passive damping")
-    assert "'hinge'" in line and "of 1e+04" in line
-
-
 def test_a_simulator_alone_says_what_was_repaired_and_that_it_begins_below_the_ground(
     processes: Processes, client: SimulatorClient, tmp_path: Path
 ) -> None:

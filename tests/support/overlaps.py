@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from msgs_config.character.bullet import connect, load_urdf, pybullet
+from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
@@ -20,7 +20,7 @@ def depths(character: Character, motion: GeneralizedPosition) -> dict[str, NDArr
         for one, other in combinations(shaped, 2)
         if one not in above[other] and other not in above[one]
     ]
-    client = connect()
+    client = Engine()
     try:
         body = load_urdf(client, character.loading)
         numbers = {pybullet.getBodyInfo(body, physicsClientId=client)[0].decode(): -1}
@@ -38,7 +38,7 @@ def depths(character: Character, motion: GeneralizedPosition) -> dict[str, NDArr
                 )
                 found[frame, column] = max((-point[8] for point in near), default=-0.2)
     finally:
-        pybullet.disconnect(client)
+        client.close()
     names = [link.name for link in character.links]
     return {f"{names[a]}-{names[b]}": found[:, k] for k, (a, b) in enumerate(pairs)}
 

@@ -160,8 +160,7 @@ def _describe_names(topic: str, named: Mapping[str, None], character: Character)
             f"'{topic}' has none of the joints of {character.name}; it has {_listed(extra)}, and "
             f"the character {_listed(own)}"
         )
-    followers = mimic_joints(character)
-    missing = [name for name in own if name not in named and name not in followers]
+    missing = [name for name in own if name not in named and name not in character.leaders]
     remarks = []
     if extra:
         remarks.append(f"not joints of {character.name} that move, left out: {_listed(extra)}")
@@ -175,21 +174,6 @@ def _listed(names: Sequence[str]) -> str:
     return (", ".join(names[:_NAMES_SHOWN]) or "none") + more
 
 
-def mimic_joints(character: Character) -> dict[str, tuple[str, float, float]]:
-    """Leader, multiplier and offset of each joint of the URDF that follows another one."""
-    found = {}
-    for joint in character.loading.robot.findall("joint"):
-        mimic = joint.find("mimic")
-        if mimic is not None:
-            numbers = [mimic.get("multiplier", "1"), mimic.get("offset", "0")]
-            try:
-                factor, offset = map(float, numbers)
-            except ValueError:
-                continue
-            found[joint.get("name", "")] = mimic.get("joint", ""), factor, offset
-    return found
-
-
 def _completed(series: JointSeries, character: Character) -> JointSeries:
     """The series without unknown positions: from the first values, the leaders or the rest pose."""
     position, names = series.position, list(character.layout.dof_names)
@@ -200,9 +184,10 @@ def _completed(series: JointSeries, character: Character) -> JointSeries:
         values[:first] = values[first]
     rest = np.array(character.rest_position)
     position[:, ~seen] = rest[~seen]
-    for follower, (leader, factor, offset) in mimic_joints(character).items():
-        if follower in names and leader in names and not seen[names.index(follower)]:
-            position[:, names.index(follower)] = factor * position[:, names.index(leader)] + offset
+    if character.coupling:
+        followers = character.coupling.followers
+        unseen = followers[~seen[followers]]
+        position[:, unseen] = character.coupling.position(position)[:, unseen]
     for link in character.links:
         joint = link.joint
         if joint.type is JointType.REVOLUTE and joint.lower == -math.inf and joint.name in names:

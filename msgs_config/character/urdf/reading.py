@@ -1,6 +1,5 @@
 """A URDF's text as elements: those that count, and each axis a direction."""
 
-import math
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -8,6 +7,7 @@ from xml.etree import ElementTree
 from msgs_config import files
 from msgs_config.character.urdf.vocabulary import LeftOut, leave_out_unknown, listed
 from msgs_config.errors import CharacterError
+from msgs_config.geometry.single_rotations import norm
 
 WITH_AXIS = ("revolute", "continuous", "prismatic")
 """The types of joints that move along or about an axis."""
@@ -57,16 +57,16 @@ def _normalise_axes(robot: ElementTree.Element) -> list[str]:
         axis = joint.find("axis") if joint.get("type") in WITH_AXIS else None
         if axis is None:
             continue
-        vector = read_axis(axis)
+        x, y, z = vector = read_axis(axis)
         largest = max(map(abs, vector))
-        length = math.hypot(*vector)
+        length = norm((x, y, z))
         if length == 1.0 or not largest:
             axis.set("xyz", axis.get("xyz", DEFAULT_AXIS))
             continue
         # in two steps, because a tiny length has few digits
-        vector = [component / largest for component in vector]
-        unit = math.hypot(*vector)
-        axis.set("xyz", " ".join(repr(component / unit + 0.0) for component in vector))
+        scaled = (x / largest, y / largest, z / largest)
+        unit = norm(scaled)
+        axis.set("xyz", " ".join(repr(component / unit + 0.0) for component in scaled))
         if abs(length - 1.0) > _DIGITS:
             changed.append(f"{joint.get('name')} ({length:.4g})")
     return changed

@@ -192,7 +192,10 @@ def test_a_topic_without_messages_is_known_from_the_metadata(bag: Path) -> None:
         ({"version": "nine"}, "metadata.yaml is damaged"),
         ({"relative_file_paths": 3}, "lacks a field or has one of a wrong type"),
         ({"relative_file_paths": ["elsewhere.mcap"]}, "its file elsewhere.mcap is missing"),
-        ({"relative_file_paths": ["metadata.yaml"]}, "metadata.yaml is no .mcap or .db3 file"),
+        (
+            {"relative_file_paths": ["metadata.yaml"]},
+            "metadata.yaml is a YAML file, not a file of a bag",
+        ),
         ({"topics_with_message_count": {"a": 1}}, "lacks a field or has one of a wrong type"),
         ({"compression_mode": 5}, "lacks a field or has one of a wrong type"),
         ({"compression_mode": "half"}, "unknown compression mode 'half'"),
