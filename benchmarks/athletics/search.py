@@ -45,10 +45,11 @@ SEARCHED = (
     "states.step.pressure.side_gain=0.3",
     "states.step.placement.width=0.015",
     "states.step.placement.depth=0.005",
+    "states.step.placement.pace=0.1",
     "states.stride.placement.pace=0.1",
     "states.step.placement.ahead=0.01",
     "states.step.placement.clearance=0.015",
-    "states.sidestep.duration=0.03",
+    "states.stride.placement.width=0.015",
 )
 """Where numbers are in the file, and how far they are first moved."""
 

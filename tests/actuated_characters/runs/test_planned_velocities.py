@@ -74,6 +74,21 @@ def test_what_cannot_be_is_one_clear_line(text: str, says: str) -> None:
         plan_velocities(plan_of(5.0), text)
 
 
+def test_what_is_more_than_a_machine_takes_is_taken_within_its_limits_and_said() -> None:
+    machine = {"behaviour": "state_machine", "machine": "walk"}
+    plan = make_plan("humanoid", 5.0, {}, {"rate": RATE}, machine)
+
+    taken, planned = plan_velocities(plan, "0.5,0,0.2@1 9,-2,9@2")
+
+    assert (planned[-1].forward, planned[-1].left, planned[-1].turn) == (1.2, -0.3, 0.5)
+    assert isinstance(taken.reference, SteeredReference)
+    assert taken.reference.course(5 * RATE - 1).turn == 0.5
+    (line,) = set(taken.warnings) - set(plan.warnings)
+    assert line == (
+        "--cmd-vel: 9,-2,9 at 2 s is more than the machine walk takes; it is taken as 1.2,-0.3,0.5"
+    )
+
+
 def test_only_a_steered_reference_takes_velocities() -> None:
     plan = make_plan("humanoid", 5.0, {"reference": "hold"}, {}, {})
 

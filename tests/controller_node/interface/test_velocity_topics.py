@@ -122,6 +122,12 @@ def test_velocities_beyond_the_limits_are_clamped_and_published_so(walker: Walke
 
     taken = walker.active.last.twist
     assert (taken.linear.x, taken.angular.z) == (2.5, -1.0)
+    walker.unstamped.publish(twist(60.0))
+    walker.take()
+    lines = [line for line in walker.node.stderr.splitlines() if "is more than it can" in line]
+    assert (
+        len(lines) == 1 and "50, 0, -50 is more than it can, and is taken as 2.5, 0, -1" in lines[0]
+    )
 
 
 def test_a_velocity_that_is_not_finite_is_refused_and_changes_nothing(
