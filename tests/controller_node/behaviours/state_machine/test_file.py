@@ -149,7 +149,7 @@ def test_each_shipped_machine_can_be_planned(name: str) -> None:
         ({"states__one__tracks": True}, "a state that tracks has no foot that stands"),
         ({"states": {}}, "states is a dict; it must be a mapping of one state or more"),
         ({"limits": {"sideways": 0.3}}, "unknown key 'limits.sideways'; did you mean 'aside'?"),
-        ({"limits": {"turn": -1}}, "'limits.turn'"),
+        ({"limits": {"turn": -1}}, "limits.turn is -1; it must be a finite number from 0 to 1000"),
         ({"includes": {"walk": "wlak"}}, "unknown machine 'wlak'; did you mean 'walk'?"),
         ({"includes": {"again": "machine.yaml"}}, "more than 8 files include each other"),
     ],

@@ -210,14 +210,14 @@ def _ahead(plan: RunPlan) -> float:
     return float(model.centre_of_mass_at(rest)[0]) - 0.045
 
 
-@pytest.mark.parametrize(("limits", "goes"), [("speed: 0.2", False), ("speed: 0.4", True)])
+@pytest.mark.parametrize(("ahead", "goes"), [(0.2, False), (0.4, True)])
 def test_a_machine_takes_over_a_command_up_to_its_speed(
-    tmp_path: Path, limits: str, goes: bool
+    tmp_path: Path, ahead: float, goes: bool
 ) -> None:
     file = tmp_path / "slow.yaml"
     file.write_text(
         SIDES
-        + limits
+        + f"limits: {{ahead: {ahead}}}"
         + """
 start: one
 states:
