@@ -120,13 +120,13 @@ def _allowed(
     for asked, taken in zip(commands, allowed, strict=True):
         if asked == taken:
             continue
-        said = f"--cmd-vel: {_text(asked)} at {asked.tick / rate:g} s is more than"
+        beyond = f"--cmd-vel: {_text(asked)} at {asked.tick / rate:g} s is more than"
         if plan.controller.text("behaviour") != STATE_MACHINE:
             raise ConfigurationError(
-                f"{said} it can, which is at most {_text(taken)} (see controller_node.steering.*)"
+                f"{beyond} it can, which is at most {_text(taken)} (see controller_node.steering.*)"
             )
         machine = plan.controller.text("machine")
-        warnings.append(f"{said} the machine {machine} takes; it is taken as {_text(taken)}")
+        warnings.append(f"{beyond} the machine {machine} takes; it is taken as {_text(taken)}")
     return allowed, tuple(warnings)
 
 
