@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from actuated_characters.metrics.falls import FallWatch, PostureReader
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_velocities import plan_velocities
 from actuated_characters.runs.planned_wrenches import parse_push, push_schedule
@@ -29,15 +30,12 @@ from msgs_config.geometry.single_rotations import (
     conjugate,
     exp,
     multiply,
-    rotate,
     yaw,
 )
 from msgs_config.messages.clock import TickClock
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup
 from sim_node.simulation_factory import make_settings as make_simulation_settings
-
-FALLEN, TILTED = 0.55, 1.0  # m, and rad: a root below the one, or tilted more than the other
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,9 @@ def moments(trial: Trial, machine: Machine, plan: RunPlan | None = None) -> Iter
     strengths = np.ones(len(gains.effort_limits))
     feet = [kit.legs[side].foot_link for side in ("right", "left")]
     setup = make_character_setup(character, plan.simulator)
-    with Simulation([setup], make_simulation_settings(plan.simulator)) as simulation:
+    settings = make_simulation_settings(plan.simulator)
+    fall = FallWatch(PostureReader(character, settings.world.terrain), rate)
+    with Simulation([setup], settings) as simulation:
         simulation.watches_contacts = True
         (simulated,) = simulation.characters
         for tick in range(plan.ticks):
@@ -109,8 +109,7 @@ def moments(trial: Trial, machine: Machine, plan: RunPlan | None = None) -> Iter
             loads = (float(contacts[feet[0], 2]), float(contacts[feet[1], 2]))
             name = str(output.phase.facts["state"])
             yield Moment(time, state.position, state.velocity, effort, course, name, loads)
-            position = simulated.state.position
-            if position[2] < FALLEN or tilt(position) > TILTED:
+            if fall.has_fallen(simulated.state.position):
                 return
 
 
@@ -159,12 +158,6 @@ def _against_standing(position: FloatArray) -> QuaternionXyzw:
     """How the humanoid's root (n,) is turned against standing, facing along x."""
     x, y, z = position[3:6].tolist()
     return multiply(exp((x, y, z)), conjugate(about_x(0.5 * math.pi)))
-
-
-def tilt(position: FloatArray) -> float:
-    """The angle of the humanoid's root (n,) from upright, rad."""
-    _, _, up = rotate(_against_standing(position), (0.0, 0.0, 1.0))
-    return math.acos(min(max(up, -1.0), 1.0))
 
 
 def _heading_error(moment: Moment) -> float:

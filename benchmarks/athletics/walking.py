@@ -3,8 +3,7 @@
 Kind `speeds` walks straight on at four speeds, `headings` turns to eight directions and walks on,
 `pushes` is pushed for 0.2 s at random moments, `steps` goes over a ground of steps that it does not
 know of. `grid` walks at five speeds, five turn rates and three velocities aside, `slalom` turns to
-and fro, `bends` is pushed in bends. A walk ends by falling: the root lower than 0.55 m, or tilted
-by more than 1 rad.
+and fro, `bends` is pushed in bends. A walk ends by falling, as `metrics.falls` has it.
 """
 
 import argparse

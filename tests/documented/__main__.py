@@ -1,6 +1,6 @@
 """Runs the documented commands, and writes the page that lists them: `make documented`.
 
-Those that take hours are left out unless `--long` is given; the page says of each when it was seen.
+Those that take long are left out unless `--long` is given, and the page says so.
 """
 
 import argparse
@@ -21,8 +21,8 @@ _KEPT = ROOT / "build" / "documented.json"  # outcomes, so that an interrupted r
 _HEAD = """# Documented commands
 
 Each command of the pages, of `--help`, of `run` without options, of the scenes and of the examples,
-and what was seen when it was run as written, to its end: `make documented` runs them and writes
-this page. Heights and tilts are the root's over the last 0.25 s, read from the bag.
+and what was seen when it was run as written, to its end or to Ctrl-C: `make documented` runs them
+and writes this page. Heights and tilts are the root's over the last 0.25 s, read from the bag.
 `tests/documented/promises.yaml` has what each must show; a command without a promise there fails
 `make test`.
 
@@ -47,7 +47,9 @@ def main() -> int:
         and (options.long or not promise.long)
         and (options.only is None or options.only in command)
     ]
-    outcomes = _read() if options.resume else {}
+    outcomes = _read()
+    if not options.resume:
+        outcomes = {each: seen for each, seen in outcomes.items() if each not in chosen}
     try:
         _try([each for each in chosen if each not in outcomes], promises, outcomes)
     except KeyboardInterrupt:

@@ -4,25 +4,20 @@ A command is a line of a block of shell, or a span of code that is whole: it beg
 that it runs. A block with jobs in the background is one command, a script.
 """
 
+import argparse
 import ast
-import io
 import re
 from collections.abc import Iterator
-from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from actuated_characters.cli import main
+from actuated_characters.cli import _parser
 from actuated_characters.commands.common.overview import OVERVIEW
 from actuated_characters.scenes.scene import scene_names
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 MADE = "documented.md"  # the page that lists the commands, made from them
-COMMANDS = (
-    *("run", "play", "view", "fork", "replay", "motion", "study", "export", "render", "report"),
-    *("reconstruct", "compare", "info", "recover", "parameters", "list"),
-)
 
 _BLOCK = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _INDENTED = re.compile(r"^    (\.venv/bin/.*)$", re.MULTILINE)
@@ -81,14 +76,20 @@ def _plain(line: str) -> str:
 
 
 def _of_help() -> Iterator[Documented]:
-    for command in COMMANDS:
-        printed = io.StringIO()
-        with redirect_stdout(printed), suppress(SystemExit):
-            main([command, "--help"])
-        _, _, examples = re.sub(r"\s+", " ", printed.getvalue()).partition("example")
+    for parser in _parsers(_parser()):
+        _, _, examples = re.sub(r"\s+", " ", parser.epilog or "").partition("example")
         for example in examples.lstrip("s: ").split(";"):
             if example.strip():
-                yield Documented(example.strip(), f"{_PROGRAM} {command} --help")
+                yield Documented(example.strip(), f"{parser.prog} --help")
+
+
+def _parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """A parser, and those of all commands below it."""
+    yield parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                yield from _parsers(below)
 
 
 def _of_overview() -> Iterator[Documented]:

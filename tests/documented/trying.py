@@ -102,7 +102,9 @@ def _run(text: str, place: Path, promise: Promise) -> tuple[int, str, bool]:
     log = place / "said.txt"
     with log.open("wb") as stream:
         process = subprocess.Popen(
-            ["bash", "-m", "-c", text] if "\n" in text else ["bash", "-c", f"exec env {text}"],
+            ["bash", "-e", "-m", "-c", text]
+            if "\n" in text
+            else ["bash", "-c", f"exec env {text}"],
             cwd=place,
             env=environment,
             stdin=subprocess.DEVNULL,
