@@ -102,9 +102,8 @@ def _run(text: str, place: Path, promise: Promise) -> tuple[int, str, bool]:
     log = place / "said.txt"
     with log.open("wb") as stream:
         process = subprocess.Popen(
-            ["bash", "-e", "-m", "-c", text]
-            if "\n" in text
-            else ["bash", "-c", f"exec env {text}"],
+            # a script ends where one of its commands fails
+            ["bash", *(("-e", "-m", "-c", text) if "\n" in text else ("-c", f"exec env {text}"))],
             cwd=place,
             env=environment,
             stdin=subprocess.DEVNULL,
