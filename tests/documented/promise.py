@@ -20,6 +20,7 @@ class Promise:
     given: tuple[str, ...] = ()
     words: Mapping[str, str] = field(default_factory=dict)  # `for`
     ends_after: float = 0.0
+    exits: int = 0
     page: bool = False
     run: str = ""
     height: tuple[float, float] | None = None

@@ -51,7 +51,7 @@ class Reader:
         spent = _cpu()
         exit_code, said, shown = _run(text, place, promise)
         faults = []
-        if exit_code not in (_INTERRUPTED if promise.ends_after else (0,)):
+        if exit_code not in (_INTERRUPTED if promise.ends_after else (promise.exits,)):
             faults.append(f"it ended with {exit_code}: {said.strip()[-300:]}")
         if promise.page and not shown:
             faults.append("no page was there")
@@ -110,6 +110,7 @@ def _run(text: str, place: Path, promise: Promise) -> tuple[int, str, bool]:
             stdout=stream,
             stderr=subprocess.STDOUT,
             start_new_session=True,
+            preexec_fn=_take_interrupts,
         )
         try:
             shown = promise.page and _shows_a_page(log, process)
@@ -120,6 +121,11 @@ def _run(text: str, place: Path, promise: Promise) -> tuple[int, str, bool]:
             _interrupt(process)  # it has a session of its own, where our Ctrl-C does not come
             raise
     return process.returncode, log.read_text(encoding="utf-8", errors="replace"), shown
+
+
+def _take_interrupts() -> None:
+    """Let Ctrl-C end what is started, also where it is ignored here, as in a background job."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _interrupt(process: "subprocess.Popen[bytes]") -> None:
