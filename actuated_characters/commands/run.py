@@ -62,7 +62,7 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         "run simulator, controller and recorder",
         "Run simulator, controller and recorder in lockstep, and report the figures. Without any "
         "option: say what there is to run.",
-        ["run --clip walk --set controller_node.law:=pd"],
+        ["run --clip walk --set controller_node.gain_scale.p:=0.5"],
     )
     add_character(run)
     add_tracked(run)
