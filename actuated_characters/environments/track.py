@@ -132,13 +132,13 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._simulation = Simulation(
             self._character, motion.first_state(), simulator, watch_contacts=False
         )
-        terrain = self._simulation.settings.world.terrain
+        world = self._simulation.settings.world
         self._assessment = Assessment(
             self._character,
             model,
             clock.rate_hz / ticks_per_step,
-            terrain,
-            falls=values.number("gravity") > 0.0,
+            world.terrain,
+            falls=values.number("gravity") > 0.0 and (world.ground or world.terrain is not None),
         )
         self.observation_space = gymnasium.spaces.Box(
             -np.inf, np.inf, (self._assessment.size,), dtype=np.float64

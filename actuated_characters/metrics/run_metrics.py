@@ -21,6 +21,7 @@ from msgs_config.character.layout import JointType
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.shared_parameters import NO_GROUND
 
 Series: TypeAlias = dict[str, FloatArray]
 """A column (t,) of one entry a tick, by its name."""
@@ -194,9 +195,11 @@ class Measurement:
     def _describe_fall(self, series: Series) -> dict[str, object]:
         """Whether and when the character fell, and in which mode of the controller."""
         fell: dict[str, object] = dict.fromkeys(("fell", "fell_at_s", "fell_in_mode"))
-        if self._postures is None or not self._configuration.parameters.get("gravity", 1.0):
+        parameters = self._configuration.parameters
+        can_fall = parameters.get("gravity", 1.0) and parameters.get("terrain") != NO_GROUND
+        if self._postures is None or not can_fall:
             return fell
-        rate = float(self._configuration.parameters["rate"])
+        rate = float(parameters["rate"])
         row = fall_row(series["is_down"] == 1.0, np.rint(series["time_s"] * rate), rate)
         fell["fell"] = row is not None
         if row is not None:

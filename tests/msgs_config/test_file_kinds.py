@@ -25,7 +25,7 @@ KINDS = {  # name: content, what it is, what to do
     "world.xml": ("<sdf version='1.9'/>", "a model or world of Gazebo (SDF)", "URDF"),
     "other.xml": ("<launch/>", "an XML file", "URDF"),
     "empty.xml": ("", "an XML file", "URDF"),
-    "robot.urdf.xacro": ("<robot/>", "a xacro file", "xacro FILE > robot.urdf"),
+    "robot.urdf.xacro": ("<robot/>", "a xacro file", "--character"),
     "MODEL.SDF": ("<sdf/>", "a model or world of Gazebo (SDF)", "URDF"),
     "old.bag": ("#ROSBAG V2.0\n", "a bag of ROS 1", "rosbags-convert"),
     "pointer.yaml": (POINTER, "a Git LFS pointer", "git lfs pull"),

@@ -113,9 +113,12 @@ def test_a_recorder_that_hears_no_simulator_fails_in_a_line(
 def test_a_recorder_without_a_tick_fails_in_a_line(
     processes: Processes, client: SimulatorClient, tmp_path: Path
 ) -> None:
-    recorder = processes.node(topics.RECORDER_NODE, directory=str(tmp_path / "run"))
+    recorder = processes.node(
+        topics.RECORDER_NODE, directory=str(tmp_path / "run"), progress_period=0.05
+    )
     processes.simulator("pendulum")
     client.first_state(2)
+    wait_until(lambda: "tick 1" in recorder.stdout, "a state that the recorder has heard")
 
     assert recorder.end(signal.SIGINT) == 1
     line = recorder.stderr.splitlines()[-1]

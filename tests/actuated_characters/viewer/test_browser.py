@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import viser
 from numpy.typing import NDArray
 from websockets.sync.client import connect
 
@@ -256,7 +257,9 @@ def test_a_browser_that_is_killed_in_the_middle_of_a_drag_leaves_no_push_behind(
     assert standing.exit_code is None
     assert viewer.exit_code is None
     assert "Traceback" not in viewer.stderr
-    with connect(address_of(viewer).replace("http", "ws"), max_size=None) as other:
+    spoken: list = [f"viser-v{viser.__version__}"]
+    address = address_of(viewer).replace("http", "ws")
+    with connect(address, max_size=None, subprotocols=spoken) as other:
         other.close()
 
 
