@@ -98,5 +98,5 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
     "swing.py": _code("README.md", "class Swing"),
-    "holder.py": _code("docs/python.md", "ControllerNode"),
+    "holder.py": _code("docs/python.md", "class Holder"),
 }

@@ -17,6 +17,7 @@ from actuated_characters.runs.run_directory import prepare_directory
 from actuated_characters.studies.athletics.measures import longest_flight
 from benchmarks.athletics.trial import Trial, moments
 from controller_node.behaviours.state_machine.file import read_machine
+from msgs_config.messages import topics
 from tests.support.ros import Processes, SimulatorClient, tick_of
 from tests.support.runs import Run, run_plan, summary_of
 
@@ -107,15 +108,16 @@ def test_a_plain_script_drives_it_over_cmd_vel(
     processes.python(str(example))
     client.spin_until(lambda: client.node.count_publishers("cmd_vel"), "the driver")
     processes.controller("humanoid", behaviour="state_machine", reference="steered")
-    # in real time, or the run would be over by the time that the driver is heard
-    steady = {"contact_breaking_threshold": 0.1, "real_time_factor": 1.0}
-    processes.simulator("humanoid", max_ticks=1200, **steady)
+    velocities = client.listen(topics.ACTIVE_CMD_VEL.of(topics.CONTROLLER_NODE))
+    processes.simulator("humanoid", max_ticks=6000, contact_breaking_threshold=0.1)
 
-    client.spin_until(lambda: len(client.states) > 0, "a state")
-    client.spin_until(lambda: tick_of(client.states.last) > 1150, "5 s of simulated time", 120.0)
+    # how soon the driver is heard is a matter of the machine; until then the character stands
+    client.spin_until(lambda: len(velocities) > 0, "a velocity that the controller has taken", 60.0)
+    since = tick_of(client.states.last)
+    client.spin_until(lambda: tick_of(client.states.last) > since + 1150, "5 s", 120.0)
 
     state = client.states.last
     place = dict(zip(state.name, state.position, strict=True))
     assert place["root_z"] > 0.7
-    # 0.8 m/s in a circle of 1.6 m to the left, from the first second or so on: past its far side
+    # 0.8 m/s in a circle of 1.6 m to the left: past its far side
     assert place["root_x"] > 0.4 and place["root_y"] > 0.9
