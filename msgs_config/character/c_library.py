@@ -41,11 +41,14 @@ class _MemoryStream:
     """A stream of the C library that keeps what is printed to it.
 
     It is never closed: when it is out of use again, a thread without Python's lock may still be
-    about to print to it.
+    about to print to it. Where its text is told is the C library's memory, never given back: as the
+    process ends, the C library flushes the stream once more, and Python's memory is gone by then.
     """
 
     def __init__(self) -> None:
-        self._text, self._size = ctypes.c_void_p(), ctypes.c_size_t()
+        places = _function("calloc", ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t)(2, 8)
+        self._text = ctypes.c_void_p.from_address(places)
+        self._size = ctypes.c_size_t.from_address(places + 8)
         self._flush = _function("fflush", ctypes.c_int, ctypes.c_void_p)
         self._rewind = _function("rewind", None, ctypes.c_void_p)
         create = _function("open_memstream", ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
