@@ -58,8 +58,9 @@ def _robot(path: Path) -> None:
 
 
 def _robots(path: Path) -> None:
-    path.mkdir()
-    write_robot(path / "robot.urdf")
+    maker = path / "maker"
+    maker.mkdir(parents=True)
+    write_robot(maker / "robot.urdf")
 
 
 def _call(path: Path, *words: object) -> None:
