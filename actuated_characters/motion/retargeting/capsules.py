@@ -17,7 +17,7 @@ from msgs_config.geometry import rotations
 APART, SHANKS_APART = 0.01, 0.08
 """m between two shapes, and from shank and foot to those of the other leg, which sway when tracked;
 less where they are nearer to each other in the pose with all joints at zero."""
-_TINY = 1e-12
+_TINY = 1e-24  # m^2 or m, of what has no length
 
 Capsule = tuple[FloatArray, FloatArray, float]
 """Both ends (3,) of its axis in the link frame and its radius, m."""
@@ -72,14 +72,13 @@ def closest_points(first: FloatArray, second: FloatArray) -> tuple[FloatArray, F
     start, way = first[..., 0, :], first[..., 1, :] - first[..., 0, :]
     other_start, other_way = second[..., 0, :], second[..., 1, :] - second[..., 0, :]
     between = start - other_start
-    a, e, b = _dot(way, way), _dot(other_way, other_way), _dot(way, other_way)
-    c, f = _dot(way, between), _dot(other_way, between)
-    square = a * e - b * b  # of the sine of their angle, by both lengths
-    crossing = square > 1e-9 * a * e + _TINY
-    s = np.where(crossing, np.clip((b * f - c * e) / np.where(crossing, square, 1.0), 0, 1), 0.0)
-    t = np.clip(np.where(e > _TINY, (b * s + f) / np.maximum(e, _TINY), 0.0), 0.0, 1.0)
-    s = np.where(a > _TINY, np.clip((b * t - c) / np.maximum(a, _TINY), 0.0, 1.0), 0.0)
-    return start + s[..., np.newaxis] * way, other_start + t[..., np.newaxis] * other_way
+    # Without what lies along the other line, the angle between nearly parallel ones is exact.
+    across = way - _share(way, other_way) * other_way
+    gap_across = between - _share(between, other_way) * other_way
+    s = np.clip(_share(-gap_across, across), 0.0, 1.0)  # any one on parallel lines
+    t = np.clip(_share(between + s * way, other_way), 0.0, 1.0)
+    s = np.clip(_share(t * other_way - between, way), 0.0, 1.0)
+    return start + s * way, other_start + t * other_way
 
 
 def make_capsules(
@@ -162,6 +161,9 @@ def _within_box(centre: FloatArray, axes: FloatArray, half: FloatArray) -> Itera
         yield place - reach, place + reach, radius
 
 
-def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
-    product: FloatArray = (one * other).sum(axis=-1)
-    return product
+def _share(vector: FloatArray, way: FloatArray) -> FloatArray:
+    """How much of the way (..., 3) a vector (..., 3) goes along it, as (..., 1); 0 on no way."""
+    square = (way * way).sum(axis=-1, keepdims=True)
+    along = (vector * way).sum(axis=-1, keepdims=True)
+    share: FloatArray = np.where(square > _TINY, along / np.maximum(square, _TINY), 0.0)
+    return share

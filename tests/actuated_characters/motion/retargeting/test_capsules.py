@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from actuated_characters.motion.clips.importing import import_bvh
@@ -22,6 +22,9 @@ from tests.support.physics import character, random_state
 POINT = st.tuples(*[st.floats(-1.0, 1.0, allow_nan=False)] * 3)
 
 
+@example((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 1.2e-7))
+@example((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1e-5), (0.0, 1.0, 1e-5))
+@example((-2e-4, 0.0, 0.0), (2e-4, 0.0, 0.0), (0.0, -2e-4, 0.0), (0.0, 2e-4, 0.0))
 @given(POINT, POINT, POINT, POINT)
 def test_no_points_of_two_segments_are_nearer_than_those_found(
     start: tuple[float, ...],
