@@ -1,6 +1,5 @@
 """Simulation and controller for Python, without ROS; the states are those of `run`, to the bit."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -10,7 +9,13 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from actuated_characters.given_arrays import finite_state, has_arrays, is_same_first, real_array
+from actuated_characters.given_arrays import (
+    finite_state,
+    has_arrays,
+    is_finite,
+    is_same_first,
+    real_array,
+)
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.runs.execution import run_in_process, run_over_topics
 from actuated_characters.runs.plan import choose_reference, make_plan
@@ -300,7 +305,7 @@ class Simulation:
                 f"an effort has shape {effort.shape}; it must be "
                 f"({self.character.layout.size},), one entry a degree of freedom"
             )
-        if not math.isfinite(np.add.reduce(effort)):  # in one pass, at each tick
+        if not is_finite(effort):
             raise ConfigurationError("an effort has entries that are not finite")
         (one,) = self._simulation.characters
         if self.character.coupling:

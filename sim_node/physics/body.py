@@ -118,7 +118,8 @@ class Body:
         for entries, axes in self._turned if all(position) and all(velocity) else self._balls:
             position[entries] = frames.to_parent(axes, position[entries])
             velocity[entries] = frames.to_parent(axes, velocity[entries])
-        return np.array(position + velocity).reshape(2, -1)
+        both = position + velocity
+        return np.fromiter(both, float, len(both)).reshape(2, -1)
 
     def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
         """Put the character into a state given as `read` gives it."""

@@ -46,11 +46,13 @@ class PassiveForces:
         self._step_s, self._coupling = step_s, character.coupling
         self._has_floating_base = character.layout.has_floating_base
         self._rotation_entries = character.layout.rotation_entries[self._has_floating_base :]
-        self._limits = [
+        limited = [
             (character.layout.joint(joint.name).entries, joint.soft_limit)
             for joint in character.moving_joints
             if joint.soft_limit is not None
         ]
+        # with the bounds beside them, which each step asks for
+        self._limits = [(joint, *joint[1].lower, *joint[1].upper) for joint in limited]
         self.resistance = JointResistance(character, step_s)
         self.active = bool(self._limits or self.resistance.active)
         self._model = DynamicsModel(character, gravity) if self.active else None
@@ -127,12 +129,11 @@ class PassiveForces:
         Of all joints' rotation vectors (n,) in rad and angular velocities (n,) in rad/s.
         """
         # up to two thirds of a turn a rotation vector is less than twice as fast as its joint
-        near, twice_step = [], 2.0 * self._step_s
-        for joint in self._limits:
-            entries, limit = joint
-            (ax, ay, az), (bx, by, bz) = limit.lower, limit.upper
+        near, twice_step, root = [], 2.0 * self._step_s, math.sqrt
+        for joint, ax, ay, az, bx, by, bz in self._limits:
+            entries = joint[0]
             u, v, w = spins[entries]
-            reach = twice_step * math.sqrt(u * u + v * v + w * w)
+            reach = twice_step * root(u * u + v * v + w * w)
             x, y, z = turns[entries]
             below = x < ax + reach or y < ay + reach or z < az + reach
             if below or x > bx - reach or y > by - reach or z > bz - reach:
