@@ -11,6 +11,7 @@ from msgs_config.character.model import Character, Shape, ShapeType
 from msgs_config.geometry import fixed_order, rotations
 
 _HARMLESS = 0.05  # m; motion capture puts feet that deep into the ground
+_TOUCHING = 0.001  # m that a link which rests on the ground may be in it
 
 
 def lowest_heights(character: Character, model: DynamicsModel) -> FloatArray:
@@ -32,6 +33,19 @@ def lowest_heights(character: Character, model: DynamicsModel) -> FloatArray:
             for link, z, turn in zip(character.links, origins[:, 2], turns_xyzw, strict=True)
         ]
     )
+
+
+def links_in_ground(character: Character) -> dict[str, float]:
+    """How deep (m) the moving links of a fixed base are in the ground at the rest pose.
+
+    Raises:
+        CharacterError: a mesh cannot be used.
+    """
+    if character.layout.has_floating_base:
+        return {}
+    heights = lowest_heights(character, still_model(character, np.array(character.rest_position)))
+    links = zip(character.links[1:], heights[1:].tolist(), strict=True)
+    return {link.name: -height for link, height in links if height < -_TOUCHING}
 
 
 def describe_start_below_ground(character: Character, position: FloatArray) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The largest speed of a character whose links are so short that an engine step is long for them.
+"""The largest speed of a character that an engine step is too long for.
 
 What a hinge carries swings as a pendulum of the length `l = I / (m r)`, with its inertia I and its
 mass m, whose centre is r off the axis (Huygens 1673). Where its holder is stopped at a speed v it
@@ -7,22 +7,29 @@ engine that takes mass matrix and Coriolis forces from the beginning of a step c
 in a chain of such links the energy grows from step to step. Neither their mass nor limits alter
 it: fingers of 4 g and of 400 g do the same, with limits and without. So the engine keeps a bound on
 the speeds of such a character, as it does by itself in all others: Bullet's own at 240 Hz.
+
+A robot whose fixed base puts its links into the ground is pushed out of it. A link that can only
+turn about itself, such as an arm's first one, moves up by as little as its centre is off its axis,
+so that the engine turns it by thousands of rad/s. Such a robot has the same bound.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.layout import JointType
+from msgs_config.character.lowest_points import links_in_ground
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
 from msgs_config.parameters import Values
+from msgs_config.shared_parameters import PLANE
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
 
 _SHORT = 0.1  # m, of a pendulum that 10 m/s turn by a bound of Bullet's own at 240 Hz
 _LARGEST_TURN = 100.0 / 240.0  # rad or m in an engine step
-_NAMED = 5  # joints in a warning
+_NAMED = 5  # joints or links in a warning
 
 
 def short_joints(character: Character) -> list[str]:
@@ -46,29 +53,44 @@ def short_joints(character: Character) -> list[str]:
     return short
 
 
-def speed_bound(character: Character, step_s: float, speed_limit: float) -> float:
+def speed_bound(
+    character: Character, step_s: float, speed_limit: float, *, has_ground: bool
+) -> float:
     """The largest speed of any degree of freedom at engine steps of `step_s`, rad/s or m/s.
 
     At most half of `speed_limit`, beyond which a speed counts as divergence: where a joint mimics
     another, the coupling may add to a speed. So by its speed alone such a character never diverges.
     """
-    return (
-        min(_LARGEST_TURN / step_s, 0.5 * speed_limit)
-        if short_joints(character)
-        else UNLIMITED_SPEED
-    )
+    if short_joints(character) or (has_ground and links_in_ground(character)):
+        return min(_LARGEST_TURN / step_s, 0.5 * speed_limit)
+    return UNLIMITED_SPEED
 
 
 def describe_speed_bound(character: Character, values: Values) -> tuple[str, ...]:
-    """A warning if the parameters' values of `sim_node` lead to a bound on the speeds."""
-    short = short_joints(character)
-    if not short:
+    """Warnings if the parameters' values of `sim_node` lead to a bound on the speeds."""
+    has_ground = values.text("terrain") == PLANE
+    short, deep = short_joints(character), links_in_ground(character) if has_ground else {}
+    if not (short or deep):
         return ()
     step_s = 1.0 / (values.integer("rate") * values.integer("substeps"))
-    bound = speed_bound(character, step_s, values.number("speed_limit"))
-    more = f" and {len(short) - _NAMED} more" if len(short) > _NAMED else ""
-    return (
-        f"what these joints carry is so short that an impact turns it faster than engine steps of "
-        f"{1e3 * step_s:.3g} ms follow: {', '.join(short[:_NAMED])}{more}; no joint and no base is "
-        f"let be faster than {bound:.4g} rad/s or m/s, substeps raise that",
-    )
+    bound = speed_bound(character, step_s, values.number("speed_limit"), has_ground=has_ground)
+    slower = f"no joint and no base is let be faster than {bound:.4g} rad/s or m/s"
+    warnings = []
+    if deep:
+        depths = [f"{name} {depth:.3g} m deep" for name, depth in deep.items()]
+        warnings.append(
+            f"the fixed base puts links into the ground, which throws them out: {_few(depths)}; "
+            f"raise the URDF's first link over it, or set 'terrain' to none; {slower}"
+        )
+    if short:
+        warnings.append(
+            f"what these joints carry is so short that an impact turns it faster than engine steps "
+            f"of {1e3 * step_s:.3g} ms follow: {_few(short)}; {slower}, substeps raise that"
+        )
+    return tuple(warnings)
+
+
+def _few(items: Sequence[str]) -> str:
+    """The first ones of a list, and how many more there are."""
+    more = f" and {len(items) - _NAMED} more" if len(items) > _NAMED else ""
+    return ", ".join(items[:_NAMED]) + more

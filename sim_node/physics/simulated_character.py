@@ -66,7 +66,8 @@ class SimulatedCharacter:
     before: StampedState | None  # the state a tick earlier; None in an episode's first one
     pushes: tuple[ExternalWrench, ...]  # that acted during the last tick
     balls: Projectiles  # of the world that it is in
-    speed_bound: float  # rad/s or m/s, of every degree of freedom in the engine
+    speed_bounds: dict[bool, float]
+    """Of every degree of freedom in the engine, rad/s or m/s; by whether there is a ground."""
 
     def __init__(
         self, setup: CharacterSetup, *, delay_ticks: int, step_s: float, speed_limit: float
@@ -93,7 +94,10 @@ class SimulatedCharacter:
         )
         self._step_s = step_s
         self._delay_ticks = delay_ticks
-        self.speed_bound = speed_bound(setup.character, step_s, speed_limit)
+        self.speed_bounds = {
+            has_ground: speed_bound(setup.character, step_s, speed_limit, has_ground=has_ground)
+            for has_ground in (False, True)
+        }
         # (2, n) largest position and velocity of a sound state
         self._bounds = np.array([[np.finfo(float).max], [speed_limit]]).repeat(self.layout.size, 1)
 

@@ -263,7 +263,8 @@ class Simulation:
         world = World(self.settings.world)
         try:
             for character in self.characters:
-                body = world.add(character.character, character.speed_bound)
+                bound = character.speed_bounds[self.settings.world.ground]
+                body = world.add(character.character, bound)
                 character.enter(body, world.balls, self.settings.world.gravity, self.stamp_ns)
         except Exception:
             world.close()

@@ -1,4 +1,4 @@
-"""Hands of light, short fingers fall with a body: nothing diverges, and a line names the bound."""
+"""Hands fall with a body, an arm begins in the ground: nothing diverges, a line names the bound."""
 
 import math
 from dataclasses import replace
@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import actuated_characters as ac
+from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.plan import make_plan
 from msgs_config.character.file import shipped_characters
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
@@ -86,8 +88,6 @@ def test_the_fingers_weigh_what_the_file_says(tmp_path: Path) -> None:
 
 
 def test_a_line_names_the_joints_and_the_bound(tmp_path: Path) -> None:
-    from actuated_characters.runs.plan import make_plan
-
     file = tmp_path / "hand.urdf"
     file.write_text(hand_on_a_body())
 
@@ -102,7 +102,7 @@ def test_no_speed_of_a_shipped_character_is_bound(name: str) -> None:
     whole = character(name)
 
     assert short_joints(whole) == []
-    assert speed_bound(whole, STEP, LIMIT) == UNLIMITED_SPEED
+    assert speed_bound(whole, STEP, LIMIT, has_ground=True) == UNLIMITED_SPEED
 
 
 @pytest.mark.parametrize("length", [0.13, 0.17])
@@ -120,7 +120,9 @@ def test_the_bound_grows_with_the_substeps_and_is_well_below_what_counts_as_dive
 ) -> None:
     whole = load(tmp_path, hand_on_a_body())
 
-    bounds = [speed_bound(whole, STEP / substeps, LIMIT) for substeps in (1, 2, 4, 16)]
+    bounds = [
+        speed_bound(whole, STEP / substeps, LIMIT, has_ground=True) for substeps in (1, 2, 4, 16)
+    ]
 
     assert bounds == pytest.approx([100.0, 200.0, 0.5 * LIMIT, 0.5 * LIMIT])
 
@@ -140,3 +142,39 @@ def test_a_short_pendulum_below_the_bound_swings_as_it_would_without(tmp_path: P
     crossings = np.flatnonzero(np.diff(np.sign(angles)))
     period = 2.0 * (crossings[-1] - crossings[0]) / (len(crossings) - 1) / simulation.rate_hz
     assert period == pytest.approx(2.0 * math.pi * math.sqrt(2.0 * length / (3.0 * 9.81)), rel=5e-3)
+
+
+def arm_along_the_ground(height: float) -> str:
+    """An arm along x on a fixed base at a height in m: a sheet turns about itself, a box bends."""
+    any_turn = '<limit lower="-3.1" upper="3.1"/>'
+    return (
+        '<robot name="arm"><link name="mount"/>'
+        + box_link("upper", 0.6, (0.1, 0.001, 0.08), (0.05, 0.001, 0.0))
+        + box_link("lower", 0.4, (0.3, 0.05, 0.06), (0.15, 0.0, 0.0))
+        + hinge("roll", "mount", "upper", f'xyz="0 0 {height}"', "1 0 0", any_turn)
+        + hinge("bend", "upper", "lower", 'xyz="0.12 0 0"', "0 1 0", any_turn)
+        + "</robot>"
+    )
+
+
+def test_an_arm_whose_base_puts_it_into_the_ground_does_not_diverge_and_is_named(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "arm.urdf").write_text(arm_along_the_ground(0.0))
+
+    plan = make_plan(
+        str(tmp_path / "arm.urdf"), 5.0, {}, {}, {"strength.roll": 0.0, "strength.bend": 0.0}
+    )
+
+    (line,) = [line for line in plan.warnings if "into the ground" in line]
+    assert "upper 0.04 m deep, lower 0.03 m deep" in line and "100 rad/s" in line
+    assert sum(1 for _ in ticks_in_process(plan)) == 1200
+
+
+@pytest.mark.parametrize(("height", "terrain"), [(0.0, "none"), (0.04, "plane"), (0.2, "plane")])
+def test_an_arm_out_of_the_ground_has_no_bound(tmp_path: Path, height: float, terrain: str) -> None:
+    (tmp_path / "arm.urdf").write_text(arm_along_the_ground(height))
+
+    plan = make_plan(str(tmp_path / "arm.urdf"), 1.0, {}, {"terrain": terrain}, {})
+
+    assert not [line for line in plan.warnings if "rad/s" in line]
