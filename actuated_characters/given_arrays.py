@@ -37,8 +37,8 @@ def has_arrays(state: StampedState, size: int) -> bool:
 
 def is_finite(numbers: FloatArray) -> bool:
     """Whether all of some doubles (n,) are finite; in a microsecond, as each tick asks for it."""
-    # a list's sum is finite only where all are, and says nothing where it overflows
-    return math.isfinite(sum(numbers.tolist())) or bool(np.isfinite(numbers).all())
+    # A sum of squares is finite only where all are; where it overflows it says nothing.
+    return math.isfinite(numbers.dot(numbers)) or bool(np.isfinite(numbers).all())
 
 
 def real_array(what: str, numbers: Sequence[float] | FloatArray) -> FloatArray:

@@ -103,7 +103,10 @@ class TrackedReference:
             time = self.time(tick)
             return [(time, self._coupled(self._reference.sample(time)))]
         times = [self.time(each) for each in range(tick, tick + _TOGETHER)]
-        return list(zip(times, map(self._coupled, self._together.samples(times)), strict=True))
+        states = self._together.samples(times)
+        if self._character.coupling:
+            states = [self._coupled(state) for state in states]
+        return list(zip(times, states, strict=True))
 
     def _coupled(self, state: ReferenceState) -> ReferenceState:
         """A state of the reference with the followers where their leaders are."""

@@ -112,8 +112,9 @@ class Body:
             states = pybullet.getJointStatesMultiDof(
                 self._body, self._joints, physicsClientId=self._client
             )
+            rotation_vector = frames.rotation_vector  # found once, not at each joint
             for value, speed, _, _ in states:
-                position += frames.rotation_vector(value) if len(value) == _QUATERNION else value
+                position += rotation_vector(value) if len(value) == _QUATERNION else value
                 velocity += speed
         for entries, axes in self._turned if all(position) and all(velocity) else self._balls:
             position[entries] = frames.to_parent(axes, position[entries])
