@@ -12,9 +12,8 @@ from typing import Any
 import yaml
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from actuated_characters.bags.format.metadata import METADATA, load_metadata
+from actuated_characters.bags.format.metadata import EARLIER_BAG, METADATA, load_metadata
 from actuated_characters.bags.writer import BagWriter
-from actuated_characters.runs.run_directory import EARLIER_BAG
 from msgs_config.errors import RecordingError
 
 _STATIC_SETS = 64  # of static frames, one of each character

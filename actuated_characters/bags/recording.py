@@ -8,6 +8,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from actuated_characters.bags.collecting import collect, naming
+from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.bags.format.storage import FILE_SUFFIXES, SUFFIXES
 from actuated_characters.bags.node_parameters import NodeParameters, between, in_force
 from actuated_characters.bags.plans import PlanArrays
@@ -21,7 +22,6 @@ from actuated_characters.bags.tracks import (
     States,
     WorldTimeline,
 )
-from actuated_characters.runs.run_directory import BAG
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.character.model import Character

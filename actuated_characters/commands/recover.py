@@ -14,7 +14,7 @@ from msgs_config.errors import RecordingError
 from msgs_config.file_kinds import refuse_other_kind
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.bags.recovery import Recovered
+    from actuated_characters.recorder.recovery import Recovered
 
 _NS_PER_S = 10**9
 
@@ -38,7 +38,7 @@ def add_recover(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 
 def _recover(options: argparse.Namespace) -> None:
-    from actuated_characters.bags.recovery import recover
+    from actuated_characters.recorder.recovery import recover
 
     refuse_other_kind(options.bag, "a run or the directory of a bag", (), RecordingError)
     with progress_bar("", 1.0) as bar:

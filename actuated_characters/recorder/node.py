@@ -10,6 +10,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.bags.format.storage import LOG_TIME, SIMULATED
 from actuated_characters.bags.last_parts import LastPartsWriter
 from actuated_characters.bags.writer import BagWriter
@@ -26,7 +27,7 @@ from actuated_characters.recorder.topics import (
     simulator_name,
 )
 from actuated_characters.runs.forked_from import given_origin
-from actuated_characters.runs.run_directory import BAG, metrics_directory, write_metrics
+from actuated_characters.runs.run_directory import metrics_directory, write_metrics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK

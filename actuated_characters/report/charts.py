@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from actuated_characters.metrics.error_measures import AT_LIMIT
+from actuated_characters.render.plots import label, make_panels
 from actuated_characters.report.decimation import decimated, span_maxima, span_means, span_starts
-from actuated_characters.studies.framework.plots import label, make_panels
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 
 TIME = "simulation time (s)"

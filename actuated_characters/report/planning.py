@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from actuated_characters.bags.plans import PlanArrays
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.error_measures import centre_path
+from actuated_characters.render.plots import label, make_panels
 from actuated_characters.report.charts import TIME, Marks, Timeline
-from actuated_characters.studies.framework.plots import label, make_panels
 from msgs_config.arrays import FloatArray, IntArray
 
 _SIZE = (11.0, 5.6)  # inches

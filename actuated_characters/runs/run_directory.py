@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import yaml
 
+from actuated_characters.bags.format.metadata import BAG, EARLIER_BAG
 from actuated_characters.metrics.run_metrics import Series
 from actuated_characters.whole_files import part_of, write_whole, writing
 from msgs_config.errors import RecordingError, RunError
 
-BAG, PARAMETERS, LOGS = "bag", "parameters", "logs"
-EARLIER_BAG = BAG + "-earlier"  # the older part, while a recording of bounded size is made
+PARAMETERS, LOGS = "parameters", "logs"
 DAMAGED = BAG + ".damaged"  # what `recover` leaves beside the bag that it makes
 SUMMARY, SERIES, PLOT = "summary.json", "measurements.csv", "plot.png"
 STRIP, VIDEO = "strip.png", "video.mp4"  # what `render` makes of the bag

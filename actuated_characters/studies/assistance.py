@@ -6,8 +6,8 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.recording_metrics import fall_time
+from actuated_characters.render.plots import label
 from actuated_characters.render.stills import strip
-from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (

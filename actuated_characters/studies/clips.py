@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.render.plots import label
 from actuated_characters.render.stills import strip
-from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import RunResult, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from actuated_characters.metrics.recording_metrics import fall_time
+from actuated_characters.render.plots import label
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import (

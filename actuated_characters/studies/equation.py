@@ -8,8 +8,8 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.equation_of_motion import EquationOfMotion
+from actuated_characters.render.plots import label
 from actuated_characters.runs.plan import make_plan
-from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
 from controller_node.parameters import make_controller

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from actuated_characters.render.plots import label
 from actuated_characters.render.stills import pose_strip
-from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import (
     WALK,

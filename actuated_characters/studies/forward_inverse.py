@@ -12,8 +12,8 @@ import numpy as np
 import yaml
 from matplotlib.axes import Axes
 
+from actuated_characters.render.plots import THEORY, label
 from actuated_characters.runs.plan import make_plan
-from actuated_characters.studies.framework.plots import THEORY, label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec, StudyRunner
 from actuated_characters.studies.framework.tracking import joint_errors

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.render.plots import THEORY, label
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies.framework.bodies import (
     HINGE,
@@ -16,7 +17,6 @@ from actuated_characters.studies.framework.bodies import (
     momenta,
     write_hinged_boxes,
 )
-from actuated_characters.studies.framework.plots import THEORY, label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import HOLD, RunSpec, StudyRunner
 from controller_node.effort_series import write_effort_series

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from actuated_characters.studies.framework.plots import THEORY, label
+from actuated_characters.render.plots import THEORY, label
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import HOLD, RunSpec, StudyRunner
 from actuated_characters.studies.theory import second_order

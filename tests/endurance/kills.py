@@ -32,12 +32,12 @@ from rich.console import Console  # noqa: E402
 from rich.table import Table  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
 
+from actuated_characters.bags.format.metadata import BAG  # noqa: E402
 from actuated_characters.bags.format.storage import COMPRESSIONS  # noqa: E402
-from actuated_characters.bags.recovery import recover  # noqa: E402
+from actuated_characters.recorder.recovery import recover  # noqa: E402
 from actuated_characters.runs.plan import make_plan  # noqa: E402
 from actuated_characters.runs.processes import Child  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
-from actuated_characters.runs.run_directory import BAG  # noqa: E402
 from benchmarks.support.nodes import Nodes  # noqa: E402
 from msgs_config.errors import RecordingError  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402

@@ -12,12 +12,13 @@ from actuated_characters.bags.format.storage import (
     ZSTD,
     reason,
 )
-from actuated_characters.runs.run_directory import BAG
 from msgs_config import files
 from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
 
 METADATA = "metadata.yaml"
+BAG = "bag"  # in the directory of a run
+EARLIER_BAG = BAG + "-earlier"  # the older part, while a recording of bounded size is made
 FILE, MESSAGE = "file", "message"  # that rosbag2 compressed; MCAP's chunks tell themselves
 _LATEST_VERSION = 9  # of Jazzy
 

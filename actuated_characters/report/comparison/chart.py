@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from actuated_characters.render.plots import label, make_panels
 from actuated_characters.report.comparison.comparison import RecordingComparison
 from actuated_characters.report.decimation import decimated
-from actuated_characters.studies.framework.plots import label, make_panels
 
 _SIZE = (11.0, 3.4)  # inches, of each character's panel
 _LEAST = 1e-17  # rad or m; stands for 0 on a logarithmic axis

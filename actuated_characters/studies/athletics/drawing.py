@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.render.plots import label
 from actuated_characters.render.stills import strip
 from actuated_characters.report.reactions import mode_spans
 from actuated_characters.studies.athletics.measures import (
@@ -16,7 +17,6 @@ from actuated_characters.studies.athletics.measures import (
     taken,
 )
 from actuated_characters.studies.athletics.pushes import LARGEST, PushMap
-from actuated_characters.studies.framework.plots import label
 from actuated_characters.studies.framework.result import StudyResult
 
 if TYPE_CHECKING:  # it takes a second to import

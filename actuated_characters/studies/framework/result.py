@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from actuated_characters.studies.framework.plots import make_panels
+from actuated_characters.render.plots import make_panels
 from msgs_config.arrays import FloatArray
 
 if TYPE_CHECKING:  # it takes a second to import

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from actuated_characters.runs.run_directory import BAG
+from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.viewer.recorded.export import free_path
 
 _MODULE = "actuated_characters.cli"

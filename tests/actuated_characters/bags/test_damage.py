@@ -11,8 +11,8 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.recovery import recover
 from actuated_characters.bags.writer import BagWriter
+from actuated_characters.recorder.recovery import recover
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import SENT, write_humble_db3, write_mcap
 

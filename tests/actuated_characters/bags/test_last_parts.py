@@ -7,12 +7,12 @@ import pytest
 import yaml
 from rosbags.highlevel import AnyReader
 
+from actuated_characters.bags.format.metadata import EARLIER_BAG
 from actuated_characters.bags.last_parts import LastPartsWriter
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.render.scene import make_scene
 from actuated_characters.replay.replay import replay
-from actuated_characters.runs.run_directory import EARLIER_BAG
 from msgs_config.errors import RecordingError
 from tests.support.bags import (
     Made,

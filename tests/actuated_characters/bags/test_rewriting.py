@@ -14,7 +14,7 @@ from std_msgs.msg import String
 
 from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.recovery import recover
+from actuated_characters.recorder.recovery import recover
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import (
     SENT,

@@ -14,9 +14,9 @@ from rosbags.highlevel import AnyReader
 
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import read_recording
-from actuated_characters.bags.recovery import recover
 from actuated_characters.cli import main
 from actuated_characters.metrics.recording_metrics import measure_recording
+from actuated_characters.recorder.recovery import recover
 from actuated_characters.report.facts import look_at
 from msgs_config.messages.clock import TickClock
 from tests.actuated_characters.bags.format.test_rosbags_storage import unclosed

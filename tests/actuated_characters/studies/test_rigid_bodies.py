@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from actuated_characters.render.plots import draw_over_theory
 from actuated_characters.studies import joint_torque, rigid_body
 from actuated_characters.studies.framework.bodies import HINGE, Box, momenta, write_box
-from actuated_characters.studies.framework.plots import draw_over_theory
 from actuated_characters.studies.framework.result import StudyResult
 from actuated_characters.studies.framework.study import RunSpec
 from actuated_characters.studies.theory.euler import (

@@ -7,12 +7,12 @@ from pathlib import Path
 from std_msgs.msg import String
 
 from actuated_characters.bags.directory_lock import DirectoryLock, find_writer
-from actuated_characters.bags.format.metadata import METADATA
+from actuated_characters.bags.format.metadata import BAG, METADATA
 from actuated_characters.bags.format.storage import reason
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rewriting import Progress, RecoveredContents, rewrite, storage_files
 from actuated_characters.metrics.collector import CONFIGURATION, HEARD, MetricsCollector
-from actuated_characters.runs.run_directory import BAG, SUMMARY, metrics_directory, write_metrics
+from actuated_characters.runs.run_directory import SUMMARY, metrics_directory, write_metrics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode

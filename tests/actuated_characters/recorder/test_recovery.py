@@ -15,9 +15,9 @@ from std_msgs.msg import String
 from actuated_characters import cli
 from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.recovery import recover
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import MetricsCollector
+from actuated_characters.recorder.recovery import recover
 from actuated_characters.runs.run_directory import SUMMARY, read_metrics, write_metrics
 from msgs_config.errors import RecordingError
 from tests.support.bags import add_to, make_run
