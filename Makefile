@@ -60,6 +60,7 @@ docs: .venv/.installed-test ## Build the documentation as a site in build/docs
 
 pages: .venv/.installed-test ## Renew the pages that are made from the code
 	$(BIN)/python -m tests.support.parameter_page
+	$(BIN)/python -m tests.support.topic_table
 
 other-numpy: .venv/.installed-test ## Compare the golden runs with the oldest and the newest numpy allowed
 	for version in '==1.26.4' '>=2,<3'; do \

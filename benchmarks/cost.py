@@ -20,6 +20,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
+from msgs_config.runtime.publishing import create_publisher
 from sim_node.parameters import CharacterParameters, SimulatorParameters, load_parameters
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.world import World
@@ -154,7 +155,7 @@ class _LimpController:
     def __init__(self, nodes: Nodes, each: CharacterParameters) -> None:
         names = [n for n in each.character.layout.dof_names if not n.startswith("root_")]
         self._states = DirectSubscription(nodes.node, topics.JOINT_STATES.under(each.name))
-        self._torques = topics.create_publisher(nodes.node, topics.JOINT_TORQUES.under(each.name))
+        self._torques = create_publisher(nodes.node, topics.JOINT_TORQUES.under(each.name))
         self._encoder, self._zeros = JointStateEncoder(names), np.zeros(len(names))
         self._decoder = JointStateDecoder()
 

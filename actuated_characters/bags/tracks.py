@@ -77,9 +77,7 @@ class States:
 class WorldTimeline:
     """All messages on the balls in one namespace."""
 
-    TOPICS: ClassVar = tuple(
-        topic.name for topic in (topics.THROW, topics.APPLIED_THROW, topics.THROWN)
-    )
+    TOPICS: ClassVar = topics.names_to_read(of_world=True)
 
     def __init__(self, namespace: str) -> None:
         """`namespace` is without the leading slash."""
@@ -117,18 +115,7 @@ class CharacterTimeline:
     comes. States before the first one of an episode are left out.
     """
 
-    TOPICS: ClassVar = (
-        CONFIGURATION,
-        _CONTROLLER,
-        _REFERENCE,
-        _MODE,
-        _PLAN,
-        topics.JOINT_STATES.name,
-        topics.JOINT_TORQUES.name,
-        topics.CONTACTS.name,
-        topics.APPLIED_WRENCH.name,
-        topics.EXTERNAL_WRENCH.name,
-    )
+    TOPICS: ClassVar = topics.names_to_read(of_world=False)
 
     def __init__(self, namespace: str) -> None:
         """`namespace` is without the leading slash."""

@@ -46,6 +46,7 @@ from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, Values, resolve
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.publishing import create_publisher
 from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 from msgs_config.versions import describe_changes, installed_versions
 
@@ -103,7 +104,7 @@ class ForkNode(Node):
         sent = [(topics.EXTERNAL_WRENCH, pushed), (topics.THROW, thrown)]
         sent += [(topic, pushed) for topic in REQUESTS if topic.name in requested]
         self._outgoing: dict[str, tuple[Publisher, int]] = {
-            topic.name: (topics.create_publisher(self, topic), values.integer(count))
+            topic.name: (create_publisher(self, topic), values.integer(count))
             for topic, count in sent
         }
         self._setters = {

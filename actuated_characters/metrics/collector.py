@@ -29,8 +29,7 @@ COUNTS = {  # the simulator's in its diagnostics, and the figures' names of them
     "rejected_throws": "rejected_throws",
 }
 HEARD = frozenset(
-    {CONFIGURATION, MODE, REFERENCE}
-    | {topic.name for topic in (topics.JOINT_STATES, topics.JOINT_TORQUES, topics.DIAGNOSTICS)}
+    topic.name for each in topics.TABLE if each.is_measured for topic in each.as_others_name_it
 )
 """The topics that the figures are measured from."""
 

@@ -32,6 +32,7 @@ from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import REMEDY, SESSION, given_session, named
+from msgs_config.messages.topic import LISTENING_DEPTH
 from msgs_config.parameters import Values, resolve
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import PollingExecutor
@@ -139,7 +140,7 @@ class RecorderNode(Node):
     def _drain_rest(self) -> None:
         """Take the messages that were there at the stop, within a reasonable time."""
         deadline = time.monotonic() + _LONGEST_END
-        for _ in range(topics.LISTENING_DEPTH // _AT_ONCE):  # no more was there
+        for _ in range(LISTENING_DEPTH // _AT_ONCE):  # no more was there
             if not self._drain(gives_way=False):
                 return
             if time.monotonic() > deadline:

@@ -17,26 +17,9 @@ from msgs_config.messages.session import (
     episode_session,
     read_session,
 )
+from msgs_config.messages.topic import SessionPlace
 
 _MOST_HELD = 1000  # messages before the first state; few topics have any then
-
-_ALWAYS_NAMED = {
-    topic.name
-    for topic in (
-        topics.JOINT_STATES,
-        topics.CONTACTS,
-        topics.APPLIED_WRENCH,
-        topics.APPLIED_THROW,
-        topics.THROWN,
-    )
-}
-_SOMETIMES_NAMED = {
-    topics.JOINT_TORQUES.name,
-    topics.REFERENCE.of(topics.CONTROLLER_NODE).name,
-    topics.EXTERNAL_WRENCH.name,
-    topics.THROW.name,
-}
-_CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 
 
 class Heard(NamedTuple):
@@ -49,18 +32,21 @@ class Heard(NamedTuple):
 
 def find_session(message: Heard) -> str | None:
     """Return the session that a message is of; None if it may be of any."""
-    name = message.recorded.own_name
+    place = message.recorded.topic.session
     try:
-        if name in _ALWAYS_NAMED or name in _SOMETIMES_NAMED:
-            session = read_session(read_frame_id(message.raw))
-            return session or (None if name in _SOMETIMES_NAMED else session)
-        if name == topics.EPISODE.name:
-            return episode_session(read_frame_id(message.raw))
-        if name == _CONFIGURATION:
-            return read_session(str(json.loads(decode(message.raw, String).data)["session"]))
+        match place:
+            case SessionPlace.FRAME_ID:
+                return read_session(read_frame_id(message.raw))
+            case SessionPlace.FRAME_ID_IF_ANY:
+                return read_session(read_frame_id(message.raw)) or None
+            case SessionPlace.EPISODE:
+                return episode_session(read_frame_id(message.raw))
+            case SessionPlace.CONFIGURATION:
+                return read_session(str(json.loads(decode(message.raw, String).data)["session"]))
+            case SessionPlace.NOWHERE:
+                return None
     except (MessageError, ValueError, KeyError, TypeError, RecursionError):
-        return None if name in _SOMETIMES_NAMED else ANONYMOUS
-    return None
+        return None if place is SessionPlace.FRAME_ID_IF_ANY else ANONYMOUS
 
 
 class SessionFilter:

@@ -6,60 +6,23 @@ from dataclasses import dataclass
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.validate_topic_name import validate_topic_name
 
 from actuated_characters.bags.format.definitions import find_message_type
-from actuated_characters.metrics.collector import HEARD
 from msgs_config.character.sensors import SensorType
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages import topics
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Kept, Quality, Topic
 
-_OF_CONTROLLER = [
-    topics.INITIAL_STATE,
-    topics.JOINT_TRAJECTORY,
-    topics.ACTIVE_TRAJECTORY,
-    topics.ACTIVE_CMD_VEL,
-    topics.STRENGTH,
-    topics.ACTIVE_STRENGTH,
-    topics.MODE,
-    topics.PLAN,
-]
-_OF_ALL = [
-    topics.CLOCK,
-    topics.DIAGNOSTICS,
-    topics.THROW,
-    topics.APPLIED_THROW,
-    topics.THROWN,
-    *topics.TRANSFORMS,
-]
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
-_OF_EACH = [
-    topics.EPISODE,
-    topics.ROBOT_DESCRIPTION,
-    topics.CONFIGURATION.of(topics.SIM_NODE),
-    topics.CONFIGURATION.of(topics.CONTROLLER_NODE),
-    topics.EXTERNAL_WRENCH,
-    topics.CMD_VEL,
-    topics.CMD_VEL_STAMPED,
-    *(topic.of(topics.CONTROLLER_NODE) for topic in _OF_CONTROLLER),
-    topics.CONTACTS,
-    topics.APPLIED_WRENCH,
-    topics.ODOM,
-    topics.VISUALIZATION,
-    topics.DESCRIPTION_JOINT_STATES,
-    topics.REFERENCE.of(topics.CONTROLLER_NODE),
-    topics.NET_WRENCH.of(topics.CONTROLLER_NODE),
-    topics.JOINT_TORQUES,
-    topics.JOINT_STATES,
+_RECORDED = [
+    topic
+    for each in reversed(topics.TABLE)
+    if each.kept in (Kept.UNLESS_EXCLUDED, Kept.ALWAYS) and each.is_installed
+    for topic in each.as_others_name_it
 ]
-_NEEDED = {  # nothing can be measured or repeated without; controllers wait for subscribers
-    topics.JOINT_STATES.name,
-    topics.JOINT_TORQUES.name,
-    topics.CONFIGURATION.of(topics.SIM_NODE).name,
-}
-EXCLUDABLE = sorted({topic.name for topic in (*_OF_ALL, *_OF_EACH)} - _NEEDED)
+EXCLUDABLE = sorted(topic.name for topic in _RECORDED if topic.kept is not Kept.ALWAYS)
 """Topics that a recording may do without."""
 
 
@@ -91,8 +54,9 @@ def contract_topics(
     if twice:
         raise ConfigurationError(f"parameter 'characters' has '{twice[0]}' twice")
     _check_names("characters", characters)
-    found = [_recorded(node, topic, None) for topic in _OF_ALL]
-    found += [_recorded(node, topic, name) for topic in _OF_EACH for name in characters]
+    found = [_recorded(node, topic, None) for topic in _RECORDED if topic.of_world]
+    of_each = [topic for topic in _RECORDED if not topic.of_world]
+    found += [_recorded(node, topic, name) for topic in of_each for name in characters]
     left_out: list[RecordedTopic] = []
     for name in exclude:
         matching = [each for each in found if name in (each.own_name, each.name)]
@@ -103,7 +67,7 @@ def contract_topics(
     return [
         each
         for each in found
-        if each not in left_out and (each.own_name in HEARD or not measured_only)
+        if each not in left_out and (each.topic.is_measured or not measured_only)
     ]
 
 
@@ -165,24 +129,21 @@ class NamedTopics:
                 continue
             self.missing.discard(name)
             try:
-                message_type = find_message_type(endpoints[0].topic_type)
+                find_message_type(endpoints[0].topic_type)
             except RecordingError as error:
                 self._node.get_logger().error(f"'{name}' is not recorded: {error}")
                 continue
             profiles = [endpoint.qos_profile for endpoint in endpoints]
-            topic = Topic(name, message_type, fitting_qos(profiles))
+            topic = Topic(name, endpoints[0].topic_type, fitting_quality(profiles))
             yield RecordedTopic(topic, name, name, None), profiles[0]
 
 
-def fitting_qos(profiles: Sequence[QoSProfile]) -> QoSProfile:
+def fitting_quality(profiles: Sequence[QoSProfile]) -> Quality:
     """The strictest quality of service with which a subscription fits all of these publishers."""
-    reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in profiles)
-    latched = all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in profiles)
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
+    return Quality(
         depth=1,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        is_latched=all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in profiles),
+        is_reliable=all(each.reliability is ReliabilityPolicy.RELIABLE for each in profiles),
     )
 
 

@@ -14,11 +14,12 @@ from actuated_characters.runs.planned_wrenches import read_pushes
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import SESSION, given_session
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.publishing import create_publisher
 from msgs_config.runtime.ros_parameters import declare, given_parameters
 
 PARAMETERS = [
@@ -106,7 +107,7 @@ class _PlannedPublisher:
     def __init__(
         self, node: Node, topic: Topic, messages: Sequence[bytes], subscribers: int
     ) -> None:
-        self._publisher = topics.create_publisher(node, topic)
+        self._publisher = create_publisher(node, topic)
         self._messages = messages
         self._subscribers = subscribers
 

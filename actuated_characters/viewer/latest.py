@@ -6,7 +6,6 @@ The subscriptions are best effort: no publisher waits for them, or sends anythin
 from dataclasses import dataclass, replace
 
 from rclpy.node import Node
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
@@ -18,7 +17,7 @@ from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_ball
 from msgs_config.messages.session import ANONYMOUS, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Quality, Topic
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
 from msgs_config.runtime.polling import DirectSubscription
 
@@ -28,10 +27,7 @@ _UNUSABLE = (MessageError, LayoutError)
 
 def unacknowledged(topic: Topic, depth: int = 1) -> Topic:
     """The topic as it is read without any duty of its publisher."""
-    qos = QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT
-    )
-    return replace(topic, qos=qos)
+    return replace(topic, quality=Quality(depth, is_reliable=False))
 
 
 def _for_display(node: Node, below: str, topic: Topic) -> Topic:

@@ -21,9 +21,10 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal, limit_threads, run_node
+from msgs_config.runtime.publishing import create_publisher
 
 _PING = replace(topics.JOINT_STATES, name="ping")
 _PONG = replace(topics.JOINT_TORQUES, name="pong")
@@ -50,7 +51,7 @@ def round_trips(layout: JointLayout, count: int, *, direct: bool) -> FloatArray:
         at_end.callback(rclpy.try_shutdown)
         at_end.callback(node.destroy_node)
         take = _taker(node, _PONG, way, at_end)
-        publisher = topics.create_publisher(node, _PING)
+        publisher = create_publisher(node, _PING)
         _wait(lambda: publisher.get_subscription_count() and node.count_publishers("pong"))
         message = encoder.encode(0, zeros, zeros, zeros)
         durations = np.empty(_WARM_UP + count)
@@ -108,7 +109,7 @@ class _FarSide(Node):
         super().__init__("far_side")
         self._at_end = ExitStack()
         self._take = _taker(self, _PING, os.environ[_WAY], self._at_end)
-        self._publisher = topics.create_publisher(self, _PONG)
+        self._publisher = create_publisher(self, _PONG)
         self._reply = bytes(int(os.environ[_SIZE]))
 
     def run(self, stop: StopSignal) -> None:

@@ -11,7 +11,7 @@ from msgs_config.character.layout import ROOT
 from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 

@@ -26,7 +26,13 @@ from msgs_config.messages.cdr import DoublesEncoder, split_stamp
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.messages.topics import Outgoing
+from msgs_config.runtime.publishing import (
+    Outgoing,
+    create_publisher,
+    flush,
+    has_subscribers,
+    publish_together,
+)
 from msgs_config.runtime.throttle import Throttle
 
 _FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge messages
@@ -58,18 +64,18 @@ class Publishers:
         self._undriven = commanded[:0]
         self.bind(session or ANONYMOUS)
         self._wrench_encoder = DoublesEncoder(WORLD)
-        self._initial_states = topics.create_publisher(node, topics.INITIAL_STATE)
-        self._references = topics.create_publisher(node, topics.REFERENCE)
-        self._throttled_references = topics.create_publisher(node, topics.REFERENCE_THROTTLE)
+        self._initial_states = create_publisher(node, topics.INITIAL_STATE)
+        self._references = create_publisher(node, topics.REFERENCE)
+        self._throttled_references = create_publisher(node, topics.REFERENCE_THROTTLE)
         self._throttle = Throttle()
-        self._wrenches = topics.create_publisher(node, topics.NET_WRENCH)
-        self._torques = topics.create_publisher(node, topics.JOINT_TORQUES)
-        self._configurations = topics.create_publisher(node, topics.CONFIGURATION)
-        self._trajectories = topics.create_publisher(node, topics.ACTIVE_TRAJECTORY)
-        self._velocities = topics.create_publisher(node, topics.ACTIVE_CMD_VEL)
-        self._strengths = topics.create_publisher(node, topics.ACTIVE_STRENGTH)
-        self._modes = topics.create_publisher(node, topics.MODE)
-        self._plans = topics.create_publisher(node, topics.PLAN)
+        self._wrenches = create_publisher(node, topics.NET_WRENCH)
+        self._torques = create_publisher(node, topics.JOINT_TORQUES)
+        self._configurations = create_publisher(node, topics.CONFIGURATION)
+        self._trajectories = create_publisher(node, topics.ACTIVE_TRAJECTORY)
+        self._velocities = create_publisher(node, topics.ACTIVE_CMD_VEL)
+        self._strengths = create_publisher(node, topics.ACTIVE_STRENGTH)
+        self._modes = create_publisher(node, topics.MODE)
+        self._plans = create_publisher(node, topics.PLAN)
         self._published_mode: ModeReport | None = None
         self._published_outlook: Outlook | None = None
 
@@ -81,7 +87,7 @@ class Publishers:
         self._initial_states.publish(
             self._reference_encoder.encode(state.stamp_ns, state.position, state.velocity)
         )
-        topics.flush((self._initial_states,), _FLUSH_TIME)
+        flush((self._initial_states,), _FLUSH_TIME)
 
     def bind(self, session: str) -> None:
         """Name the simulator's session in what answers its states."""
@@ -113,30 +119,30 @@ class Publishers:
 
     def publish(self, reply: Reply) -> None:
         """Publish a reply, the torques first: the simulator goes on while the rest is made."""
-        topics.publish_together([(self._torques, reply.torques)])
-        topics.publish_together(self._beside_torques(reply))
+        publish_together([(self._torques, reply.torques)])
+        publish_together(self._beside_torques(reply))
 
     def make_up(self, reply: Reply | None) -> None:
         """Publish the last reply's reference on the throttled topic, too, if no other follows."""
         if reply is not None and self._throttle.makes_up():
-            topics.publish_together(self._reference(self._throttled_references, reply.reference))
+            publish_together(self._reference(self._throttled_references, reply.reference))
 
     def _beside_torques(self, reply: Reply) -> Iterator[Outgoing]:
         """The messages that the simulator does not wait for, where there are subscribers."""
         yield from self._reference(self._references, reply.reference)
         if self._throttle.chooses():
             yield from self._reference(self._throttled_references, reply.reference)
-        if topics.has_subscribers(self._wrenches):
+        if has_subscribers(self._wrenches):
             yield self._wrenches, self._net_wrench(reply)
 
     def _reference(self, publisher: Publisher, reference: StampedReference) -> Iterator[Outgoing]:
-        if topics.has_subscribers(publisher):
+        if has_subscribers(publisher):
             arrays = reference.position, reference.velocity
             yield publisher, self._reference_encoder.encode(reference.stamp_ns, *arrays)
 
     def flush(self) -> None:
         """Wait a while until every subscriber has what was published in answer to states."""
-        topics.flush((self._torques, self._references, self._wrenches), _FLUSH_TIME)
+        flush((self._torques, self._references, self._wrenches), _FLUSH_TIME)
 
     def publish_configuration(self, text: str) -> None:
         """Publish what the controller is and has in force, as JSON."""
@@ -176,7 +182,7 @@ class Publishers:
         """
         if outlook is not None and outlook is not self._published_outlook:
             self._published_outlook = outlook
-            if topics.has_subscribers(self._plans):
+            if has_subscribers(self._plans):
                 self._plans.publish(plan_message(outlook, stamp_ns))
         if mode is not None and mode is not self._published_mode:
             self._published_mode = mode

@@ -1,183 +1,460 @@
-"""Names, message types and quality of service of every topic."""
+"""The table of topics: all that is known of each, once.
+
+What is recorded, measured, read, played again and documented is taken from here.
+"""
 
 import re
-import time
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import TypeAlias
-
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
-from nav_msgs.msg import Odometry
-from rclpy.duration import Duration
-from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.node import Node
-from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState, MultiDOFJointState, PointCloud2
-from std_msgs.msg import Header, String
-from trajectory_msgs.msg import JointTrajectory
-from visualization_msgs.msg import MarkerArray
+from dataclasses import replace
 
 from msgs_config.character.sensors import SensorType
-
-try:  # a full ROS install has it, the wheels have not
-    from tf2_msgs.msg import TFMessage
-except ImportError:
-    TFMessage = None
-
-Outgoing: TypeAlias = tuple[Publisher, bytes]
-"""A serialised message and its publisher."""
-
-LISTENING_DEPTH = 50_000
-"""Depth of a reader whose process may be busy otherwise for long, with a disk for instance.
-
-It costs nothing until it is needed, unlike a publisher's."""
-
-
-def _keep_last(
-    depth: int,
-    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE,
-    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE,
-) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=reliability,
-        durability=durability,
-    )
-
-
-STREAM_QOS = _keep_last(5000)
-"""With a small history a recorder that pauses for a moment loses messages."""
-LATCHED_QOS = _keep_last(1, DurabilityPolicy.TRANSIENT_LOCAL)
-CHANGES_QOS = _keep_last(100, DurabilityPolicy.TRANSIENT_LOCAL)
-"""For values that may change twice at once: a listener of depth 1 has the last, a recorder all."""
-DISPLAY_QOS = _keep_last(1000)
-"""A viewer's own depth may be 1; a recorder's is not."""
-
-
-@dataclass(frozen=True)
-class Topic:
-    """A topic of the contract. A name that begins with `~` is below its node's name."""
-
-    name: str
-    message_type: type
-    qos: QoSProfile
-
-    def of(self, node_name: str) -> "Topic":
-        """The topic as another node names it: `~` is the node that publishes it."""
-        return replace(self, name=self.name.replace("~", node_name))
-
-    @property
-    def throttled(self) -> "Topic":
-        """The topic with some of its messages, a few a second of wall time, for viewers."""
-        return replace(self, name=f"{self.name}_throttle", qos=DISPLAY_QOS)
-
-    def under(self, namespace: str) -> "Topic":
-        """The topic below a namespace; with an empty one it is the topic itself."""
-        return replace(self, name=f"{namespace}/{self.name}") if namespace else self
-
-    def for_listener(self, depth: int = LISTENING_DEPTH) -> "Topic":
-        """The topic with a queue deep enough for a listener that polls rarely."""
-        return replace(self, qos=_keep_last(depth, self.qos.durability, self.qos.reliability))
-
-
-def create_publisher(node: Node, topic: Topic) -> Publisher:
-    """A node's publisher on a topic of the contract."""
-    return node.create_publisher(
-        topic.message_type,
-        topic.name,
-        topic.qos,
-        # each default callback is one thing more that the executor looks at in each turn
-        event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
-    )
-
-
-def has_subscribers(publisher: Publisher) -> bool:
-    """Whether anybody subscribes; asked at every tick, so without rclpy's guard of the handle."""
-    return bool(publisher.handle.get_subscription_count())
-
-
-def publish_together(messages: Iterable[Outgoing]) -> None:
-    """Publish serialised messages in a row.
-
-    The first wakes its subscribers up, which takes longer than all else; of messages with work
-    between them each would find its subscribers asleep again.
-    """
-    for publisher, raw in list(messages):  # all are made before the first is published
-        publisher.handle.publish_raw(raw)
-
-
-def flush(publishers: Iterable[Publisher], seconds: float) -> bool:
-    """Wait until every subscriber has all that was published, at the most `seconds`; whether so."""
-    deadline = time.monotonic() + seconds
-    return all(
-        publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
-        for publisher in publishers
-    )
-
-
-JOINT_STATES = Topic("joint_states", JointState, STREAM_QOS)
-JOINT_TORQUES = Topic("joint_torques", JointState, STREAM_QOS)
-EXTERNAL_WRENCH = Topic("external_wrench", MultiDOFJointState, STREAM_QOS)
-APPLIED_WRENCH = Topic("applied_wrench", MultiDOFJointState, STREAM_QOS)
-CONTACTS = Topic("contacts", MultiDOFJointState, STREAM_QOS)
-THROW = Topic("throw", JointState, STREAM_QOS)
-APPLIED_THROW = Topic("applied_throw", JointState, STREAM_QOS)
-THROWN = Topic("thrown", MultiDOFJointState, STREAM_QOS)
-ODOM = Topic("odom", Odometry, STREAM_QOS)
-ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED_QOS)
-DESCRIPTION_JOINT_STATES = Topic("description_joint_states", JointState, DISPLAY_QOS)
-VISUALIZATION = Topic("visualization", MarkerArray, DISPLAY_QOS)
-INITIAL_STATE = Topic("~/initial_state", JointState, LATCHED_QOS)
-REFERENCE = Topic("~/reference", JointState, STREAM_QOS)
-NET_WRENCH = Topic("~/net_wrench", WrenchStamped, STREAM_QOS)
-JOINT_TRAJECTORY = Topic("~/joint_trajectory", JointTrajectory, STREAM_QOS)
-ACTIVE_TRAJECTORY = Topic("~/active_trajectory", JointTrajectory, LATCHED_QOS)
-CMD_VEL = Topic("cmd_vel", Twist, STREAM_QOS)
-CMD_VEL_STAMPED = Topic("cmd_vel_stamped", TwistStamped, STREAM_QOS)
-ACTIVE_CMD_VEL = Topic("~/active_cmd_vel", TwistStamped, CHANGES_QOS)
-STRENGTH = Topic("~/strength", JointState, STREAM_QOS)
-ACTIVE_STRENGTH = Topic("~/active_strength", JointState, CHANGES_QOS)
-MODE = Topic("~/mode", String, CHANGES_QOS)
-PLAN = Topic("~/plan", PointCloud2, STREAM_QOS)
-CLOCK = Topic("/clock", Clock, STREAM_QOS)
-EPISODE = Topic("episode", Header, LATCHED_QOS)
-CONFIGURATION = Topic("~/configuration", String, LATCHED_QOS)
-DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, STREAM_QOS)
-JOINT_STATES_THROTTLE = JOINT_STATES.throttled
-CONTACTS_THROTTLE = CONTACTS.throttled
-APPLIED_WRENCH_THROTTLE = APPLIED_WRENCH.throttled
-THROWN_THROTTLE = THROWN.throttled
-REFERENCE_THROTTLE = REFERENCE.throttled
-TRANSFORMS = (
-    []
-    if TFMessage is None
-    else [
-        Topic("/tf", TFMessage, DISPLAY_QOS),
-        Topic("/tf_static", TFMessage, LATCHED_QOS),
-    ]
+from msgs_config.messages.topic import (
+    CHANGES,
+    DISPLAY,
+    LATCHED,
+    STREAM,
+    Kept,
+    SessionPlace,
+    Topic,
 )
-"""`/tf` and `/tf_static`, where their type is installed."""
-
-
-def contact_wrench(link: str) -> Topic:
-    """The topic of the contact wrench on a link; what no topic's name can have becomes `_`."""
-    name = re.sub(r"\W|^(?=\d)", "_", link, flags=re.ASCII)
-    return Topic(f"contact_wrenches/{name}", WrenchStamped, DISPLAY_QOS)
-
-
-_SENSOR_MESSAGES = {SensorType.IMU: Imu, SensorType.FORCE: WrenchStamped}
-
-
-def sensor_reading(sensor_type: SensorType, name: str) -> Topic:
-    """The topic of a sensor's readings; `name` is that of `Sensor.topic`."""
-    return Topic(name, _SENSOR_MESSAGES[sensor_type], STREAM_QOS)
-
 
 SIM_NODE = "sim_node"
 CONTROLLER_NODE = "controller_node"
 RECORDER_NODE = "recorder"
 VIEWER_NODE = "viewer"
+
+JOINT_STATES = Topic(
+    "joint_states",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "sim_node → all",
+    kept=Kept.ALWAYS,
+    session=SessionPlace.FRAME_ID,
+    is_measured=True,
+    is_read=True,
+    is_of_tick=True,
+    content=(
+        "state at tick k, stamped with its simulated time; `effort` = the commanded torque "
+        "that was really applied during the previous tick (after clipping); **empty in the "
+        "first state of an episode**"
+    ),
+)
+JOINT_TORQUES = Topic(
+    "joint_torques",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "a controller → sim_node",
+    kept=Kept.ALWAYS,
+    session=SessionPlace.FRAME_ID_IF_ANY,
+    is_measured=True,
+    is_read=True,
+    content="`name` + `effort`; `header.stamp` **repeats the stamp of the answered state**",
+)
+EXTERNAL_WRENCH = Topic(
+    "external_wrench",
+    "sensor_msgs/msg/MultiDOFJointState",
+    STREAM,
+    "any node → sim_node",
+    session=SessionPlace.FRAME_ID_IF_ANY,
+    is_read=True,
+    content=(
+        "pushes: `joint_names` = links, `wrench` in world axes, translations of "
+        "`transforms` (optional) = points of application in the link frames, else the "
+        "links' centres of mass; the simulator holds a push for `wrench_duration`"
+    ),
+)
+APPLIED_WRENCH = Topic(
+    "applied_wrench",
+    "sensor_msgs/msg/MultiDOFJointState",
+    STREAM,
+    "sim_node → all",
+    session=SessionPlace.FRAME_ID,
+    is_read=True,
+    is_of_tick=True,
+    content=(
+        "the pushes that really acted during the previous tick, as `effort` reports the "
+        "torques; every tick, also when empty"
+    ),
+)
+CONTACTS = Topic(
+    "contacts",
+    "sensor_msgs/msg/MultiDOFJointState",
+    STREAM,
+    "sim_node → all",
+    session=SessionPlace.FRAME_ID,
+    is_read=True,
+    is_of_tick=True,
+    content=(
+        "links that touched something during the previous tick, and the net contact force "
+        "and torque on each: world axes, the torque about the link's centre of mass in the "
+        "state in which the contact acted; mean over the tick's substeps; every tick, also "
+        "when empty. It excludes the torque of the rolling and spinning friction that a "
+        "URDF defines, because the engine does not report that torque"
+    ),
+)
+IMU = Topic(
+    "imu/NAME",
+    "sensor_msgs/msg/Imu",
+    STREAM,
+    "sim_node → all",
+    kept=Kept.IF_NAMED,
+    is_of_tick=True,
+    content=(
+        "an IMU of the character's file: orientation in `odom`, angular velocity and "
+        "specific force in the sensor's frame, which is `frame_id`; the specific force is "
+        "the difference of velocities over the previous tick, in the axes at the stamp; "
+        "none (covariance -1) in the first state of an episode"
+    ),
+)
+FORCE = Topic(
+    "force/NAME",
+    "geometry_msgs/msg/WrenchStamped",
+    STREAM,
+    "sim_node → all",
+    kept=Kept.IF_NAMED,
+    is_of_tick=True,
+    content=(
+        "a force sensor of the character's file: the wrench of all contacts on its link, "
+        "mean over the previous tick, in the sensor's frame at the stamp and about its "
+        "origin"
+    ),
+)
+THROW = Topic(
+    "throw",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "any node → sim_node",
+    of_world=True,
+    session=SessionPlace.FRAME_ID_IF_ANY,
+    is_read=True,
+    content=(
+        "a ball to throw: `name` has `mass`, `radius`, `x`, `y`, `z`, `vx`, `vy`, `vz`, "
+        "`position` their values (kg, m, m/s, world); without `radius` the ball has that of "
+        "500 kg/m³"
+    ),
+)
+APPLIED_THROW = Topic(
+    "applied_throw",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "sim_node → all",
+    of_world=True,
+    session=SessionPlace.FRAME_ID,
+    is_read=True,
+    content=(
+        "a ball released at the beginning of the previous tick, with all its numbers; only "
+        "when there was one"
+    ),
+)
+THROWN = Topic(
+    "thrown",
+    "sensor_msgs/msg/MultiDOFJointState",
+    STREAM,
+    "sim_node → all",
+    of_world=True,
+    session=SessionPlace.FRAME_ID,
+    is_read=True,
+    content=(
+        "centre, orientation and velocities of the balls `ball_1`, ...; every tick while "
+        "there are any. With several characters, `throw`, `applied_throw` and `thrown` "
+        "belong to the world, without a character's name"
+    ),
+)
+ODOM = Topic(
+    "odom",
+    "nav_msgs/msg/Odometry",
+    STREAM,
+    "sim_node → all",
+    is_of_tick=True,
+    content=(
+        "the frame `base_link` in `odom`, for ROS tools; twist in the child frame; "
+        "covariances of 1e-9 on the diagonal, because the values are exact and zero would "
+        "mean unknown"
+    ),
+)
+ROBOT_DESCRIPTION = Topic(
+    "robot_description",
+    "std_msgs/msg/String",
+    LATCHED,
+    "sim_node → all",
+    content=(
+        "latched: the URDF, meshes as `file://`, with `base_link` as its root; for "
+        "characters with ball joints, capsules, a scale or incomplete limits one of hinges, "
+        "cylinders and spheres with the same masses, shapes and frames"
+    ),
+)
+DESCRIPTION_JOINT_STATES = Topic(
+    "description_joint_states",
+    "sensor_msgs/msg/JointState",
+    DISPLAY,
+    "sim_node → all",
+    content=(
+        "position of each joint of `robot_description`; a ball joint is three: yaw, pitch, roll"
+    ),
+)
+TF = Topic(
+    "/tf",
+    "tf2_msgs/msg/TFMessage",
+    DISPLAY,
+    "sim_node → all",
+    of_world=True,
+    content="[the frames](#frames) that move, where `tf2_msgs` can be imported",
+)
+TF_STATIC = Topic(
+    "/tf_static",
+    "tf2_msgs/msg/TFMessage",
+    LATCHED,
+    "sim_node → all",
+    of_world=True,
+    content=(
+        "latched: fixed joints, fixed bases and `world` → `odom`, where `tf2_msgs` can be imported"
+    ),
+)
+CONTACT_WRENCH = Topic(
+    "contact_wrenches/LINK",
+    "geometry_msgs/msg/WrenchStamped",
+    DISPLAY,
+    "sim_node → all",
+    kept=Kept.IF_NAMED,
+    content=(
+        "`contacts` for viewers, of each link with collision shapes: force and torque in "
+        "the link's frame, about its origin; zero without contact. Characters other than "
+        "letters, digits and `_` in the link's name become `_`"
+    ),
+)
+VISUALIZATION = Topic(
+    "visualization",
+    "visualization_msgs/msg/MarkerArray",
+    DISPLAY,
+    "sim_node → all",
+    content=(
+        "the shapes in the frame `world`, and those of balls while there are any (with "
+        "several characters, each character's message has the balls), `display_rate` times "
+        "per simulated second, like the three before it"
+    ),
+)
+INITIAL_STATE = Topic(
+    "~/initial_state",
+    "sensor_msgs/msg/JointState",
+    LATCHED,
+    "controller_node → sim_node",
+    nodes=(CONTROLLER_NODE,),
+    content=(
+        "latched, stamp 0: position and velocity of all DoF at the reference's start; a "
+        "simulator with `initial_state: reference` begins there"
+    ),
+)
+REFERENCE = Topic(
+    "~/reference",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    session=SessionPlace.FRAME_ID_IF_ANY,
+    is_measured=True,
+    is_read=True,
+    content=(
+        "the desired state *at* its stamp, which is the stamp of the torque computed from "
+        "it; stable PD itself looks at the reference one tick later"
+    ),
+)
+NET_WRENCH = Topic(
+    "~/net_wrench",
+    "geometry_msgs/msg/WrenchStamped",
+    STREAM,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    content=(
+        "force and torque on the whole character of all the efforts that answer the stamp's "
+        "state: world axes, the torque about the base link's origin. Joint torques act and "
+        "react inside the character, so alone they give zero; a nonzero value is the root's"
+    ),
+)
+CMD_VEL = Topic(
+    "cmd_vel",
+    "geometry_msgs/msg/Twist",
+    STREAM,
+    "any node → controller_node",
+    content=(
+        "with `reference: steered`: a velocity to reach in the character's own frame, from "
+        "the next answered state on; `steering.timeout` s of simulated time later it stops, "
+        "unless another one comes"
+    ),
+)
+CMD_VEL_STAMPED = Topic(
+    "cmd_vel_stamped",
+    "geometry_msgs/msg/TwistStamped",
+    STREAM,
+    "any node → controller_node",
+    accepted_on="~/active_cmd_vel",
+    content="the same from its stamp on; stamp 0: from the next answered state on",
+)
+ACTIVE_CMD_VEL = Topic(
+    "~/active_cmd_vel",
+    "geometry_msgs/msg/TwistStamped",
+    CHANGES,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    content=(
+        "latched: each accepted velocity, within the limits, stamped with its start; a "
+        "replay sends these"
+    ),
+)
+JOINT_TRAJECTORY = Topic(
+    "~/joint_trajectory",
+    "trajectory_msgs/msg/JointTrajectory",
+    STREAM,
+    "any node → controller_node",
+    nodes=(CONTROLLER_NODE,),
+    accepted_on="~/active_trajectory",
+    content=(
+        "a trajectory to track from its stamp on, in place of the present reference; stamp "
+        "0: from the next answered state on. Unnamed DoF stop"
+    ),
+)
+ACTIVE_TRAJECTORY = Topic(
+    "~/active_trajectory",
+    "trajectory_msgs/msg/JointTrajectory",
+    LATCHED,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    content=(
+        "latched: the last accepted trajectory, stamped with its start; the episode's end "
+        "discards it"
+    ),
+)
+STRENGTH = Topic(
+    "~/strength",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "any node → controller_node",
+    nodes=(CONTROLLER_NODE,),
+    accepted_on="~/active_strength",
+    content=(
+        "strengths of joints, 0 to 1, in `effort`, `name` being joints: factors on their "
+        "gains and effort limits. They hold from the stamp on, with stamp 0 from the next "
+        "answered state on, until the next message or the episode's end; unnamed joints are "
+        "at 1"
+    ),
+)
+ACTIVE_STRENGTH = Topic(
+    "~/active_strength",
+    "sensor_msgs/msg/JointState",
+    CHANGES,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    content="latched: the last accepted strengths, of all joints, stamped with their first tick",
+)
+MODE = Topic(
+    "~/mode",
+    "std_msgs/msg/String",
+    CHANGES,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    is_measured=True,
+    is_read=True,
+    content=(
+        "latched, JSON: `mode`, `stamp_ns` of the state from which it holds, and its cause "
+        "(the link struck and the impulse, the clip found and its distance, the "
+        "assistance); at an episode's start and at each change"
+    ),
+)
+PLAN = Topic(
+    "~/plan",
+    "sensor_msgs/msg/PointCloud2",
+    STREAM,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    is_read=True,
+    content=(
+        "one message per plan, stamped with the first state in which the plan acts, with "
+        "one point per check: the expected centre of mass (`x`, `y`, `z`, world) at `time` "
+        "s after that state, the cost of the deviations there for the plan and for the best "
+        "other candidate (`cost`, `alternative`), and the place of the reference's world "
+        "(`anchor_x`, `anchor_y`, `anchor_yaw`, m and rad)"
+    ),
+)
+CLOCK = Topic(
+    "/clock",
+    "rosgraph_msgs/msg/Clock",
+    STREAM,
+    "sim_node → all",
+    of_world=True,
+    content="every tick",
+)
+EPISODE = Topic(
+    "episode",
+    "std_msgs/msg/Header",
+    LATCHED,
+    "sim_node → all",
+    session=SessionPlace.EPISODE,
+    content="latched: stamp of the episode's first state; number and session in `frame_id`",
+)
+CONFIGURATION = Topic(
+    "~/configuration",
+    "std_msgs/msg/String",
+    LATCHED,
+    "sim_node → all",
+    nodes=(SIM_NODE,),
+    kept=Kept.ALWAYS,
+    session=SessionPlace.CONFIGURATION,
+    is_measured=True,
+    is_read=True,
+    content=(
+        "latched, JSON: character file, URDF text, parameters (the initial state among them) and "
+        "the stamp after which they are in force, its `session`, versions of package, engines, "
+        "numpy, Python and C library; again at a reset with changed parameters"
+    ),
+)
+CONTROLLER_CONFIGURATION = Topic(
+    "~/configuration",
+    "std_msgs/msg/String",
+    LATCHED,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    is_read=True,
+    content="the same of the controller; again at each change of its parameters",
+)
+DIAGNOSTICS = Topic(
+    "/diagnostics",
+    "diagnostic_msgs/msg/DiagnosticArray",
+    STREAM,
+    "both nodes → all",
+    of_world=True,
+    is_measured=True,
+    content=(
+        "one status per character: counts of commands by verdict, pushes, saturations, tick "
+        "times, lateness, ages of commands, faults, and warnings left out of the log after "
+        "100 different ones; each second and at the end. `hardware_id` is the character in "
+        "its namespace (`left/humanoid`), the same in both nodes' statuses. WARN: of the "
+        "deadlines since the report before, at least a hundred, more than 1 % were missed; "
+        "ERROR: the node has a fault"
+    ),
+)
+JOINT_STATES_THROTTLE = JOINT_STATES.throttled
+CONTACTS_THROTTLE = CONTACTS.throttled
+APPLIED_WRENCH_THROTTLE = APPLIED_WRENCH.throttled
+THROWN_THROTTLE = THROWN.throttled
+REFERENCE_THROTTLE = REFERENCE.throttled
+
+TABLE = tuple(topic for topic in list(globals().values()) if isinstance(topic, Topic))
+"""All topics, in the order of the documentation."""
+
+
+def names_to_read(*, of_world: bool) -> tuple[str, ...]:
+    """The topics that a recording is read from, of a world or of a character in it."""
+    read = [each for each in TABLE if each.is_read and each.of_world is of_world]
+    return tuple(topic.name for each in read for topic in each.as_others_name_it)
+
+
+def contact_wrench(link: str) -> Topic:
+    """The topic of the contact wrench on a link; what no topic's name can have becomes `_`."""
+    name = re.sub(r"\W|^(?=\d)", "_", link, flags=re.ASCII)
+    return replace(CONTACT_WRENCH, name=CONTACT_WRENCH.name.replace("LINK", name))
+
+
+_SENSORS = {SensorType.IMU: IMU, SensorType.FORCE: FORCE}
+
+
+def sensor_reading(sensor_type: SensorType, name: str) -> Topic:
+    """The topic of a sensor's readings; `name` is that of `Sensor.topic`."""
+    return replace(_SENSORS[sensor_type], name=name)

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from msgs_config.messages.topics import DIAGNOSTICS, create_publisher, flush
+from msgs_config.messages.topics import DIAGNOSTICS
+from msgs_config.runtime.publishing import create_publisher, flush
 
 DIAGNOSTICS_PERIOD = 1.0  # s of wall time
 

@@ -15,7 +15,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.runtime.endpoint_types import EndpointTypes
 
 _SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop

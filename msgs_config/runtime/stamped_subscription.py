@@ -8,7 +8,7 @@ from msgs_config.errors import CommandError, LayoutError, MessageError, MotionEr
 from msgs_config.messages.cdr import read_frame_id
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.session import OwnSession
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 

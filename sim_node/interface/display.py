@@ -16,7 +16,8 @@ from msgs_config.geometry import fixed_order, frames, rotations
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder
 from msgs_config.messages.joint_state import JointStateEncoder
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
+from msgs_config.runtime.publishing import create_publisher, has_subscribers
 from sim_node.interface.markers import MarkerEncoder
 from sim_node.interface.transforms import TransformPublisher
 from sim_node.node_settings import NodeSettings
@@ -51,7 +52,7 @@ class DisplayPublishers:
         """Whether a contact wrench has a subscriber, when the last sample was published."""
 
         def create(topic: Topic) -> Publisher:
-            return topics.create_publisher(node, topic.under(character.setup.name))
+            return create_publisher(node, topic.under(character.setup.name))
 
         whole, prefix = character.character, character.setup.prefix
         self._joints = DescribedJoints(whole, settings.frames.base)
@@ -62,7 +63,7 @@ class DisplayPublishers:
         self._description.publish(String(data=robot_description(whole, settings.frames.base)))
         self._wrenches = list(self._make_wrenches(create))
         self._transforms: TransformPublisher | None = None
-        if topics.TRANSFORMS:
+        if topics.TF.is_installed:
             self._transforms = TransformPublisher(node, character, self._joints, settings.frames)
         self._odometry_encoder = DoublesEncoder(
             prefix + settings.frames.odom, prefix + self._joints.root
@@ -90,7 +91,7 @@ class DisplayPublishers:
 
     def publish(self, tick: int) -> None:
         """Publish what shows a tick's state."""
-        if topics.has_subscribers(self._odometry):
+        if has_subscribers(self._odometry):
             self._odometry.publish(self._encode_odometry())
         if tick % self._ticks == 0 or self._character.state.effort is None:
             self._publish_sample()
@@ -111,7 +112,7 @@ class DisplayPublishers:
     def _publish_sample(self) -> None:
         self._publish_markers()
         stamp_ns = self._character.state.stamp_ns
-        if topics.has_subscribers(self._joint_states):
+        if has_subscribers(self._joint_states):
             self._joint_states.publish(self._joint_encoder.encode(stamp_ns, self._positions()))
         if self._transforms is not None:
             self._transforms.publish(stamp_ns, self._positions)
@@ -122,7 +123,7 @@ class DisplayPublishers:
 
     def _publish_wrenches(self) -> None:
         """Publish the wrench on each link that is listened to, in its frame, about its origin."""
-        heard = [each for each in self._wrenches if topics.has_subscribers(each.publisher)]
+        heard = [each for each in self._wrenches if has_subscribers(each.publisher)]
         self.wants_contacts = bool(heard)
         contacts = self._character.contacts
         if contacts is None or not heard:
@@ -150,7 +151,7 @@ class DisplayPublishers:
 
     def _publish_markers(self) -> None:
         """Publish the shapes and the world's balls where they are, if there are subscribers."""
-        if topics.has_subscribers(self._visualization):
+        if has_subscribers(self._visualization):
             balls = self._character.balls
             origins, turns = self._character.link_frames()
             self._visualization.publish(

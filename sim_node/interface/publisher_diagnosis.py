@@ -7,7 +7,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
 from msgs_config.messages.session import REMEDY
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.runtime.endpoint_types import other_types, type_name
 from msgs_config.runtime.once_logger import OnceLogger
 

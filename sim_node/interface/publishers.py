@@ -14,11 +14,17 @@ from msgs_config.messages.cdr import split_stamp, with_stamp
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.session import episode_text
-from msgs_config.messages.topics import Outgoing, Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import SelectionEncoder, WrenchArrays, encode_wrenches
 from msgs_config.parameters import Values
 from msgs_config.runtime.composition import UNTIL_A_MESSAGE, Turns
 from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.publishing import (
+    Outgoing,
+    create_publisher,
+    has_subscribers,
+    publish_together,
+)
 from sim_node.interface.display import DisplayPublishers
 from sim_node.interface.sensors import SensorPublishers
 from sim_node.node_settings import NodeSettings
@@ -42,7 +48,7 @@ class Publishers:
         self._make_encoders()
 
         def create(topic: Topic) -> Publisher:
-            return topics.create_publisher(node, topic.under(character.setup.name))
+            return create_publisher(node, topic.under(character.setup.name))
 
         self._episode = create(topics.EPISODE)
         self.configuration = create(topics.CONFIGURATION.of(node.get_name()))
@@ -72,10 +78,10 @@ class Publishers:
         Subscribers of the `throttled` ones count where the tick is one of theirs.
         """
         return (
-            topics.has_subscribers(self._contacts)
+            has_subscribers(self._contacts)
             or self._display.wants_contacts
             or self._sensors.wants_contacts
-            or (throttled and topics.has_subscribers(self._throttled_contacts))
+            or (throttled and has_subscribers(self._throttled_contacts))
         )
 
     def publish_configuration(
@@ -118,9 +124,9 @@ class Publishers:
 
     def before_state(self) -> Iterator[Outgoing]:
         """The messages that a controller may wait for beside a tick's state, which follows them."""
-        if self._character.contacts is not None and topics.has_subscribers(self._contacts):
+        if self._character.contacts is not None and has_subscribers(self._contacts):
             yield self._contacts, self._encode_contacts()
-        if topics.has_subscribers(self._wrenches):
+        if has_subscribers(self._wrenches):
             yield self._wrenches, self._encode_applied()
         yield from self._sensors.messages()
 
@@ -135,13 +141,11 @@ class Publishers:
 
     def throttled(self) -> Iterator[Outgoing]:
         """The messages of the tick for those who do not need each one, the state last."""
-        if self._character.contacts is not None and topics.has_subscribers(
-            self._throttled_contacts
-        ):
+        if self._character.contacts is not None and has_subscribers(self._throttled_contacts):
             yield self._throttled_contacts, self._encode_contacts()
-        if topics.has_subscribers(self._throttled_wrenches):
+        if has_subscribers(self._throttled_wrenches):
             yield self._throttled_wrenches, self._encode_applied()
-        if topics.has_subscribers(self._throttled_states):
+        if has_subscribers(self._throttled_states):
             yield self._throttled_states, self._last_state
 
     def publish_display(self, tick: int) -> None:
@@ -158,9 +162,9 @@ class Publishers:
         if with_episode and self._last_episode is not None:
             self._episode.publish(self._last_episode)
         if with_state:
-            if topics.has_subscribers(self._contacts):
+            if has_subscribers(self._contacts):
                 self._contacts.publish(self._encode_contacts())
-            topics.publish_together(self._sensors.messages())
+            publish_together(self._sensors.messages())
             self._states.publish(self._last_state)
 
     @property

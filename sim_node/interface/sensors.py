@@ -10,7 +10,7 @@ from rclpy.publisher import Publisher
 from msgs_config.character.sensors import SensorType
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder
-from msgs_config.messages.topics import Outgoing
+from msgs_config.runtime.publishing import Outgoing, create_publisher, has_subscribers
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.sensors.readers import SensingSettings, SensorReader, make_readers
@@ -41,7 +41,7 @@ class SensorPublishers:
             self._sensors.append(
                 _SensorPublisher(
                     reader,
-                    topics.create_publisher(node, topic),
+                    create_publisher(node, topic),
                     DoublesEncoder(character.setup.prefix + sensor.name),
                     sensor.type is SensorType.FORCE,
                 )
@@ -63,7 +63,7 @@ class SensorPublishers:
         stamp_ns = self._character.state.stamp_ns
         self.wants_contacts = False
         for reader, publisher, encoder, reads_contacts in self._sensors:
-            if topics.has_subscribers(publisher):
+            if has_subscribers(publisher):
                 self.wants_contacts |= reads_contacts
                 values = reader.read(self._clock.tick(stamp_ns))
                 yield publisher, encoder.encode(stamp_ns, _NO_WRENCH if values is None else values)

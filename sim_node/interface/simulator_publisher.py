@@ -8,7 +8,13 @@ from rclpy.node import Node
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.probe import DynamicsSample
-from msgs_config.messages.topics import Outgoing
+from msgs_config.runtime.publishing import (
+    Outgoing,
+    create_publisher,
+    flush,
+    has_subscribers,
+    publish_together,
+)
 from msgs_config.runtime.throttle import Throttle
 from sim_node.interface.publishers import Publishers
 from sim_node.interface.world_interface import WorldInterface
@@ -37,7 +43,7 @@ class SimulatorPublisher:
         self.of_characters = of_characters
         self._samples = samples
         self._is_configured = False
-        self._clock_topic = topics.create_publisher(node, topics.CLOCK)
+        self._clock_topic = create_publisher(node, topics.CLOCK)
         self._throttle = Throttle()
         self._is_chosen = True  # whether the tick is published on the throttled topics
 
@@ -64,7 +70,7 @@ class SimulatorPublisher:
         if self._is_configured:
             self.publish_configurations(parameters, since_ns)
             # each latched topic keeps one message: the next must not push it out
-            topics.flush([each.configuration for each in self.of_characters], _ACKNOWLEDGE_TIME)
+            flush([each.configuration for each in self.of_characters], _ACKNOWLEDGE_TIME)
 
     def publish_episode(self) -> None:
         """Publish that the present tick is the first of an episode."""
@@ -84,7 +90,7 @@ class SimulatorPublisher:
 
     def publish_tick(self) -> None:
         """Publish the present tick; what is only displayed comes after the states."""
-        topics.publish_together(self._messages())
+        publish_together(self._messages())
         for each in self.of_characters:
             each.publish_display(self._simulation.tick)
         if self._is_chosen:
@@ -97,16 +103,16 @@ class SimulatorPublisher:
 
     def _publish_throttled(self) -> None:
         own = chain.from_iterable(each.throttled() for each in self.of_characters)
-        topics.publish_together(chain(self._world.throttled(), own))
+        publish_together(chain(self._world.throttled(), own))
 
     def is_acknowledged(self, seconds: float) -> bool:
         """Wait at most `seconds` until every subscriber has the last tick; whether it has."""
         of_ticks = [each.of_ticks for each in self.of_characters]
-        return topics.flush(chain(self._world.publishers, *of_ticks), seconds)
+        return flush(chain(self._world.publishers, *of_ticks), seconds)
 
     def _messages(self) -> Iterator[Outgoing]:
         """The messages that are published before the tick can be answered, the states last."""
-        if topics.has_subscribers(self._clock_topic):
+        if has_subscribers(self._clock_topic):
             yield self._clock_topic, encode_clock(self._simulation.stamp_ns)
         yield from self._world.messages()
         for each in self.of_characters:

@@ -11,6 +11,7 @@ from msgs_config.frame_names import WORLD
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.transforms import TransformsEncoder
+from msgs_config.runtime.publishing import create_publisher
 from sim_node.frames import FrameNames
 from sim_node.physics.simulated_character import SimulatedCharacter
 
@@ -31,9 +32,8 @@ class TransformPublisher:
         """Offer both topics, and publish the static frames."""
         self._character, self._joints = character, joints
         self._prefix = character.setup.prefix
-        moving_topic, static_topic = topics.TRANSFORMS
-        self.publisher = topics.create_publisher(node, moving_topic)
-        self._static = topics.create_publisher(node, static_topic)
+        self.publisher = create_publisher(node, topics.TF)
+        self._static = create_publisher(node, topics.TF_STATIC)
         self._subscribers = 0  # when it was published last
         self._repetitions = 0  # still to come
         self._floats = character.layout.has_floating_base

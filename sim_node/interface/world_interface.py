@@ -8,8 +8,8 @@ from msgs_config.messages import topics
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, ball_names, encode_balls
 from msgs_config.messages.session import OwnSession
 from msgs_config.messages.throw import ProjectileThrow
-from msgs_config.messages.topics import Outgoing
 from msgs_config.runtime.once_logger import OnceLogger
+from msgs_config.runtime.publishing import Outgoing, create_publisher, has_subscribers
 from msgs_config.runtime.stamped_subscription import StampedSubscription, first_tick
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
@@ -30,9 +30,9 @@ class WorldInterface:
         self._messages = StampedSubscription(
             node, topics.THROW, "throw refused: ", self._add_throw, logger, own_session
         )
-        self._applied = topics.create_publisher(node, topics.APPLIED_THROW)
-        self._thrown = topics.create_publisher(node, topics.THROWN)
-        self._throttled = topics.create_publisher(node, topics.THROWN_THROTTLE)
+        self._applied = create_publisher(node, topics.APPLIED_THROW)
+        self._thrown = create_publisher(node, topics.THROWN)
+        self._throttled = create_publisher(node, topics.THROWN_THROTTLE)
         self.publishers = (self._applied, self._thrown, self._throttled)
 
     def take_throws(self) -> list[ProjectileThrow]:
@@ -54,12 +54,12 @@ class WorldInterface:
             self._published_ns = simulation.stamp_ns
             for throw in simulation.throws:
                 yield self._applied, self._codec.encode(simulation.stamp_ns, throw)
-        if topics.has_subscribers(self._thrown):
+        if has_subscribers(self._thrown):
             yield self._thrown, self._encode_balls()
 
     def throttled(self) -> Iterator[Outgoing]:
         """Where the balls are, if there are any, for those who do not need each tick's."""
-        if self._simulation.balls and topics.has_subscribers(self._throttled):
+        if self._simulation.balls and has_subscribers(self._throttled):
             yield self._throttled, self._encode_balls()
 
     def report(self) -> dict[str, object]:

@@ -42,7 +42,7 @@ from msgs_config.messages.joint_state import (  # noqa: E402
     state_in_layout,
 )
 from msgs_config.messages.session import make_session  # noqa: E402
-from msgs_config.messages.topics import Topic  # noqa: E402
+from msgs_config.messages.topic import Topic  # noqa: E402
 from msgs_config.runtime.polling import DirectSubscription  # noqa: E402
 
 _RATE = 240  # Hz

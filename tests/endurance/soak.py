@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from msgs_config.runtime.process import limit_threads
+from msgs_config.runtime.publishing import create_publisher
 
 limit_threads()
 
@@ -91,7 +92,7 @@ class _Soak:
         self._decoder = JointStateDecoder()
         # this process naps and waits for services, on a machine that may be busy
         self._states = DirectSubscription(node, topics.JOINT_STATES.for_listener())
-        self._pushes = topics.create_publisher(node, topics.EXTERNAL_WRENCH)
+        self._pushes = create_publisher(node, topics.EXTERNAL_WRENCH)
         diagnostics = topics.DIAGNOSTICS
         node.create_subscription(
             diagnostics.message_type, diagnostics.name, self._listen, diagnostics.qos

@@ -12,7 +12,7 @@ import yaml
 from msgs_config.character.loading import load_character
 from msgs_config.frame_names import BASE_FRAME
 from msgs_config.messages import topics
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from sim_node.frames import ODOM_FRAME
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -14,7 +14,7 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 
 REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE)

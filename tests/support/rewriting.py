@@ -10,12 +10,13 @@ from actuated_characters.bags.writer import BagWriter
 from msgs_config.arrays import FloatArray
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointArrays, JointStateDecoder, JointStateEncoder
+from msgs_config.messages.topic import Topic
 from tests.support.physics import character
 
 _TYPES = {
     topic.name.rpartition("/")[2]: topic
     for topic in vars(topics).values()
-    if isinstance(topic, topics.Topic)
+    if isinstance(topic, Topic)
 }
 _TYPES |= {
     sensor.name: topics.sensor_reading(sensor.type, sensor.topic)

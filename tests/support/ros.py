@@ -34,7 +34,7 @@ from actuated_characters.runs.processes import MODULES, Child
 from msgs_config.character.layout import ROOT
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from tests.support.forked import Fork
 
 PATIENCE = 30.0

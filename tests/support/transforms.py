@@ -11,7 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
-from msgs_config.messages.topics import CHANGES_QOS, STREAM_QOS
+from msgs_config.messages.topic import CHANGES, STREAM
 
 TF2 = Path(__file__).parent / "tf2"
 """A folder for `PYTHONPATH` with a package `tf2_msgs`."""
@@ -35,8 +35,10 @@ class Frames:
         self.static: dict[str, Any] = {}
         self.moving: dict[int, dict[str, Any]] = {}  # by stamp, ns
         self.parents: dict[str, set[str]] = {}
-        node.create_subscription(TFMessage, "/tf", self._take, STREAM_QOS, raw=True)
-        node.create_subscription(TFMessage, "/tf_static", self._take_static, CHANGES_QOS, raw=True)
+        node.create_subscription(TFMessage, "/tf", self._take, STREAM.profile, raw=True)
+        node.create_subscription(
+            TFMessage, "/tf_static", self._take_static, CHANGES.profile, raw=True
+        )
 
     def _take(self, raw: bytes) -> None:
         for each in self._decode(raw):

@@ -29,6 +29,7 @@ from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.publishing import create_publisher
 from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 
 PARAMETERS = [
@@ -63,7 +64,7 @@ class RecordedController(Node):
         )
         session = given_session(values)
         self._throw_codec = ThrowCodec(session)
-        self._throw_topic = topics.create_publisher(self, topics.THROW)
+        self._throw_topic = create_publisher(self, topics.THROW)
         inputs = make_inputs(world)
         self._characters = [
             _CharacterTopics(self, *each, session) for each in zip(world, inputs, strict=True)
@@ -180,8 +181,8 @@ class _CharacterTopics:
         self._layout, self._clock = recording.layout, clock_of(recording)
         self._decoder = JointStateDecoder()
         self._encoder = lru_cache(maxsize=16)(lambda names: JointStateEncoder(names, session))
-        self._torques = topics.create_publisher(node, topics.JOINT_TORQUES.under(name))
-        self._wrenches = topics.create_publisher(node, topics.EXTERNAL_WRENCH.under(name))
+        self._torques = create_publisher(node, topics.JOINT_TORQUES.under(name))
+        self._wrenches = create_publisher(node, topics.EXTERNAL_WRENCH.under(name))
         self.publishers = self._torques, self._wrenches
         self._subscription = DirectSubscription(node, topics.JOINT_STATES.under(name))
 

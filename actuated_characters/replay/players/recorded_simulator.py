@@ -36,11 +36,12 @@ from msgs_config.messages.session import (
     make_session,
     read_session,
 )
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.parameters import Parameter, resolve
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
+from msgs_config.runtime.publishing import create_publisher
 from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 
 PARAMETERS = [
@@ -99,12 +100,10 @@ class RecordedSimulator(Node):
     def _open_topics(self) -> None:
         rare = (topics.CONFIGURATION, topics.EPISODE)
         of_ticks = tick_topics(self._recording)
-        self._outputs = {
-            topic.name: topics.create_publisher(self, topic) for topic in (*rare, *of_ticks)
-        }
-        self._clock_topic = topics.create_publisher(self, topics.CLOCK)
+        self._outputs = {topic.name: create_publisher(self, topic) for topic in (*rare, *of_ticks)}
+        self._clock_topic = create_publisher(self, topics.CLOCK)
         self._requests = {
-            topic.name: topics.create_publisher(self, topic)
+            topic.name: create_publisher(self, topic)
             for topic in REQUESTS
             if self._repeats and topic.name in self._rare.requested
         }
@@ -114,7 +113,7 @@ class RecordedSimulator(Node):
         self._opponent = opponent_of(self._recording)
         if self._opponent:
             topic = topics.JOINT_STATES.under(f"/{self._opponent}")
-            self._outputs[self._opponent] = topics.create_publisher(self, topic)
+            self._outputs[self._opponent] = create_publisher(self, topic)
             self._opponents_states = read_opponent(self._path, self._recording)
         self._late = late_topics(self._recording)
         self._torques = DirectSubscription(self, topics.JOINT_TORQUES)

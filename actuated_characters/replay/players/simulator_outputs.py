@@ -24,20 +24,17 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.messages.session import episode_text
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Kept, Topic
 from msgs_config.messages.wrenches import decode_wrenches, encode_wrenches
 
-_TICK_TOPICS = (topics.CONTACTS, topics.APPLIED_WRENCH, topics.ODOM, topics.JOINT_STATES)
-
-REQUESTS = tuple(
-    topic.of(topics.CONTROLLER_NODE)
-    for topic in (topics.JOINT_TRAJECTORY, topics.CMD_VEL_STAMPED, topics.STRENGTH)
-)
+REQUESTS = tuple(topic.of(topics.CONTROLLER_NODE) for topic in topics.TABLE if topic.accepted_on)
 """What a controller is asked for while it works."""
 
 _ACTIVE = tuple(  # what the controller publishes of each request that it has accepted
     topic.of(topics.CONTROLLER_NODE)
-    for topic in (topics.ACTIVE_TRAJECTORY, topics.ACTIVE_CMD_VEL, topics.ACTIVE_STRENGTH)
+    for request in REQUESTS
+    for topic in topics.TABLE
+    if topic.name == request.accepted_on
 )
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
 
@@ -92,7 +89,9 @@ class SessionRewriter:
 def tick_topics(recording: Recording) -> list[Topic]:
     """What the simulator publishes at each tick; its state is the last."""
     sensors = recording.character.sensors
-    return [*(topics.sensor_reading(each.type, each.topic) for each in sensors), *_TICK_TOPICS]
+    readings = [topics.sensor_reading(each.type, each.topic) for each in sensors]
+    of_all = [each for each in topics.TABLE if each.is_of_tick and each.kept is not Kept.IF_NAMED]
+    return [*readings, *reversed(of_all)]
 
 
 def read_ticks(path: Path, recording: Recording) -> Iterator[list[tuple[Topic, bytes]]]:

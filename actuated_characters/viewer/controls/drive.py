@@ -19,6 +19,7 @@ from rclpy.publisher import Publisher
 
 from actuated_characters.viewer.controls.actions import ActionQueue
 from msgs_config.messages import topics
+from msgs_config.runtime.publishing import create_publisher
 
 _WALK, _RUN, _BACK, _TURN = 1.0, 2.2, -0.4, 0.8  # m/s and rad/s, by keys
 _PERIOD = 0.1  # s between two velocities
@@ -157,7 +158,7 @@ class DrivingControls:
         if below is not None and is_steered:
             if below not in self._publishers:
                 topic = replace(topics.CMD_VEL, name=f"{below}/{topics.CMD_VEL.name}")
-                self._publishers[below] = topics.create_publisher(self._node, topic)
+                self._publishers[below] = create_publisher(self._node, topic)
             self._publisher = self._publishers[below]
             self._commands = [self._add_command(key) for key in KEYS]
 

@@ -19,8 +19,9 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import CommandError
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import ThrowCodec
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
+from msgs_config.runtime.publishing import create_publisher
 
 _SPRING = (230, 60, 20)
 _GRAVITY, _WRENCH_DURATION = 9.81, 0.1  # what simulators have by default
@@ -47,7 +48,7 @@ class Hands:
     def _publisher(self, below: str, topic: Topic) -> Publisher:
         name = f"{below}/{topic.name}"
         if name not in self._publishers:
-            self._publishers[name] = topics.create_publisher(self._node, replace(topic, name=name))
+            self._publishers[name] = create_publisher(self._node, replace(topic, name=name))
         return self._publishers[name]
 
     def bind(self, below: str, drawn: Callable[[], LiveCharacter | None]) -> Bind:

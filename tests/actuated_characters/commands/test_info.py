@@ -18,7 +18,7 @@ from actuated_characters.report.timing import lateness, pauses, state_times
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import STREAM, Topic
 from tests.support.bags import Made, add_to, make_run, raw_configuration, raw_states, write_bag
 from tests.support.eventful import (
     MS,
@@ -207,7 +207,7 @@ def test_missing_ticks_are_named_and_states_that_came_again_count_once(
 def test_a_bag_of_something_else_has_its_topics(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    chatter = Topic("chatter", String, topics.STREAM_QOS)
+    chatter = Topic("chatter", "std_msgs/msg/String", STREAM)
     raw = JointStateEncoder(["wheel"]).encode(5 * MS, np.zeros(1))
     messages = [
         (chatter, serialize_message(String(data="[bold]hello"))),

@@ -18,7 +18,7 @@ from actuated_characters.recorder.log_time import SimulatedLogTime
 from actuated_characters.recorder.session_filter import Heard
 from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.messages import topics
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 
 WALL_NS = 1_790_000_000_000_000_000
 S = 10**9

@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 import yaml
 from rclpy.context import Context
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from actuated_characters.bags.reader import read_messages
@@ -26,7 +25,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.state import StampedState
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Quality, Topic
 from msgs_config.runtime.polling import DirectSubscription
 from sim_node.sensors.readers import SensingSettings, make_readers
 from tests.support.physics import simulation
@@ -311,8 +310,7 @@ def test_messages_that_were_lost_are_counted_by_topic_and_said(
     processes: Processes, client: SimulatorClient, tmp_path: Path
 ) -> None:
     # Arrange: nobody sends again what a best-effort topic has lost
-    qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-    flood = client.speak(Topic("flood", Header, qos))
+    flood = client.speak(Topic("flood", "std_msgs/msg/Header", Quality(10, is_reliable=False)))
     recorder = processes.node(topics.RECORDER_NODE, directory="run", topics=["flood"])
     processes.simulator("pendulum", wait_for_subscribers=2)
     state = client.first_state(listeners=2)

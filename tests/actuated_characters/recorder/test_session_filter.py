@@ -15,7 +15,7 @@ from actuated_characters.replay.players.simulator_outputs import SessionRewriter
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS, episode_text
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches, encode_wrenches
 from tests.support.ros import joint_state, stamp_ns
 

@@ -15,7 +15,6 @@ from mcap_ros2.decoder import DecoderFactory
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.highlevel import AnyReader
 from std_msgs.msg import Header
 
@@ -26,7 +25,7 @@ from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import LATCHED, STREAM, Quality, Topic
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import character, simulation
 from tests.support.ros import PATIENCE, Processes, SimulatorClient, tick_of, wrench_message
@@ -230,9 +229,8 @@ def test_topics_by_name_are_recorded_as_their_publishers_offer_them(
     processes: Processes, client: SimulatorClient, tmp_path: Path
 ) -> None:
     # Arrange: one is there before the recorder, others come later, one never
-    volatile = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    early = Topic("early", Header, topics.LATCHED_QOS)
+    volatile, latched = Quality(10, is_reliable=False), Quality(1, is_latched=True)
+    early = Topic("early", "std_msgs/msg/Header", LATCHED)
     before = client.speak(early)
     before.publish(Header(frame_id="before"))
     names = ["early", "/far/sensor", "latched", "never", "/joint_states"]
@@ -240,8 +238,8 @@ def test_topics_by_name_are_recorded_as_their_publishers_offer_them(
     client.spin_until(before.get_subscription_count, "a recorder")
 
     # Act
-    sensor = client.speak(Topic("/far/sensor", Header, volatile))
-    late = client.speak(Topic("latched", Header, latched))
+    sensor = client.speak(Topic("/far/sensor", "std_msgs/msg/Header", volatile))
+    late = client.speak(Topic("latched", "std_msgs/msg/Header", latched))
     late.publish(Header(frame_id="kept for who comes later"))
     client.spin_until(lambda: sensor.get_subscription_count(), "a recorder of what came later")
     client.spin_until(lambda: late.get_subscription_count(), "a recorder of what is latched")
@@ -339,7 +337,7 @@ def test_one_recorder_records_several_characters_with_figures_of_each(
 
 def test_a_topic_gives_no_more_at_a_time_than_is_asked_for(client: SimulatorClient) -> None:
     # who publishes faster than a recorder takes would otherwise never let it flush, or end
-    topic = Topic("flood", Header, topics.STREAM_QOS)
+    topic = Topic("flood", "std_msgs/msg/Header", STREAM)
     publisher = client.speak(topic)
     inbox = TopicReader(client.node, RecordedTopic(topic, "/flood", "flood", None))
     client.spin_until(publisher.get_subscription_count, "a recorder's inbox")

@@ -26,8 +26,8 @@ from actuated_characters.report.sections import NAMES
 from actuated_characters.report.writing import default_directory, write_report
 from actuated_characters.runs.run_directory import prepare_directory
 from msgs_config.errors import RecordingError
-from msgs_config.messages import configuration, topics
-from msgs_config.messages.topics import Topic
+from msgs_config.messages import configuration
+from msgs_config.messages.topic import STREAM, Topic
 from tests.support.bags import (
     Made,
     add_to,
@@ -85,7 +85,7 @@ def run(walk: Eventful, tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("walk")
     with BagWriter(directory / "bag") as bag:
         add_timed(bag, walk.messages())
-        bag.add_topic(HOSTILE, String, topics.STREAM_QOS)
+        bag.add_topic(HOSTILE, String, STREAM.profile)
         bag.write(HOSTILE, serialize_message(String(data="")), walk.log_times_ns[-1])
     assert main(["report", str(directory), "--stills", "2"]) == 0
     return directory
@@ -320,7 +320,7 @@ def pendulum() -> Made:
 def test_a_bag_of_something_else_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    chatter = Topic("chatter", String, topics.STREAM_QOS)
+    chatter = Topic("chatter", "std_msgs/msg/String", STREAM)
     bag = write_bag(tmp_path / "bag", [(chatter, serialize_message(String(data="hello")))])
 
     assert main(["report", str(bag)]) == 1

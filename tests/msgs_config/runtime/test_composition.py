@@ -8,7 +8,7 @@ from rclpy.context import Context
 from std_msgs.msg import String
 
 from msgs_config.errors import ConfigurationError, SimulationError
-from msgs_config.messages.topics import LATCHED_QOS, Topic
+from msgs_config.messages.topic import LATCHED, Topic
 from msgs_config.runtime import composition
 from msgs_config.runtime.composition import (
     AT_ONCE,
@@ -19,7 +19,7 @@ from msgs_config.runtime.composition import (
 )
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 
-TOPIC = Topic("turn", String, LATCHED_QOS)
+TOPIC = Topic("turn", "std_msgs/msg/String", LATCHED)
 
 
 class Worker(ComposableNode):

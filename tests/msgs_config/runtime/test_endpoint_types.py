@@ -4,10 +4,9 @@ from collections.abc import Iterator
 
 import pytest
 from rclpy.context import Context
-from std_msgs.msg import Float64MultiArray, String
 
 from msgs_config.messages import topics
-from msgs_config.messages.topics import STREAM_QOS, Topic
+from msgs_config.messages.topic import STREAM, Topic
 from tests.support.ros import Client, Process, Processes, wait_until
 
 pytestmark = pytest.mark.slow
@@ -44,7 +43,7 @@ def told(process: Process, *words: str) -> str:
 def test_the_simulator_names_whoever_sends_another_type(
     topic: str, right: str, stranger: Client, processes: Processes
 ) -> None:
-    stranger.speak(Topic(topic, Float64MultiArray, STREAM_QOS))
+    stranger.speak(Topic(topic, "std_msgs/msg/Float64MultiArray", STREAM))
 
     simulator = processes.simulator()
 
@@ -55,7 +54,7 @@ def test_the_simulator_names_whoever_sends_another_type(
 def test_the_line_about_missing_commands_names_the_type_that_was_found_and_the_right_one(
     stranger: Client, processes: Processes
 ) -> None:
-    stranger.speak(Topic(topics.JOINT_TORQUES.name, Float64MultiArray, STREAM_QOS))
+    stranger.speak(Topic(topics.JOINT_TORQUES.name, "std_msgs/msg/Float64MultiArray", STREAM))
 
     simulator = processes.simulator()
 
@@ -66,7 +65,7 @@ def test_the_line_about_missing_commands_names_the_type_that_was_found_and_the_r
 def test_the_simulator_names_whoever_reads_another_type(
     stranger: Client, processes: Processes
 ) -> None:
-    stranger.listen(Topic(topics.JOINT_STATES.name, String, STREAM_QOS))
+    stranger.listen(Topic(topics.JOINT_STATES.name, "std_msgs/msg/String", STREAM))
 
     simulator = processes.simulator()
 
@@ -85,7 +84,7 @@ def test_the_simulator_names_whoever_reads_another_type(
 def test_the_controller_names_whoever_sends_another_type(
     topic: str, right: str, stranger: Client, processes: Processes
 ) -> None:
-    stranger.speak(Topic(topic, Float64MultiArray, STREAM_QOS))
+    stranger.speak(Topic(topic, "std_msgs/msg/Float64MultiArray", STREAM))
     steered = {"reference": "steered"} if topic == "cmd_vel" else {}
 
     controller = processes.controller("humanoid" if steered else "pendulum", **steered)
@@ -98,7 +97,7 @@ def test_a_node_is_named_once_and_one_that_comes_later_as_well(
     stranger: Client, context: Context, processes: Processes
 ) -> None:
     simulator = processes.simulator()
-    wrong = Topic(topics.JOINT_TORQUES.name, Float64MultiArray, STREAM_QOS)
+    wrong = Topic(topics.JOINT_TORQUES.name, "std_msgs/msg/Float64MultiArray", STREAM)
     stranger.speak(wrong)
     told(simulator, "'/joint_torques' is published by /effort_controller as")
     later = Client(context, "later")

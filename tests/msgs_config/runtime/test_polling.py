@@ -7,7 +7,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from msgs_config.messages.cdr import decode
-from msgs_config.messages.topics import Topic
+from msgs_config.messages.topic import Quality, Topic
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from tests.support.ros import wait_until
 
@@ -19,7 +19,7 @@ def test_of_more_than_it_keeps_the_oldest_go_and_that_is_said_once(
     context: Context, capfd: pytest.CaptureFixture[str], depth: int, is_logged: bool
 ) -> None:
     # Arrange
-    topic = Topic("flood", String, QoSProfile(depth=depth))
+    topic = Topic("flood", "std_msgs/msg/String", Quality(depth))
     sender, receiver = (Node(name, context=context) for name in ("speaker", "listener"))
     publisher = sender.create_publisher(String, "flood", QoSProfile(depth=100))
     subscription, spinner = DirectSubscription(receiver, topic), PollingExecutor(receiver)
