@@ -52,7 +52,7 @@ class ControllerNode(ComposableNode):
         values = resolve(declared, given)
         declare(self, declared, values)
         self._setups = ControllerSetups(self._character, declared, values)
-        self._log_warnings(self._character.warnings + values.warnings)
+        self._log_warnings(self._character.warnings)
         self._log_warnings(self._setups.in_force.warnings)
         self._last_reply: Reply | None = None
         self._published_first: StampedState | None = None

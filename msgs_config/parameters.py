@@ -7,7 +7,7 @@ specifications by the same function, so that a value is right or wrong in the sa
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.mappings import show_value
@@ -82,14 +82,8 @@ class Parameter:
         )
 
 
-RENAMED = {"balance": "balance.enabled"}
-"""Present names of parameters by their old ones, in parameter files, options and bags."""
-
-
 class Values(dict[str, Value]):
     """The values of a node's parameters by name, each taken out in the type that it has."""
-
-    warnings: tuple[str, ...] = ()  # of names that were given and have become others
 
     def flag(self, name: str) -> bool:
         """The value of a parameter that is true or false."""
@@ -133,33 +127,18 @@ def resolve(parameters: Iterable[Parameter], given: Mapping[str, object]) -> Val
     """The value of every parameter: the one given, checked, or else its default.
 
     Raises:
-        ConfigurationError: a value is wrong, a name is none of the parameters', or a parameter is
-            given by both of its names.
+        ConfigurationError: a value is wrong, or a name is none of the parameters'.
     """
     by_name = {parameter.name: parameter for parameter in parameters}
-    old = [name for name in given if name in RENAMED]
-    for name in old:
-        if RENAMED[name] in given:
-            raise ConfigurationError(
-                f"parameter '{RENAMED[name]}' is given twice, also as '{name}'"
-            )
-    given = with_present_names(given)
     for name in given:
         if name not in by_name and name not in _OF_EVERY_NODE:
             raise ConfigurationError(one_of("parameter", name, sorted(by_name)))
-    values = Values(
+    return Values(
         {
             name: parameter.checked(given[name]) if name in given else parameter.default
             for name, parameter in by_name.items()
         }
     )
-    values.warnings = tuple(f"parameter '{name}' is called '{RENAMED[name]}' now" for name in old)
-    return values
-
-
-def with_present_names(given: Mapping[str, object]) -> dict[str, Any]:
-    """Values by the names that parameters have today."""
-    return {RENAMED.get(name, name): value for name, value in given.items()}
 
 
 _OF_EVERY_NODE = ("use_sim_time", "start_type_description_service")

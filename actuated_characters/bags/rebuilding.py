@@ -1,20 +1,16 @@
 """Builds the character of a recording from the texts in it, not from today's files."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from msgs_config.character.file import (
-    character_path,
-    read_character_file,
     read_character_texts,
 )
 from msgs_config.character.loading import build_character
 from msgs_config.character.meshes.resolving import check_collision_meshes
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import ActuatedCharactersError, RecordingError
-from msgs_config.files import resolve
 from msgs_config.messages.configuration import (
     RunConfiguration,
     UrdfCopy,
@@ -22,7 +18,7 @@ from msgs_config.messages.configuration import (
     parse,
     parse_world,
 )
-from msgs_config.shared_parameters import CHARACTER, collides, placed
+from msgs_config.shared_parameters import collides, placed
 
 
 @dataclass(frozen=True)
@@ -58,7 +54,7 @@ def rebuild(text: str, namespace: str) -> Rebuilt:
     known, copy = parse(text), parse_world(text)
     try:
         character = placed(_character(known, copy), known.parameters)
-        terrain = None if copy.terrain is None else _terrain(known, copy.terrain)
+        terrain = None if copy.terrain is None else _terrain(copy.terrain)
     except ActuatedCharactersError as error:
         raise RecordingError(f"cannot rebuild character {known.character}: {error}") from error
     same_joints = character.layout.joints == known.layout.joints
@@ -75,33 +71,15 @@ def rebuild(text: str, namespace: str) -> Rebuilt:
 
 def _character(known: RunConfiguration, copy: WorldCopy) -> Character:
     """From the texts, with the meshes that lie where they lay."""
-    path, urdf_path = copy.character_path, copy.urdf.path
-    if path is None or urdf_path is None:
-        path, urdf_path = _paths_of_today(known, copy)
-    file = read_character_texts(path, copy.character_text, urdf_path, copy.urdf.text)
+    urdf = copy.urdf
+    file = read_character_texts(copy.character_path, copy.character_text, urdf.path, urdf.text)
     loaded = collides(known.parameters)
     if loaded:
-        check_collision_meshes(file.loading, copy.urdf.meshes)
+        check_collision_meshes(file.loading, urdf.meshes)
     return build_character(file, loaded)
 
 
-def _paths_of_today(known: RunConfiguration, copy: WorldCopy) -> tuple[Path, Path]:
-    """Where the files lie now, for an older recording that does not say where they lay."""
-    path = character_path(str(known.parameters.get(CHARACTER.name)))
-    file = read_character_file(str(path))
-    same = (file.text, file.loading.urdf_text) == (copy.character_text, copy.urdf.text)
-    if not same and "<mesh" in copy.urdf.text:
-        raise RecordingError(
-            f"the recording does not say where its meshes lay, and {path} or its URDF has another "
-            "text now"
-        )
-    return path, file.loading.urdf_path
-
-
-def _terrain(known: RunConfiguration, terrain: UrdfCopy) -> UrdfOptions:
-    path = terrain.path
-    if path is None:
-        path = resolve(str(known.parameters.get("terrain")), Path.cwd(), RecordingError)
-    loading = UrdfOptions(path, terrain.text, fixed_base=True)
+def _terrain(terrain: UrdfCopy) -> UrdfOptions:
+    loading = UrdfOptions(terrain.path, terrain.text, fixed_base=True)
     check_collision_meshes(loading, terrain.meshes)
     return loading

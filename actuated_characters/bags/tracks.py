@@ -24,7 +24,6 @@ from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_ball
 from msgs_config.messages.session import ANONYMOUS, read_session
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
-from msgs_config.parameters import with_present_names
 from msgs_config.shared_parameters import RATE
 
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
@@ -274,7 +273,7 @@ class CharacterTimeline:
         self._controller_text = text
         with suppress(*_UNREADABLE):
             content = json.loads(text)
-            parameters = with_present_names(dict(content["parameters"]))
+            parameters = dict(content["parameters"])
             since_ns = content.get(SINCE)
             self.controller.append(NodeParameters(parameters, since_ns))
 

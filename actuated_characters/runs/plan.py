@@ -99,7 +99,7 @@ def make_plan(
     controller_parameters.check_world(controller, simulator)
     _check_engines(character, simulator.number("gravity"))
     _check_commanded(simulator, commanded)
-    warnings = character.warnings + motion.warnings + simulator.warnings + controller.warnings
+    warnings = character.warnings + motion.warnings
     warnings += describe_start(character, simulator) + describe_speed_bound(character, simulator)
     return RunPlan(character, motion.reference, simulator, controller, warnings)
 

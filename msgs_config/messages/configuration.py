@@ -16,7 +16,7 @@ from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import LayoutError, MessageError
 from msgs_config.messages.probe import DynamicsSample, read_probe
 from msgs_config.messages.session import ANONYMOUS, SESSION, read_session
-from msgs_config.parameters import Value, Values, with_present_names
+from msgs_config.parameters import Value, Values
 from msgs_config.versions import installed_versions, read_versions
 
 _CHARACTER = ("urdf", "urdf_path", "meshes")  # keys of a URDF's text, path and meshes
@@ -112,7 +112,7 @@ def parse(text: str) -> RunConfiguration:
                 [np.inf if limit is None else limit for limit in content["effort_limits"]]
             ),
             mass=float(content["mass"]),
-            parameters=with_present_names(dict(content["parameters"])),
+            parameters=dict(content["parameters"]),
             probe=None if probe is None else read_probe(probe, layout.size),
             versions=read_versions(content.get("versions")),
             session=read_session(str(content.get("session", ""))),
@@ -125,7 +125,7 @@ def parse(text: str) -> RunConfiguration:
 class UrdfCopy:
     """A URDF as it was read, and where it lay, which is where its meshes are looked for."""
 
-    path: Path | None  # None in configurations of older simulators
+    path: Path
     text: str = field(repr=False)
     meshes: dict[str, str]  # SHA-256 by the name that the URDF gives, see `collision_meshes`
 
@@ -134,7 +134,7 @@ class UrdfCopy:
 class WorldCopy:
     """The files that a simulator has read, and the character's place in its world."""
 
-    character_path: Path | None  # None in configurations of older simulators
+    character_path: Path
     character_text: str = field(repr=False)  # of its YAML file; empty for a URDF alone
     urdf: UrdfCopy
     terrain: UrdfCopy | None
@@ -151,7 +151,7 @@ def parse_world(text: str) -> WorldCopy:
     try:
         content = json.loads(text)
         return WorldCopy(
-            character_path=_path(content.get("character_path")),
+            character_path=Path(str(content["character_path"])),
             character_text=str(content["character_file"]),
             urdf=_read_urdf(content, _CHARACTER),
             terrain=None if content.get(_TERRAIN[0]) is None else _read_urdf(content, _TERRAIN),
@@ -165,8 +165,4 @@ def parse_world(text: str) -> WorldCopy:
 def _read_urdf(content: dict[str, Any], keys: tuple[str, str, str]) -> UrdfCopy:
     text, path, meshes = keys
     hashes = {str(name): str(digest) for name, digest in content.get(meshes, {}).items()}
-    return UrdfCopy(_path(content.get(path)), str(content[text]), hashes)
-
-
-def _path(text: object) -> Path | None:
-    return None if text is None else Path(str(text))
+    return UrdfCopy(Path(str(content[path])), str(content[text]), hashes)

@@ -261,18 +261,6 @@ def test_what_both_nodes_must_agree_on_has_one_default(name: str) -> None:
     )
 
 
-def test_the_name_that_a_parameter_had_before_is_taken_with_a_warning() -> None:
-    parameters = [Parameter("balance.enabled", False, "a flag")]
-
-    values = resolve(parameters, {"balance": True})
-
-    assert values == {"balance.enabled": True}
-    assert values.warnings == ("parameter 'balance' is called 'balance.enabled' now",)
-    assert not resolve(parameters, {"balance.enabled": True}).warnings
-    with pytest.raises(ConfigurationError, match="given twice, also as 'balance'"):
-        resolve(parameters, {"balance": True, "balance.enabled": False})
-
-
 def test_the_defaults_of_one_node_are_a_simulation(character: Character) -> None:
     values = resolve(sim_node_parameters(character), {})
 

@@ -23,7 +23,6 @@ from msgs_config.geometry import fixed_order, rotations
 from msgs_config.motion_formats import describe_no_clip
 
 _SUFFIXES = (".txt", ".json")
-_OF_BEFORE = "Corrections"
 _BEGINNING = 256  # bytes, in which an object begins
 _ROOT_COLUMNS = 8  # duration, position, quaternion
 _SHORTEST_QUATERNION = 0.1
@@ -78,11 +77,6 @@ class ClipFile:
             loop, frames = self.content["Loop"], np.array(self.content["Frames"], dtype=float)
         except (ValueError, KeyError, TypeError, OverflowError) as error:
             raise self._malformed() from error
-        if _OF_BEFORE in self.content:
-            raise ClipError(
-                f"{self.path}: found by `reconstruct` of version 0.2, whose corrections are not "
-                "played any more; reconstruct the clip again"
-            )
         if loop not in ("wrap", "none"):
             raise ClipError(f"{self.path}: Loop is {loop!r}; it must be 'wrap' or 'none'")
         _check_frames(self.path, frames)

@@ -418,19 +418,6 @@ def test_what_a_controller_says_of_itself_is_there_once(pendulum: Made, tmp_path
     assert recording.controller[0].parameters["rate"] == 240
 
 
-def test_a_parameter_of_an_old_bag_has_its_present_name(pendulum: Made, tmp_path: Path) -> None:
-    plan, topic = pendulum.plan, topics.CONFIGURATION.of(topics.CONTROLLER_NODE)
-    text = configuration.describe(plan.character, plan.controller, since_ns=None)
-    assert '"balance.enabled"' in text
-    old = text.replace('"balance.enabled"', '"balance"')
-    messages = [(topic, serialize_message(String(data=old)))]
-
-    recording = read_recording(write_bag(tmp_path / "bag", [*pendulum.messages(), *messages]))
-
-    assert recording.controller[0].parameters["balance.enabled"] is False
-    assert "balance" not in recording.controller[0].parameters
-
-
 def own_character(folder: Path) -> Path:
     """A pendulum of the user's own; its file."""
     text = Path("msgs_config/character/data/pendulum.urdf").read_text()
@@ -464,30 +451,6 @@ def test_a_character_is_made_from_the_texts_in_the_bag(tmp_path: Path, alone: bo
 
 
 NEW = ("character_path", "urdf_path", "meshes", "name", "characters")  # in a configuration
-
-
-def test_an_older_bag_has_its_character_in_its_texts_too(tmp_path: Path) -> None:
-    file = own_character(tmp_path)
-    made = make_run(str(file), 0.02)
-    bag = write_bag(tmp_path / "bag", [raw_without(made.plan, *NEW), *made.messages()[1:]])
-    assert read_recording(bag).character == made.plan.character
-
-    file.write_text(file.read_text() + "feet: [rod]\n")
-
-    assert read_recording(bag).character == made.plan.character
-    file.unlink()
-    assert "cannot rebuild character thing" in refusal(bag) and str(file) in refusal(bag)
-
-
-def test_meshes_of_an_older_bag_are_those_of_the_same_text(tmp_path: Path) -> None:
-    made = make_run("franka_panda", 0.01)
-    older, rest = raw_without(made.plan, *NEW), made.messages()[1:]
-    other = raw_without(made.plan, *NEW, urdf=made.plan.character.loading.urdf_text + "<!-- -->")
-
-    recording = read_recording(write_bag(tmp_path / "same", [older, *rest]))
-
-    assert recording.character == made.plan.character
-    assert "another text now" in refusal(write_bag(tmp_path / "other", [other, *rest]))
 
 
 def test_a_mesh_that_is_another_one_or_missing_is_named(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import make_plan
-from controller_node.references.files.clip import clip_path, read_clip
+from controller_node.references.files.clip import clip_path
 from controller_node.references.files.reconstructed import PLAN, ReconstructedClip
 from controller_node.references.offsets import Offsets, RecordedPlan
 from msgs_config.errors import ClipError, ConfigurationError
@@ -161,14 +161,6 @@ def test_a_file_that_is_no_clip_is_refused(tmp_path: Path, text: str) -> None:
 
     with pytest.raises(ClipError, match="not a motion clip"):
         ReconstructedClip(HUMANOID, str(path))
-
-
-def test_a_file_of_before_is_refused_in_a_line(tmp_path: Path) -> None:
-    clip = json.loads(clip_path(HUMANOID, "walk").read_text())
-    (tmp_path / "walk.json").write_text(json.dumps({**clip, "Corrections": {}}))
-
-    with pytest.raises(ClipError, match=r"version 0\.2.* reconstruct the clip again"):
-        read_clip(HUMANOID, str(tmp_path / "walk.json"))
 
 
 @pytest.mark.parametrize(

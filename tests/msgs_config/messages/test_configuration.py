@@ -22,14 +22,6 @@ def test_parameters_that_are_no_mapping_are_refused(parameters: object) -> None:
         configuration.parse(json.dumps(content | {"parameters": parameters}))
 
 
-def test_of_both_names_of_a_parameter_one_counts() -> None:
-    described = configuration.describe(character("pendulum"), resolve(PARAMETERS, {}))
-    content = json.loads(described)
-    content["parameters"] |= {"balance": True}
-
-    assert "balance" not in configuration.parse(json.dumps(content)).parameters
-
-
 @pytest.mark.parametrize("name", shipped_characters())
 def test_a_configuration_is_json_that_any_language_reads_and_says_the_same(name: str) -> None:
     whole = character(name)
