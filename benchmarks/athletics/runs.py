@@ -21,13 +21,13 @@ from rich.console import Console  # noqa: E402
 from rich.progress import track  # noqa: E402
 from rich.table import Table  # noqa: E402
 
-from benchmarks.athletics.trial import Trial, moments  # noqa: E402
+from benchmarks.athletics.trial import Moment, Trial, moments, walked  # noqa: E402
 from controller_node.behaviours.state_machine.description import Machine  # noqa: E402
 from controller_node.behaviours.state_machine.file import read_machine  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError  # noqa: E402
 
 SPEED, AIRBORNE = 2.0, 0.1  # m/s and share of the time, at least
-COMMANDED = 2.1  # m/s
+COMMANDED, TURN = 2.1, 0.3  # m/s, rad/s
 MEASURED = 20.0  # s
 SEARCHED = (
     "states.contact.duration=0.01",
@@ -47,7 +47,9 @@ SEARCHED = (
     "states.flight.targets.stance.knee=0.1",
 )
 """Where numbers are in the file, and how far a search first moves them."""
-_SEARCHED_FOR = 8.0  # s, measured in a search
+_SEARCHED_FOR, _MEASURED_SINCE = 14.0, 4.0  # s, in a search
+_CHANGES = (5.5, 8.0)  # s, when its velocity changes
+_LEAST_SPEED, _RUNS = 1.5, 1.8  # m/s, and from which on there are flights
 _BEGINS = 1.0  # s
 _EVERY, _LEAST, _MOST, _LASTS = 4.0, 10.0, 30.0, 0.2  # s, N, N, s
 
@@ -113,19 +115,41 @@ def run(machine: Machine, seed: int, speed: float, seconds: float = MEASURED) ->
     )
 
 
-def draw_seeds(rng: np.random.Generator, count: int, rate: int) -> list[int]:
-    """Seeds of nudges that a search draws, whatever the rate."""
-    return [int(seed) for seed in rng.integers(1, 1 << 30, count)]
+def draw_trials(rng: np.random.Generator, count: int, rate: int) -> list[Trial]:
+    """Trials at random speeds and turns that change once, every other one to a stop, nudged."""
+    return [_draw_trial(rng, rate, stops=number % 2 == 0) for number in range(count)]
 
 
-def search_cost(machine: Machine, seeds: Sequence[int]) -> float:
-    """The mean cost of a machine: a fall, the error of its speed, and what it lacks of flights."""
+def _draw_trial(rng: np.random.Generator, rate: int, *, stops: bool) -> Trial:
+    changes = float(rng.uniform(*_CHANGES))
+    velocities = [
+        f"{rng.uniform(_LEAST_SPEED, COMMANDED):.3f},0,{rng.uniform(-TURN, TURN):.3f}"
+        for _ in range(2)
+    ]
+    second = "0,0,0" if stops else velocities[1]
+    nudged = (
+        [] if stops else nudges(int(rng.integers(1, 1 << 30)), changes, _SEARCHED_FOR - changes)
+    )
+    commands = f"{velocities[0]}@{_BEGINS:g} {second}@{changes:.3f}"
+    return Trial(_SEARCHED_FOR, commands, nudged, rate, {"wrench_duration": _LASTS})
+
+
+def search_cost(machine: Machine, trials: Sequence[Trial]) -> float:
+    """The mean cost of a machine: a fall, errors of its velocity, and what it lacks of flights."""
     costs = []
-    for seed in seeds:
-        seen = run(machine, seed, COMMANDED, _SEARCHED_FOR)
-        fell = 1.0 - min(seen.lasted / _SEARCHED_FOR, 1.0)
-        short = max(0.0, 1.5 * AIRBORNE - seen.airborne)
-        costs.append(20.0 * fell + 8.0 * abs(seen.speed - COMMANDED) + 8.0 * short)
+    for trial in trials:
+        ticks = airborne = 0
+
+        def watch(moment: Moment) -> None:
+            nonlocal ticks, airborne
+            if moment.course.forward > _RUNS:
+                ticks, airborne = ticks + 1, airborne + (not any(moment.loads))
+
+        seen = walked(trial, machine, _MEASURED_SINCE, watch)
+        lacks = max(0.0, 1.5 * AIRBORNE - airborne / max(ticks, 1))
+        left = 1.0 - seen.lasted / trial.seconds if seen.fell else 0.0
+        errors = abs(seen.speed - seen.wanted) + abs(seen.drift) + seen.heading_error
+        costs.append(20.0 * (seen.fell + left) + 4.0 * errors + 40.0 * lacks)
     return sum(costs) / len(costs)
 
 

@@ -3,8 +3,8 @@
 Each candidate walks some short trials in the simulator, at speeds and turns and under pushes that
 change from generation to generation. Its cost is what it fell short of them, the error of its
 speed, its drift aside, the error of its heading, and its effort. With `--task jump` it jumps, with
-`--task run` it runs, nudged. The best machine so far is written after every generation; Ctrl-C ends
-the search and keeps it.
+`--task run` it runs, round bends, nudged, and stops. The best machine so far is written after every
+generation; Ctrl-C ends the search and keeps it.
 
 Source: Hansen and Ostermeier 2001, "Completely Derandomized Self-Adaptation in Evolution
 Strategies"; the extra `search` brings the package `cma`.
@@ -145,7 +145,7 @@ class Task:
 TASKS = {
     "walk": Task(SEARCHED, trials, cost),
     "jump": Task(jumps.SEARCHED, jumps.draw_nudges, jumps.search_cost),
-    "run": Task(runs.SEARCHED, runs.draw_seeds, runs.search_cost),
+    "run": Task(runs.SEARCHED, runs.draw_trials, runs.search_cost),
 }
 
 
