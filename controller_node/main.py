@@ -1,21 +1,13 @@
 """The executable `controller_node`."""
 
-from collections.abc import Callable
 from typing import NoReturn
 
-from msgs_config.runtime.process import RunnableNode, limit_threads, run_node
+from msgs_config.runtime.process import run_node
 
 
 def main() -> NoReturn:
     """Run the controller until a signal."""
-    limit_threads()
-    run_node(_load)
-
-
-def _load() -> Callable[[], RunnableNode]:
-    from controller_node.node import ControllerNode
-
-    return ControllerNode
+    run_node("controller_node.node:ControllerNode")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,8 @@
 """The executable `composed`."""
 
-from collections.abc import Callable
 from typing import NoReturn
 
-from msgs_config.runtime.process import RunnableNode, limit_threads, run_node
+from msgs_config.runtime.process import run_node
 
 _ABOUT = """\
 The nodes sim_node and controller_node in one process and one thread, which take turns. A simulator
@@ -18,14 +17,7 @@ namespace; in a file, /**/sim_node, /**/controller_node or /left/controller_node
 
 def main() -> NoReturn:
     """Run simulator and controllers until one of them ends, or until a signal."""
-    limit_threads()
-    run_node(_load, _ABOUT)
-
-
-def _load() -> Callable[[], RunnableNode]:
-    from actuated_characters.composed.nodes import compose
-
-    return compose
+    run_node("actuated_characters.composed.nodes:compose", _ABOUT)
 
 
 if __name__ == "__main__":

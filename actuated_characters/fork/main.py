@@ -1,22 +1,13 @@
 """The process that repeats what a recorded run was sent."""
 
-from collections.abc import Callable
 from typing import NoReturn
 
-from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, use_batch_scheduling
+from msgs_config.runtime.process import run_node
 
 
 def main() -> NoReturn:
     """Run the node until a signal."""
-    limit_threads()
-    use_batch_scheduling()
-    run_node(_load)
-
-
-def _load() -> Callable[[], RunnableNode]:
-    from actuated_characters.fork.node import ForkNode
-
-    return ForkNode
+    run_node("actuated_characters.fork.node:ForkNode", listens=True)
 
 
 if __name__ == "__main__":

@@ -1,22 +1,13 @@
 """The executable `recorder`."""
 
-from collections.abc import Callable
 from typing import NoReturn
 
-from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, use_batch_scheduling
+from msgs_config.runtime.process import run_node
 
 
 def main() -> NoReturn:
     """Run the recorder until a signal."""
-    limit_threads()
-    use_batch_scheduling()
-    run_node(_load)
-
-
-def _load() -> Callable[[], RunnableNode]:
-    from actuated_characters.recorder.node import RecorderNode
-
-    return RecorderNode
+    run_node("actuated_characters.recorder.node:RecorderNode", listens=True)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,9 @@
 """The executable `viewer`."""
 
 import os
-from collections.abc import Callable
 from typing import NoReturn
 
-from msgs_config.extras import require_extra
-from msgs_config.runtime.process import RunnableNode, limit_threads, run_node, use_batch_scheduling
+from msgs_config.runtime.process import run_node
 
 _NICE = 5  # pictures can wait on a busy machine, ticks cannot
 _ABOUT = """\
@@ -16,17 +14,8 @@ Shows all characters of the simulators in its namespace in a browser, at the add
 
 def main() -> NoReturn:
     """Run the viewer until a signal."""
-    limit_threads()
-    use_batch_scheduling()
     os.nice(_NICE)
-    run_node(_load, _ABOUT)
-
-
-def _load() -> Callable[[], RunnableNode]:
-    require_extra("view", "the viewer")
-    from actuated_characters.viewer.node import ViewerNode
-
-    return ViewerNode
+    run_node("actuated_characters.viewer.node:ViewerNode", _ABOUT, listens=True, extra="view")
 
 
 if __name__ == "__main__":

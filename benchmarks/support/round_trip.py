@@ -23,7 +23,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.topic import Topic
 from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
-from msgs_config.runtime.process import StopSignal, limit_threads, run_node
+from msgs_config.runtime.process import StopSignal, run_node
 from msgs_config.runtime.publishing import create_publisher
 
 _PING = replace(topics.JOINT_STATES, name="ping")
@@ -102,7 +102,7 @@ def _wait(condition: Callable[[], object]) -> None:
             raise TimeoutError("the other side of the round trip does not answer")
 
 
-class _FarSide(Node):
+class FarSide(Node):
     """Answers every message with one of the size that its environment says."""
 
     def __init__(self) -> None:
@@ -113,6 +113,7 @@ class _FarSide(Node):
         self._reply = bytes(int(os.environ[_SIZE]))
 
     def run(self, stop: StopSignal) -> None:
+        """Answer until a signal."""
         with self._at_end:
             while not stop:
                 if self._take():
@@ -120,5 +121,4 @@ class _FarSide(Node):
 
 
 if __name__ == "__main__":
-    limit_threads()
-    run_node(lambda: _FarSide)
+    run_node("benchmarks.support.round_trip:FarSide")

@@ -9,11 +9,13 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
 from typing import NoReturn, Protocol
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
+from msgs_config.extras import require_extra
 from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.runtime.exit_watchdog import exit_after
 from msgs_config.runtime.ros_environment import (
@@ -118,7 +120,7 @@ class RunnableNode(Protocol):
         """Leave the graph."""
 
 
-def run_node(load: Callable[[], Callable[[], RunnableNode]], about: str = "") -> NoReturn:
+def run_node(place: str, about: str = "", *, listens: bool = False, extra: str = "") -> NoReturn:
     """Run a node between rclpy's start and end, and end the process.
 
     rclpy's own signal handlers would end the context under a loop that still publishes or writes,
@@ -126,9 +128,14 @@ def run_node(load: Callable[[], Callable[[], RunnableNode]], about: str = "") ->
     any more, and the process ends without Python's own finalization, which takes far longer.
 
     Args:
-        load: Imports the node's modules, and returns its constructor.
+        place: Of its constructor, MODULE:NAME; the module is imported after rclpy's start.
         about: What `--help` says before it says how parameters are set.
+        listens: Whether it only listens to a control loop, and others come first.
+        extra: The extra of the package that it needs.
     """
+    limit_threads()
+    if listens:
+        use_batch_scheduling()
     open_missing_streams()
     stop = StopSignal()
     node, code = None, EXIT_ERROR
@@ -137,7 +144,9 @@ def run_node(load: Callable[[], Callable[[], RunnableNode]], about: str = "") ->
             for sentence in shadowed_packages():
                 print(f"warning: {sentence}", file=sys.stderr, flush=True)
             _start_ros(about)
-            make_node = load()
+            if extra:
+                require_extra(extra, "this node")
+            make_node = _find(place)
         node = make_node()
         node.run(stop)
         code = 0
@@ -147,6 +156,13 @@ def run_node(load: Callable[[], Callable[[], RunnableNode]], about: str = "") ->
         _leave(node, code)
     sys.stderr.flush()
     os._exit(code)
+
+
+def _find(place: str) -> Callable[[], RunnableNode]:
+    """The constructor at a place, MODULE:NAME."""
+    module, _, name = place.partition(":")
+    found: Callable[[], RunnableNode] = getattr(import_module(module), name)
+    return found
 
 
 def _leave(node: RunnableNode | None, code: int) -> None:

@@ -2,9 +2,12 @@
 
 import argparse
 
+from actuated_characters.commands.common.parameter_choices import ParameterChoices
 from actuated_characters.commands.view import add_server
 
 ALL_SENSORS = "all"
+_SIMULATOR, _CONTROLLER = "sim_node.parameters", "controller_node.parameters"
+_RECORDER = "actuated_characters.recorder.parameters"
 
 
 def add_tracked(run: argparse.ArgumentParser) -> None:
@@ -21,7 +24,7 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     )
     tracked.add_argument(
         "--reference",
-        choices=["hold", "step", "sine", "steered"],
+        choices=ParameterChoices(_CONTROLLER, "reference", without=("clip", "keyframes")),
         help="the rest pose (hold, the default), a test signal from it, or a walk steered by the "
         "topic cmd_vel",
     )
@@ -33,7 +36,7 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     )
     run.add_argument(
         "--behaviour",
-        choices=["tracking", "ragdoll", "active_ragdoll", "reactive", "state_machine"],
+        choices=ParameterChoices(_CONTROLLER, "behaviour"),
         help="track whatever comes (tracking, the default); be limp; go limp on a hard hit, and "
         "get up; react to hits; or go through the states of a machine",
     )
@@ -45,13 +48,13 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     )
     run.add_argument(
         "--collision",
-        choices=["file", "none"],
+        choices=ParameterChoices(_SIMULATOR, "collision"),
         help="what the character collides with: as its file has it (file, the default), or nothing "
         "(none), in which case meshes may be missing",
     )
     run.add_argument(
         "--planner",
-        choices=["none", "predictive"],
+        choices=ParameterChoices(_CONTROLLER, "planner", without=("recorded",)),
         help="keep the motion by joint torques alone, planned ahead (predictive: without root "
         "assistance; needs the extra 'plan'), or not (none, the default)",
     )
@@ -71,13 +74,16 @@ def add_viewed(run: argparse.ArgumentParser) -> None:
 def add_recorded(run: argparse.ArgumentParser) -> None:
     """Add the options that say what is recorded, and how."""
     run.add_argument("--no-record", action="store_true", help="write no bag")
-    run.add_argument("--storage", choices=["mcap", "sqlite3"], help="how the bag is stored (mcap)")
+    storages = ParameterChoices(_RECORDER, "storage")
+    run.add_argument("--storage", choices=storages, help="how the bag is stored (mcap)")
     run.add_argument(
-        "--compression", choices=["none", "zstd"], help="how the bag is compressed (none)"
+        "--compression",
+        choices=ParameterChoices(_RECORDER, "compression"),
+        help="how the bag is compressed (none)",
     )
     run.add_argument(
         "--log-time",
-        choices=["wall", "simulated"],
+        choices=ParameterChoices(_RECORDER, "log_time"),
         help="clock of the bag's log times (wall); with simulated, players show 20 s as 20 s",
     )
     for name, about in (

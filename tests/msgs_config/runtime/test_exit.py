@@ -399,7 +399,7 @@ def make_node():
     exec("os.kill(os.getpid(), signal.SIGTERM); [None for _ in range(10)]")
     return Node()
 
-run_node(make_node)
+run_node("__main__:make_node")
 """
 
 
