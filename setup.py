@@ -44,7 +44,7 @@ setup(
     install_requires=[
         "lz4>=4.0,<5",  # which rosbags needs as well
         "matplotlib>=3.6,<4",
-        "mcap>=1.2,<2",  # reads files that were never closed, which rosbags does not
+        "mcap>=1.6,<2",  # writes bags, and reads files that were never closed
         "mujoco-core==4.0.1",  # exactly: another engine may have other last bits
         "numpy>=1.26,<3",
         "pybullet==3.2.7",  # exactly, likewise

@@ -9,10 +9,9 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from actuated_characters.bags.format.metadata import EARLIER_BAG, METADATA, load_metadata
+from actuated_characters.bags.format.metadata import EARLIER_BAG, load_metadata, write_metadata
 from actuated_characters.bags.writer import BagWriter
 from msgs_config.errors import RecordingError
 
@@ -106,10 +105,7 @@ def _join(earlier: Path, bag: Path) -> None:
     counts = _counts(first)
     for topic in joined["topics_with_message_count"]:
         topic["message_count"] += counts.get(topic["topic_metadata"]["name"], 0)
-    scratch = bag / f"{METADATA}.tmp"
-    content = yaml.safe_dump({"rosbag2_bagfile_information": joined}, sort_keys=False)
-    scratch.write_text(content, encoding="utf-8")
-    scratch.replace(bag / METADATA)
+    write_metadata(bag, joined)
     shutil.rmtree(earlier)
 
 

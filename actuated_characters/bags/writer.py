@@ -1,19 +1,21 @@
 """Writes recordings: rosbag2 directories of serialised messages, without ROS' rosbag2.
 
-They are of version 9, as ROS 2 Jazzy's `ros2 bag record` writes them; rosbags writes the files.
+They are of version 9 with one MCAP file, as ROS 2 Jazzy's `ros2 bag record` writes them.
 """
 
+import os
 import shutil
-import sqlite3
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
+import yaml
+from mcap.writer import CompressionType, Writer
 from rclpy.duration import Duration, Infinite
 from rclpy.qos import LivelinessPolicy, QoSProfile
 from rosbags.interfaces import (
-    Connection,
     Qos,
     QosDurability,
     QosHistory,
@@ -21,30 +23,33 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, WriterError
+from rosbags.rosbag2.metadata import dump_qos_v9
 
 from actuated_characters.bags.directory_lock import DirectoryLock
 from actuated_characters.bags.format.definitions import MessageDefinition, read_definition
-from actuated_characters.bags.format.rosbags_storage import McapStorage, RosbagWriter, SqliteStorage
+from actuated_characters.bags.format.metadata import write_metadata
 from actuated_characters.bags.format.storage import (
+    CDR,
     COMPRESSIONS,
     LATEST_NS,
     LOG_TIME,
     LOG_TIMES,
     MCAP,
     NONE,
+    OFFERED_QOS,
+    ROS_DISTRO,
     SIMULATED,
-    SQLITE3,
-    STORAGES,
+    SUFFIXES,
+    TYPE_HASH,
     WALL,
     ZSTD,
     reason,
 )
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 
-_PLUGINS = {MCAP: StoragePlugin.MCAP, SQLITE3: StoragePlugin.SQLITE3}
-_MODES = {MCAP: CompressionMode.STORAGE, SQLITE3: CompressionMode.MESSAGE}
-_DISK_ERRORS = (OSError, sqlite3.Error)  # raised by a write to a disk that is full or gone
+_COMPRESSIONS = {NONE: CompressionType.NONE, ZSTD: CompressionType.ZSTD}
+_VERSION = 9  # of rosbag2's metadata
+_NUMBERS = 1 << 32  # that MCAP has for a topic's messages
 _NS_PER_S = 10**9
 _T = TypeVar("_T")
 
@@ -57,59 +62,49 @@ class BagWriter:
     must not raise into `write` or `close`, which would leave half a record: let it set a flag.
     """
 
-    def __init__(
-        self, path: Path, *, storage: str = MCAP, compression: str = NONE, log_time: str = WALL
-    ) -> None:
+    def __init__(self, path: Path, *, compression: str = NONE, log_time: str = WALL) -> None:
         """Create the directory `path`, and its parents; nothing stays of it where that fails.
 
         Args:
             path: Where the recording goes.
-            storage: `mcap`, or `sqlite3` as ROS 2 Humble has it by default.
-            compression: `none` or `zstd`, of MCAP's chunks or of each message: half the size.
+            compression: `none` or `zstd`, of the file's chunks: half the size.
             log_time: `wall` or `simulated`, the clock of the log times; the bag names the latter.
 
         Raises:
-            ConfigurationError: There is no such storage, compression or log time.
+            ConfigurationError: There is no such compression or log time.
             RecordingError: `path` exists already or cannot be created.
         """
-        _check_choice("storage", storage, STORAGES)
         _check_choice("compression", compression, COMPRESSIONS)
         _check_choice("log time", log_time, LOG_TIMES)
-        wrong = next((character for character in "?#%" if character in str(path)), None)
-        if storage == SQLITE3 and wrong is not None:  # SQLite takes it for a part of a URI
-            raise RecordingError(
-                f"recording {path}: storage sqlite3 allows no '{wrong}' in its path"
-            )
         self.path = path
-        self._connections: dict[str, Connection] = {}
+        self._is_simulated = log_time == SIMULATED
+        self._custom_data = {LOG_TIME: SIMULATED} if self._is_simulated else {}
+        self._schemas: dict[str, int] = {}  # by the type's name
+        self._channels: dict[str, int] = {}  # by topic
+        self._topics: list[dict[str, object]] = []  # for the metadata
+        self._counts = Counter[str]()
+        self._span_ns = (LATEST_NS, 0)  # of the log times
         try:
-            self._writer = RosbagWriter(path, version=9, storage_plugin=_PLUGINS[storage])
-            if log_time == SIMULATED:
-                self._writer.set_custom_data(LOG_TIME, SIMULATED)
-            if compression == ZSTD:
-                self._writer.set_compression(_MODES[storage], CompressionFormat.ZSTD)
-            self._open()
-        except WriterError as error:
+            self._open(_COMPRESSIONS[compression])
+        except FileExistsError as error:
             raise RecordingError(
                 f"recording {path} exists already; remove it or choose another directory"
             ) from error
-        except _DISK_ERRORS as error:
+        except OSError as error:
             raise RecordingError(f"cannot create recording {path}: {reason(error)}") from error
         self._is_open = True
 
-    def _open(self) -> None:
+    def _open(self, compression: CompressionType) -> None:
+        self.path.mkdir(parents=True)
         try:
-            self._writer.open()
+            self._file = (self.path / f"{self.path.name}{SUFFIXES[MCAP]}").open("wb")
+            self._writer = Writer(self._file, compression=compression)
+            self._writer.start("ros2", "actuated_characters")
+            self._file.flush()
             self._lock = DirectoryLock(self.path)  # against a recovery meanwhile
-        except _DISK_ERRORS:
-            with suppress(*_DISK_ERRORS):
-                self._writer.abort()
+        except OSError:
             shutil.rmtree(self.path, ignore_errors=True)  # it was not there before
             raise
-        self._storage = self._writer.storage
-        self._mcap = self._storage if isinstance(self._storage, McapStorage) else None
-        if self._mcap is not None:
-            self._mcap.has_simulated_log_time = LOG_TIME in self._writer.custom_data
 
     def __enter__(self) -> Self:
         return self
@@ -124,7 +119,7 @@ class BagWriter:
             RecordingError: The recording is closed.
         """
         self._check_open()
-        self._writer.set_custom_data(name, text)
+        self._custom_data[name] = text
 
     def add_topic(self, topic: str, message_type: type, qos: QoSProfile) -> None:
         """Announce a topic, with the quality of service that its publisher offers.
@@ -139,13 +134,27 @@ class BagWriter:
     def announce(self, topic: str, definition: MessageDefinition, offered: Sequence[Qos]) -> None:
         """Announce a topic of a type that need not be installed. Raises as `add_topic`."""
         self._check_new(topic)
-        self._connections[topic] = self._attempt(
-            self._writer.add_connection,
-            topic,
-            definition.type_name,
-            msgdef=definition.text,
-            rihs01=definition.type_hash,
-            offered_qos_profiles=offered,
+        name, profiles = definition.type_name, dump_qos_v9(list(offered))
+        if name not in self._schemas:
+            text = definition.text.encode()
+            self._schemas[name] = self._attempt(self._writer.register_schema, name, "ros2msg", text)
+        metadata = {
+            OFFERED_QOS: yaml.safe_dump(profiles, sort_keys=False).strip(),
+            TYPE_HASH: definition.type_hash,
+        }
+        if self._is_simulated:
+            metadata[LOG_TIME] = SIMULATED
+        self._channels[topic] = self._attempt(
+            self._writer.register_channel, topic, CDR, self._schemas[name], metadata
+        )
+        self._topics.append(
+            {
+                "name": topic,
+                "type": name,
+                "serialization_format": CDR,
+                "offered_qos_profiles": profiles,
+                "type_description_hash": definition.type_hash,
+            }
         )
 
     def write(
@@ -162,41 +171,37 @@ class BagWriter:
             topic: Its topic, which was added.
             raw: The message.
             log_time_ns: When it was published, by the clock of the bag's log times, ns.
-            published_ns: Wall time of that, ns; None: the log time. SQLite has no place for it.
-            number: Of the messages of its topic, in MCAP; None: counted from 1 on.
+            published_ns: Wall time of that, ns; None: the log time.
+            number: Of the messages of its topic; None: counted from 1 on.
 
         Raises:
             RecordingError: The recording is closed, the topic was never added, the time is out of
                 range, or the disk refuses the data, which closes the recording.
         """
         self._check_open()
-        if topic not in self._connections:
-            raise RecordingError(one_of("topic", topic, list(self._connections)))
-        if not 0 <= log_time_ns <= LATEST_NS:
-            raise RecordingError(f"log time {log_time_ns} ns is not within 0 to {LATEST_NS} ns")
-        if self._mcap is not None:
-            if published_ns is None:
-                published_ns = log_time_ns
-            elif not 0 <= published_ns <= LATEST_NS:
-                raise RecordingError(
-                    f"time of publishing {published_ns} ns is not within 0 to {LATEST_NS} ns"
-                )
-            self._mcap.describe_next(published_ns, number)
-        self._attempt(self._writer.write, self._connections[topic], log_time_ns, raw)
+        if topic not in self._channels:
+            raise RecordingError(one_of("topic", topic, list(self._channels)))
+        published_ns = log_time_ns if published_ns is None else published_ns
+        for what, time_ns in (("log time", log_time_ns), ("time of publishing", published_ns)):
+            if not 0 <= time_ns <= LATEST_NS:
+                raise RecordingError(f"{what} {time_ns} ns is not within 0 to {LATEST_NS} ns")
+        count = self._counts[topic] = self._counts[topic] + 1
+        first_ns, last_ns = self._span_ns
+        self._span_ns = min(first_ns, log_time_ns), max(last_ns, log_time_ns)
+        channel, sequence = self._channels[topic], (number or count) % _NUMBERS
+        self._attempt(self._writer.add_message, channel, log_time_ns, raw, published_ns, sequence)
 
     def flush(self) -> None:
         """Hand all that was written to the operating system.
 
         Flushed data outlives this process, however that ends: `actuated_characters recover` makes
-        a recording of MCAP's, and SQLite's file can be read alone. Without it a killed recorder
-        loses up to the last MiB of MCAP, and all of SQLite.
+        a recording of it. Without it a killed recorder loses up to the last MiB.
 
         Raises:
             RecordingError: The recording is closed, or the disk refuses the data, which closes it.
         """
         self._check_open()
-        assert isinstance(self._storage, McapStorage | SqliteStorage)
-        self._attempt(self._storage.flush)
+        self._attempt(self._writer.flush)
 
     def close(self) -> None:
         """Complete the recording: the rest of the messages, the index and the metadata.
@@ -209,9 +214,42 @@ class BagWriter:
         if self._is_open:
             self._is_open = False
             try:
-                self._attempt(self._writer.close)
+                self._attempt(self._finish)
             finally:
                 self._lock.release()
+
+    def _finish(self) -> None:
+        content = self._information()
+        text = yaml.safe_dump(content, sort_keys=False)
+        self._writer.flush()  # the messages come before the metadata
+        self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
+        self._writer.finish()
+        self._file.close()
+        write_metadata(self.path, content)
+
+    def _information(self) -> dict[str, object]:
+        """What rosbag2's metadata says, but for its outermost key."""
+        (first_ns, last_ns), file = self._span_ns, Path(self._file.name).name
+        span: dict[str, object] = {
+            "starting_time": {"nanoseconds_since_epoch": first_ns},
+            "duration": {"nanoseconds": max(last_ns - first_ns, 0)},
+            "message_count": self._counts.total(),
+        }
+        return {
+            "version": _VERSION,
+            "storage_identifier": MCAP,
+            **span,
+            "topics_with_message_count": [
+                {"topic_metadata": topic, "message_count": self._counts[str(topic["name"])]}
+                for topic in self._topics
+            ],
+            "compression_format": "",  # of the file or of each message
+            "compression_mode": "",
+            "relative_file_paths": [file],
+            "files": [{"path": file, **span}],
+            "custom_data": self._custom_data or None,
+            "ros_distro": os.environ.get("ROS_DISTRO", "").strip() or ROS_DISTRO,
+        }
 
     def _check_open(self) -> None:
         if not self._is_open:
@@ -219,17 +257,17 @@ class BagWriter:
 
     def _check_new(self, topic: str) -> None:
         self._check_open()
-        if topic in self._connections:
+        if topic in self._channels:
             raise RecordingError(f"recording {self.path} has topic '{topic}' already")
 
-    def _attempt(self, act: Callable[..., _T], *arguments: Any, **options: Any) -> _T:
+    def _attempt(self, act: Callable[..., _T], *arguments: Any) -> _T:
         """Write, or give up the file, whose end is undefined then: without index and metadata."""
         try:
-            return act(*arguments, **options)
-        except _DISK_ERRORS as error:
+            return act(*arguments)
+        except OSError as error:
             self._is_open = False
-            with suppress(*_DISK_ERRORS):  # it flushes once more, to the same full disk
-                self._writer.abort()
+            with suppress(OSError):  # it flushes once more, to the same full disk
+                self._file.close()
             self._lock.release()
             raise RecordingError(
                 f"recording {self.path} is incomplete, cannot write: {reason(error)}"

@@ -44,7 +44,6 @@ if TYPE_CHECKING:  # it takes a second to import
 _DURATION = 10.0  # s
 _NO_PUSH = "none"
 _RECORDING = {  # options, and the recorder's parameters
-    "storage": "storage",
     "compression": "compression",
     "log_time": "log_time",
     "topic": "topics",

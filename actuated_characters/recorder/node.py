@@ -89,14 +89,8 @@ class RecorderNode(Node):
     def _open_bag(self, values: Values) -> BagWriter | LastPartsWriter | None:
         if not values.flag("write_bag"):
             return None
-        path, options = (
-            self._directory / BAG,
-            {
-                "storage": values.text("storage"),
-                "compression": values.text("compression"),
-                "log_time": values.text(LOG_TIME),
-            },
-        )
+        path = self._directory / BAG
+        options = {"compression": values.text("compression"), "log_time": values.text(LOG_TIME)}
         least = round(values.number("last_megabytes") * _BYTES_PER_MB)
         bag = LastPartsWriter(path, least, **options) if least else BagWriter(path, **options)
         for name, origin in self._origin.items():

@@ -4,9 +4,7 @@ from actuated_characters.bags.format.storage import (
     COMPRESSIONS,
     LOG_TIME,
     LOG_TIMES,
-    MCAP,
     NONE,
-    STORAGES,
     WALL,
 )
 from actuated_characters.runs.forked_from import FORKED_FROM
@@ -34,7 +32,6 @@ PARAMETERS = [
         "how much of the last messages the bag keeps at least, and twice that at most; 0: all",
         unit="MB",
     ),
-    Parameter("storage", MCAP, "how the bag is stored", choices=STORAGES),
     Parameter("compression", NONE, "how the bag is compressed", choices=COMPRESSIONS),
     Parameter(
         LOG_TIME,

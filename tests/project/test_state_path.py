@@ -15,8 +15,8 @@ import pytest
 PROJECT = Path(__file__).parents[2]
 ROOMS = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
 ENTRANCES = [  # what works out states and efforts, and what a run of `--in-process` begins with
-    "sim_node/main.py",
-    "controller_node/main.py",
+    "sim_node/node.py",
+    "controller_node/node.py",
     "actuated_characters/runs/in_process.py",
     "actuated_characters/runs/plan.py",
     "actuated_characters/runs/planned_wrenches.py",

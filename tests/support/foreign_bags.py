@@ -1,4 +1,4 @@
-"""Bags as other programs write them: by the `mcap` package and by SQL, never by our own writer."""
+"""Bags as other programs write them: by `mcap`, by rosbags and by SQL, never by our own writer."""
 
 import sqlite3
 from collections.abc import Iterable, Mapping
@@ -8,6 +8,9 @@ from typing import Any, NamedTuple
 
 import yaml
 from mcap.writer import CompressionType, Writer
+from rosbags.interfaces import ConnectionExtRosbag2
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin
+from rosbags.rosbag2 import Writer as Writer9
 
 from actuated_characters.bags.reader import read_messages
 
@@ -175,3 +178,27 @@ def write_metadata(
     content |= changes
     text = yaml.safe_dump({"rosbag2_bagfile_information": content}, sort_keys=False)
     (bag / "metadata.yaml").write_text(text)
+
+
+def to_sqlite(bag: Path, target: Path, *, compressed: bool = False) -> Path:
+    """A bag's messages in an SQLite bag by rosbags; each of them compressed, if so said."""
+    information = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    writer = Writer9(target, version=9, storage_plugin=StoragePlugin.SQLITE3)
+    if compressed:
+        writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    for name, text in (information["custom_data"] or {}).items():
+        writer.set_custom_data(name, text)
+    with Reader(bag) as reader, writer:
+        topics = {}
+        for each in reader.connections:
+            assert isinstance(each.ext, ConnectionExtRosbag2)
+            topics[each.id] = writer.add_connection(
+                each.topic,
+                each.msgtype,
+                msgdef=each.msgdef.data,
+                rihs01=each.digest,
+                offered_qos_profiles=each.ext.offered_qos_profiles,
+            )
+        for connection, log_time_ns, raw in reader.messages():
+            writer.write(topics[connection.id], log_time_ns, raw)
+    return target

@@ -1,8 +1,10 @@
-"""Reads the `metadata.yaml` of a rosbag2 directory, of any version of rosbag2."""
+"""The `metadata.yaml` of a rosbag2 directory: read of any version of rosbag2, and written."""
 
 from collections.abc import Collection, Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
+
+import yaml
 
 from actuated_characters.bags.format.storage import (
     CDR,
@@ -17,6 +19,7 @@ from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
 
 METADATA = "metadata.yaml"
+_OUTERMOST = "rosbag2_bagfile_information"
 BAG = "bag"  # in the directory of a run
 EARLIER_BAG = BAG + "-earlier"  # the older part, while a recording of bounded size is made
 FILE, MESSAGE = "file", "message"  # that rosbag2 compressed; MCAP's chunks tell themselves
@@ -68,7 +71,15 @@ def load_metadata(bag: Path) -> Any:
         text = file.read(MOST_OF_METADATA + 1)
     place = f"{METADATA} is damaged"
     content = files.parse_yaml(place, text, RecordingError, most=MOST_OF_METADATA)
-    return content["rosbag2_bagfile_information"]
+    return content[_OUTERMOST]
+
+
+def write_metadata(bag: Path, content: Mapping[str, Any]) -> None:
+    """Write `metadata.yaml`, whole. Raises OSError."""
+    scratch = bag / f"{METADATA}.tmp"
+    text = yaml.safe_dump({_OUTERMOST: dict(content)}, sort_keys=False)
+    scratch.write_text(text, encoding="utf-8")
+    scratch.replace(bag / METADATA)
 
 
 def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 MCAP, SQLITE3 = "mcap", "sqlite3"
 NONE, ZSTD = "none", "zstd"
-STORAGES, COMPRESSIONS = (MCAP, SQLITE3), (NONE, ZSTD)
+COMPRESSIONS = (NONE, ZSTD)
 SUFFIXES = {MCAP: ".mcap", SQLITE3: ".db3"}
 ZSTD_SUFFIX = ".zstd"  # of a file that is compressed as a whole
 FILE_SUFFIXES = (*SUFFIXES.values(), ZSTD_SUFFIX)

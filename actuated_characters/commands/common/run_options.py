@@ -74,8 +74,6 @@ def add_viewed(run: argparse.ArgumentParser) -> None:
 def add_recorded(run: argparse.ArgumentParser) -> None:
     """Add the options that say what is recorded, and how."""
     run.add_argument("--no-record", action="store_true", help="write no bag")
-    storages = ParameterChoices(_RECORDER, "storage")
-    run.add_argument("--storage", choices=storages, help="how the bag is stored (mcap)")
     run.add_argument(
         "--compression",
         choices=ParameterChoices(_RECORDER, "compression"),

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,16 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.recorder.recovery import recover
 from msgs_config.errors import RecordingError
-from tests.support.foreign_bags import SENT, write_humble_db3, write_mcap
+from tests.support.foreign_bags import SENT, to_sqlite, write_humble_db3, write_mcap
 
 pytestmark = pytest.mark.slow
 
 READ, RECOVERED = 45, 12  # damaged copies of each kind of bag
 
 
-def own(storage: str, compression: str) -> Callable[[Path], None]:
+def own(compression: str) -> Callable[[Path], None]:
     def make(bag: Path) -> None:
-        with BagWriter(bag, storage=storage, compression=compression) as writer:
+        with BagWriter(bag, compression=compression) as writer:
             for topic in ("/a", "/b"):
                 writer.add_topic(topic, String, QoSProfile(depth=10))
             for number, sent in enumerate(SENT):
@@ -32,6 +33,12 @@ def own(storage: str, compression: str) -> Callable[[Path], None]:
                     writer.flush()
 
     return make
+
+
+def sqlite(bag: Path, *, compressed: bool) -> None:
+    own("none")(bag.with_name("own"))
+    to_sqlite(bag.with_name("own"), bag, compressed=compressed)
+    shutil.rmtree(bag.with_name("own"))
 
 
 def foreign(compression: CompressionType, **options: object) -> Callable[[Path], None]:
@@ -49,10 +56,10 @@ def humble(bag: Path) -> None:
 
 
 KINDS = {
-    "mcap": own("mcap", "none"),
-    "mcap zstd": own("mcap", "zstd"),
-    "sqlite3": own("sqlite3", "none"),
-    "sqlite3 zstd": own("sqlite3", "zstd"),
+    "mcap": own("none"),
+    "mcap zstd": own("zstd"),
+    "sqlite3": partial(sqlite, compressed=False),
+    "sqlite3 zstd": partial(sqlite, compressed=True),
     "foreign lz4": foreign(CompressionType.LZ4),
     "foreign unindexed": foreign(CompressionType.NONE, index_types=IndexType.NONE),
     "foreign unchunked": foreign(CompressionType.NONE, use_chunking=False),

@@ -28,7 +28,7 @@ from tests.support.eventful import (
     raw_controller,
     write_timed,
 )
-from tests.support.foreign_bags import TextMessage, write_humble_db3, write_metadata
+from tests.support.foreign_bags import TextMessage, to_sqlite, write_humble_db3, write_metadata
 
 PUSH = (100.0, 0.0, 50.0)
 TICKS = 60
@@ -95,11 +95,15 @@ def test_the_bag_and_its_topics_are_described(facts: BagFacts, fall: Eventful) -
 def test_storage_compression_and_a_topic_without_messages_are_named(
     pendulum: Made, tmp_path: Path, storage: str, compression: str, named: str
 ) -> None:
-    with BagWriter(tmp_path / "bag", storage=storage, compression=compression) as bag:
+    chunks = compression if storage == "mcap" else "none"
+    with BagWriter(tmp_path / "own" / "bag", compression=chunks) as bag:
         add_to(bag, pendulum.messages())
         bag.add_topic("/contacts", topics.CONTACTS.message_type, topics.CONTACTS.qos)
+    if storage == "sqlite3":
+        compressed = compression == "zstd"
+        to_sqlite(tmp_path / "own" / "bag", tmp_path / "other" / "bag", compressed=compressed)
 
-    contents = read_contents(tmp_path)
+    contents = read_contents(tmp_path / ("other" if storage == "sqlite3" else "own"))
 
     assert (contents.storage, contents.compression) == (storage, named)
     empty = {topic.name: topic for topic in contents.topics}["/contacts"]

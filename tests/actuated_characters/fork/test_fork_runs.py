@@ -124,7 +124,7 @@ def test_pushes_resets_pauses_and_what_a_controller_is_asked_come_again(
         ("--behaviour", "ragdoll"),
         ("--behaviour", "active_ragdoll", "--composed", "--sensor", "all"),
         ("--planner", "predictive"),
-        ("--set", "sim_node.real_time_factor:=4", "--storage", "sqlite3"),
+        ("--set", "sim_node.real_time_factor:=4", "--compression", "zstd"),
         ("--exclude", "contacts", "--exclude", "odom", "--log-time", "simulated"),
     ],
     ids=" ".join,

@@ -54,7 +54,7 @@ def refusal(capsys: pytest.CaptureFixture[str], run: Path, *options: str) -> str
         ),
         (["--at", "0.1", "--set", "sim_node.gravty:=3"], "parameter of sim_node 'gravty'"),
         (["--at", "0.1", "--set", "controller_node.law:=lqr"], "'law': 'lqr'"),
-        (["--at", "0.1", "--set", "recorder.storage:=mcap"], "node 'recorder'"),
+        (["--at", "0.1", "--set", "recorder.compression:=zstd"], "node 'recorder'"),
         (["--at", "0.1", "--output", "{run}"], "is the run that is forked"),
     ],
 )

@@ -19,7 +19,8 @@ from actuated_characters.metrics.recording_metrics import measure_recording
 from actuated_characters.recorder.recovery import recover
 from actuated_characters.report.facts import look_at
 from msgs_config.messages.clock import TickClock
-from tests.actuated_characters.bags.format.test_rosbags_storage import unclosed
+from tests.actuated_characters.bags.format.test_mcap_writing import unclosed
+from tests.support.foreign_bags import to_sqlite
 from tests.support.ros import Processes
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
@@ -42,19 +43,19 @@ def started(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[P
 
 @pytest.fixture(scope="module")
 def runs(started: Processes, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The same second of a pushed walk with simulated log times in both storages, and with wall."""
+    """A second of a pushed walk with simulated log times, also as SQLite, and with wall times."""
     directory, found = tmp_path_factory.mktemp("runs"), {}
-    for name in ("mcap", "sqlite3", "wall"):
-        storage = "mcap" if name == "wall" else name
-        log_time = "wall" if name == "wall" else "simulated"
+    for name, log_time in (("mcap", "simulated"), ("wall", "wall")):
         process = started.command(
             *("run", "--clip", "walk", "--duration", "1", "--push=chest:200,50,0@0.3"),
-            *("--storage", storage, "--log-time", log_time),
+            *("--log-time", log_time),
             *("--output", str(directory / name)),
         )
         assert process.wait(120.0) == 0, process.stderr
         found[name] = directory / name
-    return found
+    shutil.copytree(found["mcap"], directory / "sqlite3", ignore=shutil.ignore_patterns("bag"))
+    to_sqlite(found["mcap"] / "bag", directory / "sqlite3" / "bag")
+    return {**found, "sqlite3": directory / "sqlite3"}
 
 
 def summary_of(run: Path) -> dict[str, Any]:

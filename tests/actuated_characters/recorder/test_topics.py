@@ -278,7 +278,7 @@ def test_topics_by_name_are_recorded_as_their_publishers_offer_them(
         ({"exclude": ["contcts"]}, ["'exclude'", "did you mean 'contacts'"]),
         ({"exclude": ["joint_states"]}, ["'exclude'", "'joint_states'"]),
         ({"sensors": ["pelvis_imu"]}, ["'sensors'", "'pelvis_imu'", "imu/NAME or force/NAME"]),
-        ({"storage": "tape"}, ["'storage'", "'tape'", "mcap, sqlite3"]),
+        ({"compression": "lz4"}, ["'compression'", "'lz4'", "none, zstd"]),
         ({"compression": "zip"}, ["'compression'", "'zip'", "none, zstd"]),
         ({"log_time": "sim"}, ["'log_time'", "'sim'", "wall, simulated"]),
     ],

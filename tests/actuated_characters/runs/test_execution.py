@@ -323,7 +323,7 @@ WRONG: list[tuple[str, ...]] = [  # a command, and what its error names
     (f"{IN_PROCESS} --set sim_node.mode:=realtime", "--in-process", "'mode' realtime"),
     (f"{IN_PROCESS} --set sim_node.real_time_factor:=1.0", "--in-process", "'real_time_factor'"),
     (f"{IN_PROCESS} --topic /mine", "--topic", "--in-process"),
-    (f"{PENDULUM} --storage sqlite3 --no-record", "--storage", "--no-record"),
+    (f"{PENDULUM} --compression zstd --no-record", "--compression", "--no-record"),
     (f"{PENDULUM} --exclude contcts", "'contcts'", "mean 'contacts'"),
     (f"{PENDULUM} --exclude joint_states", "'joint_states'"),
     (f"{PENDULUM} --sensor all", "--sensor", "'pendulum' has no sensors"),

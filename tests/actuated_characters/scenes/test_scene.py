@@ -77,7 +77,7 @@ def test_a_malformed_file_is_refused(tmp_path: Path, text: str, reason: str) -> 
             ["--scene", "brawl", "--set", "controller_node.opponent:=nobody"],
             "'opponent' of 'left/controller_node' is nobody, which is no other character",
         ),
-        (["--set", "recorder.storage:=mcap"], "unknown node 'recorder'"),
+        (["--set", "recorder.compression:=zstd"], "unknown node 'recorder'"),
     ],
 )
 def test_a_mistake_is_one_clear_line(

@@ -3,11 +3,9 @@
 `records` parses by the text of the MCAP specification alone.
 """
 
-import sqlite3
 import struct
 import zlib
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +29,6 @@ MAGIC = b"\x89MCAP0\r\n"
 MESSAGE, CHUNK, METADATA, FOOTER = 0x05, 0x06, 0x0C, 0x02
 SENT = [("/a", 5), ("/b", 5), ("/a", 5), ("/a", 3), ("/b", 4), ("/a", 9)]  # topic, log time in ns
 NUMBERS = [1, 1, 2, 3, 2, 4]
-EACH_STORAGE = pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 
 
 def write(path: Path, **options: str) -> Path:
@@ -170,14 +167,12 @@ def test_a_flipped_byte_anywhere_is_found_or_harmless(tmp_path: Path) -> None:
         assert read is None or not any(at in part for part in checked), f"byte {at}"
 
 
-@EACH_STORAGE
 @pytest.mark.parametrize(
     ("variable", "distro"), [(None, "jazzy"), ("", "jazzy"), ("kilted", "kilted"), ("a: b", "a: b")]
 )
 def test_metadata_and_files_name_the_distribution(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    storage: str,
     variable: str | None,
     distro: str,
 ) -> None:
@@ -185,51 +180,41 @@ def test_metadata_and_files_name_the_distribution(
     if variable is not None:
         monkeypatch.setenv("ROS_DISTRO", variable)
 
-    bag = write(tmp_path / "bag", storage=storage)
+    bag = write(tmp_path / "bag")
 
     information = yaml.safe_load((bag / "metadata.yaml").read_text())
     assert information["rosbag2_bagfile_information"]["ros_distro"] == distro
-    inside = yaml.safe_load(serialized_metadata(bag, storage))
+    inside = yaml.safe_load(serialized_metadata(bag))
     assert inside == information["rosbag2_bagfile_information"]
-    assert sorted(path.suffix for path in bag.iterdir() if "lock" not in path.name) == sorted(
-        [".mcap" if storage == "mcap" else ".db3", ".yaml"]
-    )
+    suffixes = sorted(path.suffix for path in bag.iterdir() if "lock" not in path.name)
+    assert suffixes == [".mcap", ".yaml"]
     with Reader(bag) as reader:
         assert reader.ros_distro == distro
-    if storage == "sqlite3":
-        with closing(sqlite3.connect(bag / "bag.db3")) as tables:
-            assert tables.execute("SELECT ros_distro FROM schema").fetchall() == [(distro,)]
 
 
-def serialized_metadata(bag: Path, storage: str) -> Any:
+def serialized_metadata(bag: Path) -> Any:
     """The metadata that the file itself has, by rosbag2's names."""
-    if storage == "mcap":
-        with file_of(bag).open("rb") as file:
-            (record,) = make_reader(file).iter_metadata()
-        assert record.name == "rosbag2"
-        return record.metadata["serialized_metadata"]
-    with closing(sqlite3.connect(bag / "bag.db3")) as tables:
-        ((version, text),) = tables.execute("SELECT metadata_version, metadata FROM metadata")
-    assert version == 9
-    return text
+    with file_of(bag).open("rb") as file:
+        (record,) = make_reader(file).iter_metadata()
+    assert record.name == "rosbag2"
+    return record.metadata["serialized_metadata"]
 
 
-@EACH_STORAGE
 @pytest.mark.parametrize("log_time", ["wall", "simulated"])
 @pytest.mark.parametrize("alone", [False, True], ids=["bag", "file"])
 def test_the_clock_of_the_log_times_is_known_of_a_bag_and_of_its_file_alone(
-    tmp_path: Path, storage: str, log_time: str, alone: bool
+    tmp_path: Path, log_time: str, alone: bool
 ) -> None:
-    bag = write(tmp_path / "bag", storage=storage, log_time=log_time)
+    bag = write(tmp_path / "bag", log_time=log_time)
 
     information = yaml.safe_load((bag / "metadata.yaml").read_text())
     custom = information["rosbag2_bagfile_information"]["custom_data"]
     assert custom == ({"log_time": "simulated"} if log_time == "simulated" else None)
-    place = bag / f"bag.{'mcap' if storage == 'mcap' else 'db3'}" if alone else bag
-    found = [(m.topic, m.log_time_ns, m.published_ns) for m in read_messages(place)]
+    read_from = file_of(bag) if alone else bag
+    found = [(m.topic, m.log_time_ns, m.published_ns) for m in read_messages(read_from)]
     published: list[int | None] = [t for _, t in SENT]
     if log_time == "simulated":
-        published = [1_000_000 + place if storage == "mcap" else None for place in range(len(SENT))]
+        published = [1_000_000 + place for place in range(len(SENT))]
     every = [(*sent, time) for sent, time in zip(SENT, published, strict=True)]
     assert found == sorted(every, key=lambda each: each[1])
     with AnyReader([bag]) as reader:
