@@ -28,7 +28,6 @@ from msgs_config.character.followers import check_undriven
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.parameters import resolve
 from msgs_config.plain_values import finite_numbers, plain_parameters
 from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
@@ -63,9 +62,7 @@ class Controller:
         given = plain_parameters(parameters, more)
         given = {**choose_reference(given), **given}
         self.character = placed(character, given)
-        declared = controller_parameters.PARAMETERS
-        own = controller_parameters.character_parameters(self.character, given)
-        self._values = resolve(declared + own, given)
+        self._values = controller_parameters.resolve_for(self.character, given)
         motion = make_motion(self.character, self._values)
         self.reference: Reference = motion.reference
         self.start = motion.first_state()
@@ -176,12 +173,11 @@ class Simulation:
         """
         given = plain_parameters(parameters, more)
         character = placed(character, given)
-        own = simulator_parameters.character_parameters(character)
         begins: Mapping[str, object] = _NONE
         if start is not None:
             begins = as_values(finite_state(start, character.layout.size))
         everything = {"commanded_joints": _drivable(character), **begins, **given}
-        self._values = resolve(simulator_parameters.PARAMETERS + own, everything)
+        self._values = simulator_parameters.resolve_alone(character, everything)
         self.character = character
         setup = make_character_setup(character, self._values)
         settings = make_settings(self._values)

@@ -22,7 +22,7 @@ from controller_node.references.factory import MOTION_PARAMETERS
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE, Character
 from msgs_config.messages.session import SESSION
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Parameter, Values, resolve
 from msgs_config.shared_parameters import (
     CHARACTER,
     COLLISION,
@@ -99,6 +99,15 @@ _GAINS = {  # the end of a parameter's name: the field of `Gains`, its descripti
     "d": ("damping", "damping of '{}'", "N m s/rad or N s/m"),
     "i": ("integral", "integral gain of '{}', for the law pid", "N m/(rad s) or N/(m s)"),
 }
+
+
+def resolve_for(character: Character, given: Mapping[str, object]) -> Values:
+    """The values of all parameters of a character's controller: those given, or defaults.
+
+    Raises:
+        ConfigurationError: a name or a value is wrong.
+    """
+    return resolve(PARAMETERS + character_parameters(character, given), given)
 
 
 def character_parameters(

@@ -49,6 +49,15 @@ def character_parameters(character: Character) -> list[Parameter]:
     ]
 
 
+def resolve_alone(character: Character, given: Mapping[str, object]) -> Values:
+    """The values of all parameters of a simulator of one character: those given, or defaults.
+
+    Raises:
+        ConfigurationError: a name or a value is wrong.
+    """
+    return resolve(PARAMETERS + character_parameters(character), given)
+
+
 @dataclass(frozen=True)
 class CharacterParameters:
     """One character of a simulator: its name, and all parameters as if it were alone."""
@@ -182,7 +191,7 @@ def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
         first = {p.name: given[p.name] for p in _FIRST if p.name in given}
         alone = resolve(_FIRST, first)
         character = placed(load_character(alone.text(CHARACTER.name), collides(alone)), alone)
-        values = resolve(PARAMETERS + character_parameters(character), given)
+        values = resolve_alone(character, given)
         check_given(values, given)
         FrameNames.of(values).check(character)
         character.check_driven(values.texts("commanded_joints"))

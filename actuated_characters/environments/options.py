@@ -13,7 +13,7 @@ from controller_node import parameters
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, one_of
-from msgs_config.parameters import Values, resolve
+from msgs_config.parameters import Values
 
 RENDER_MODES = ["rgb_array"]
 
@@ -59,8 +59,7 @@ def controller_values(character: Character, given: Mapping[str, object]) -> Valu
                 "because the action takes its place"
             )
     given = {**choose_reference(given), **given, **_UNAIDED}
-    own = parameters.character_parameters(character, given)
-    return resolve(parameters.PARAMETERS + own, given)
+    return parameters.resolve_for(character, given)
 
 
 def checked_action(action: FloatArray, shape: tuple[int, ...] | None) -> FloatArray:

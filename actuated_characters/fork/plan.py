@@ -28,7 +28,7 @@ from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import Value, Values, resolve
+from msgs_config.parameters import Value, Values
 from sim_node import parameters as simulator_parameters
 
 _AS_A_RUN: Mapping[str, Value] = {  # which ends with an error, rather than pause
@@ -158,8 +158,7 @@ def _run_plan(recording: Recording, ticks: int) -> RunPlan:
     timeout = simulator.number("lockstep_timeout") or _LOCKSTEP_TIMEOUT
     simulator = Values({**simulator, **_AS_A_RUN, "lockstep_timeout": timeout, "max_ticks": ticks})
     given = {**first_parameters(recording), "wait_for_subscribers": 0}
-    own = controller_parameters.character_parameters(character, given)
-    controller = resolve(controller_parameters.PARAMETERS + own, given)
+    controller = controller_parameters.resolve_for(character, given)
     check_installed(controller)
     make_motion(character, controller)  # raises where a file is not there any more
     return RunPlan(character, _RecordedMotion(recording), simulator, controller, ())

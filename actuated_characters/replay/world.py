@@ -12,10 +12,10 @@ from actuated_characters.replay.comparison import clock_of
 from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import Values, resolve
+from msgs_config.parameters import Values
 from msgs_config.versions import describe_changes, installed_versions
 from sim_node.initial_state import changed_start
-from sim_node.parameters import PARAMETERS, character_parameters
+from sim_node.parameters import resolve_alone
 from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.world import WorldSettings
@@ -64,7 +64,7 @@ def simulator_values(recording: Recording, row: int = 0) -> Values:
     recorded = recording.parameters_at(row)
     given = {name: value for name, value in recorded.items() if value is not None}
     try:
-        return resolve(PARAMETERS + character_parameters(recording.character), given)
+        return resolve_alone(recording.character, given)
     except ActuatedCharactersError as error:
         reason = f"the recording's simulator cannot be built again: {error}"
         changes = describe_changes(recording.versions, installed_versions())

@@ -17,7 +17,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.mappings import show_value
-from msgs_config.parameters import Values, resolve
+from msgs_config.parameters import Values
 from msgs_config.plain_values import as_plain, plain_parameters
 from msgs_config.shared_parameters import collides, placed
 from sim_node import parameters as simulator_parameters
@@ -139,8 +139,7 @@ def choose_reference(given: Mapping[str, object]) -> dict[str, object]:
 
 
 def _controller_values(character: Character, given: Mapping[str, object]) -> tuple[Values, Motion]:
-    own = controller_parameters.character_parameters(character, given)
-    values = resolve(controller_parameters.PARAMETERS + own, given)
+    values = controller_parameters.resolve_for(character, given)
     motion = make_motion(character, values)
     choose_behaviour(character, values)
     check_planning(character, values)
@@ -148,9 +147,7 @@ def _controller_values(character: Character, given: Mapping[str, object]) -> tup
 
 
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:
-    parameters = simulator_parameters.PARAMETERS
-    own = simulator_parameters.character_parameters(character)
-    values = resolve(parameters + own, {**RUN_DEFAULTS, **given})
+    values = simulator_parameters.resolve_alone(character, {**RUN_DEFAULTS, **given})
     values["max_ticks"] = count_ticks(duration, values.integer("rate"))
     character.check_driven(values.texts("commanded_joints"))
     return values
