@@ -35,7 +35,7 @@ from sim_node.initial_state import as_values
 from sim_node.node_settings import make_node_settings
 from sim_node.physics import simulation
 from sim_node.physics.wrenches import ExternalWrench, WrenchQueue
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 if TYPE_CHECKING:
     from sensor_msgs.msg import JointState
@@ -180,7 +180,7 @@ class Simulation:
         self._values = simulator_parameters.resolve_alone(character, everything)
         self.character = character
         setup = make_character_setup(character, self._values)
-        settings = make_settings(self._values)
+        settings = make_simulation_settings(self._values)
         self._simulation = simulation.Simulation([setup], settings)
         self._simulation.watches_contacts = watch_contacts
         self._drives_all = bool(self._simulation.characters[0].commanded.all())

@@ -13,7 +13,7 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.yardstick import yardstick_us
 from controller_node.controller import Controller
-from controller_node.parameters import make_settings as make_control
+from controller_node.parameters import make_controller_settings
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.compiled.rollout import Desired
 from controller_node.planner.contact_model import ContactModel
@@ -23,7 +23,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.messages.clock import TickClock
 from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 _RATE = 240  # Hz
 _WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
@@ -78,10 +78,10 @@ class _World:
 
     def __init__(self, plan: RunPlan) -> None:
         character = plan.character
-        settings = planner_settings.make_settings(character, plan.controller)
+        settings = planner_settings.make_planner_settings(character, plan.controller)
         assert settings is not None
         self._plan = plan
-        self._control = make_control(character, plan.controller)
+        self._control = make_controller_settings(character, plan.controller)
         self._model = ContactModel(
             character, period_s=1.0 / _RATE, gravity=9.81, friction=settings.friction
         )
@@ -135,7 +135,7 @@ class _World:
             self._plan.character, self._plan.reference, self._control, rate_hz=_RATE, gravity=9.81
         )
         setup = make_character_setup(self._plan.character, values)
-        with Simulation([setup], make_settings(values)) as simulation:
+        with Simulation([setup], make_simulation_settings(values)) as simulation:
             (simulated,) = simulation.characters
             for tick in range(_HORIZON):
                 state = replace(simulated.state, stamp_ns=clock.stamp_ns(1 + first + tick))

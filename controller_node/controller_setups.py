@@ -6,7 +6,7 @@ import numpy as np
 
 from controller_node.behaviours.factory import make_motion
 from controller_node.controller import Controller
-from controller_node.parameters import commanded_joints, make_controller, make_settings
+from controller_node.parameters import commanded_joints, make_controller, make_controller_settings
 from msgs_config.arrays import IntArray
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character
@@ -68,7 +68,7 @@ class ControllerSetups:
         Raises:
             ActuatedCharactersError: they cannot be taken.
         """
-        self.in_force.controller.check(make_settings(self._character, self._now(values)))
+        self.in_force.controller.check(make_controller_settings(self._character, self._now(values)))
         if self._coming(values) == self._coming(self.in_force.values):
             return None
         upcoming = self._find(values) or make_setup(self._character, values)
@@ -78,7 +78,7 @@ class ControllerSetups:
                 "sim_node's 'commanded_joints' lack it; set 'root_assistance' to false"
             )
         self._checked = upcoming
-        upcoming.controller.check(make_settings(self._character, values))
+        upcoming.controller.check(make_controller_settings(self._character, values))
         return upcoming
 
     def take(self, values: Values) -> None:
@@ -92,7 +92,7 @@ class ControllerSetups:
         """Set live values; where there is no new one, nothing happens that a planner notices."""
         if values != setup.values:
             setup.values = values
-            setup.controller.settings = make_settings(self._character, values)
+            setup.controller.settings = make_controller_settings(self._character, values)
 
     def _find(self, values: Values) -> ControllerSetup | None:
         """What was built already for the next episode's values."""

@@ -172,7 +172,7 @@ def make_gains(character: Character, values: Values) -> GainArrays:
     return GainArrays(**gains, effort_limits=np.array(limits))
 
 
-def make_settings(character: Character, values: Values) -> ControllerSettings:
+def make_controller_settings(character: Character, values: Values) -> ControllerSettings:
     """Law, gains and limits that the parameters' values say."""
     undriven = {*_ROOT_VECTORS, *character.layout.followers}
     strengths = [
@@ -216,7 +216,7 @@ def make_controller(character: Character, reference: Reference, values: Values) 
     return Controller(
         character,
         reference,
-        make_settings(character, values),
+        make_controller_settings(character, values),
         rate_hz=values.integer("rate"),
         gravity=values.number("gravity"),
         series=read_effort_series(character.layout, path) if path else None,

@@ -28,7 +28,7 @@ def make_simulation(parameters: SimulatorParameters) -> Simulation:
         make_character_setup(each.character, each.values, each.name)
         for each in parameters.characters
     ]
-    return Simulation(setups, make_settings(parameters.values))
+    return Simulation(setups, make_simulation_settings(parameters.values))
 
 
 def make_character_setup(character: Character, values: Values, name: str = "") -> CharacterSetup:
@@ -42,7 +42,7 @@ def make_character_setup(character: Character, values: Values, name: str = "") -
     )
 
 
-def make_settings(values: Values) -> SimulationSettings:
+def make_simulation_settings(values: Values) -> SimulationSettings:
     """The settings of the simulation that the parameters' values say.
 
     Raises:

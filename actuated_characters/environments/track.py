@@ -32,7 +32,7 @@ from actuated_characters.environments.options import (
 from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import Picture
 from controller_node.model_check import check_inertia
-from controller_node.parameters import make_settings
+from controller_node.parameters import make_controller_settings
 from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -158,7 +158,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
     ) -> Actuation:
         if action == TORQUES:
             return TorqueActuation(self._character)
-        settings = make_settings(self._character, values)
+        settings = make_controller_settings(self._character, values)
         return TargetActuation(action, self._character, settings, self._motion, model, clock)
 
     def reset(

@@ -11,7 +11,7 @@ import numpy as np
 from actuated_characters.bags.format.metadata import read_metadata
 from actuated_characters.bags.recording import Recording, find_bag, read_recordings
 from actuated_characters.fork.inputs import ForkPoint, recorded_stops
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.run_metrics import hash_of_states
 from actuated_characters.replay.comparison import clock_of
 from actuated_characters.replay.players.controller_parameters import first_parameters
 from actuated_characters.replay.world import simulator_values
@@ -27,7 +27,6 @@ from controller_node.references.factory import make_motion
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
-from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Value, Values
 from sim_node import parameters as simulator_parameters
 
@@ -91,10 +90,11 @@ def plan_fork(path: Path, at: float, inputs: ForkInputs, duration: float | None 
         _check_late_enough(kind, texts, planned, recording, row)
     node = {"row": row, "ticks": point.ticks, "later_inputs": point.with_later}
     origin, time = str(path.absolute()), row / clock_of(recording).rate_hz
+    recorded = hash_of_states(recording.stamps_ns, recording.position, recording.velocity)
     return ForkPlan(
         recording=recording,
         plan=plan,
-        origin=ForkedFrom(origin, _hash(recording), FIRST_TICK + row, time),
+        origin=ForkedFrom(origin, recorded, FIRST_TICK + row, time),
         pushes=pushes,
         throws=throws,
         repeated_throws=[throw for stop in stops for throw in stop.throws],
@@ -223,13 +223,3 @@ def _check_late_enough(
                 f"{kind} '{text}' begins at {begins / clock.rate_hz:.4g} s, before the fork at "
                 f"{row / clock.rate_hz:.4g} s; let it begin later"
             )
-
-
-def _hash(recording: Recording) -> str:
-    """The hash of all recorded states."""
-    state_hash = StateHash()
-    for stamp_ns, position, velocity in zip(
-        recording.stamps_ns.tolist(), recording.position, recording.velocity, strict=True
-    ):
-        state_hash.add(StampedState(stamp_ns, position, velocity, None))
-    return state_hash.hexdigest()

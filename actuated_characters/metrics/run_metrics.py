@@ -1,7 +1,7 @@
 """The figures of a run, measured tick by tick."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -16,7 +16,7 @@ from actuated_characters.metrics.error_measures import (
     vector_kinds,
 )
 from actuated_characters.metrics.falls import PostureReader, fall_row, is_down, tilts
-from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.layout import JointType
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
@@ -87,6 +87,18 @@ class StateHash:
     def hexdigest(self) -> str:
         """The hash of all states so far, hexadecimal."""
         return self._hash.hexdigest()
+
+
+def hash_of_states(
+    stamps_ns: IntArray, position: Iterable[FloatArray], velocity: Iterable[FloatArray]
+) -> str:
+    """The hash over states in rows, as many as there are velocities."""
+    states = StateHash()
+    for stamp_ns, position_now, velocity_now in zip(
+        stamps_ns.tolist(), position, velocity, strict=False
+    ):
+        states.add(StampedState(stamp_ns, position_now, velocity_now, None))
+    return states.hexdigest()
 
 
 class Measurement:

@@ -16,7 +16,7 @@ from msgs_config.errors import SimulationError
 from msgs_config.messages import configuration
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
-from sim_node.simulation_factory import make_settings
+from sim_node.simulation_factory import make_simulation_settings
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def verified(problem: Problem, file: Path, best: Node) -> ReconstructionMetrics:
     clock = TickClock(plan.simulator.integer("rate"))
     ends = {node.tick: node for node in best.path}
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
-    terrain = make_settings(plan.simulator).world.terrain
+    terrain = make_simulation_settings(plan.simulator).world.terrain
     measurement = Measurement(known, reader_for(plan.character, terrain))
     positions: list[FloatArray] = []
     motions: list[FloatArray] = []

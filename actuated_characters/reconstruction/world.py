@@ -15,7 +15,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import SimulationError
 from sim_node.physics.simulation import Simulation, Snapshot
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 
 @dataclass(frozen=True)
@@ -134,4 +134,4 @@ class TrialWorld:
 
     def _fresh(self) -> Simulation:
         setup = make_character_setup(self.plan.character, self.plan.simulator)
-        return Simulation([setup], make_settings(self.plan.simulator))
+        return Simulation([setup], make_simulation_settings(self.plan.simulator))

@@ -13,12 +13,11 @@ import numpy as np
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics import error_measures
 from actuated_characters.metrics.error_measures import different_bits
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.run_metrics import hash_of_states
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.projectiles import BallStates
-from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import RATE
 
@@ -123,7 +122,7 @@ def compare_world(
         states=count,
         episodes=int((together[0].episode_rows < count).sum()),
         state_hashes={
-            recording.name: _hash(recording, states)
+            recording.name: hash_of_states(recording.stamps_ns, states[POSITION], states[VELOCITY])
             for recording, states in zip(together, found, strict=True)
         },
         largest={} if tolerance is None else _largest_differences(pairs),
@@ -212,16 +211,6 @@ def _largest_differences(pairs: Sequence[tuple[Recording, States]]) -> dict[str,
                 unit = unit_of(layout, entry, quantity)
                 largest[unit] = max(size, largest.get(unit, 0.0))
     return largest
-
-
-def _hash(recording: Recording, found: States) -> str:
-    """The hash of replayed states with the recorded stamps."""
-    state_hash = StateHash()
-    for stamp_ns, position, velocity in zip(
-        recording.stamps_ns.tolist(), found[POSITION], found[VELOCITY], strict=False
-    ):
-        state_hash.add(StampedState(stamp_ns, position, velocity, None))
-    return state_hash.hexdigest()
 
 
 def compare_contacts(

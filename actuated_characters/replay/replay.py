@@ -19,12 +19,12 @@ from actuated_characters.replay.comparison import (
 )
 from actuated_characters.replay.effort_check import first_uncommanded
 from actuated_characters.replay.world import (
+    changes_of_reset,
     check_pushes,
     check_throws,
     cut_world,
     make_pushes,
     make_simulation,
-    reset_changes,
     worlds,
 )
 from msgs_config.errors import SimulationError
@@ -148,7 +148,7 @@ class _ReplayedWorld:
     def _reset(self, row: int) -> None:
         """Begin the episode whose first state is that of a row."""
         recordings = [recording for recording, _, _ in self._characters]
-        changes = reset_changes(recordings, row, self._simulation.settings.world)
+        changes = changes_of_reset(recordings, row, self._simulation.settings.world)
         if changes is None:
             self._simulation.reset()
         else:

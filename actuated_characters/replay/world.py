@@ -20,7 +20,7 @@ from sim_node.physics.simulated_character import CharacterSetup
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.world import WorldSettings
 from sim_node.physics.wrenches import ExternalWrench
-from sim_node.simulation_factory import change_world, make_character_setup, make_settings
+from sim_node.simulation_factory import change_world, make_character_setup, make_simulation_settings
 
 _GROUNDS = ("plane", "none")
 _MOST_BEHIND = 1  # states by which a recorder that is stopped may have more of one than of another
@@ -79,7 +79,7 @@ class ResetChanges:
     states: Mapping[str, StampedState]  # in which characters begin, by their names in the world
 
 
-def reset_changes(
+def changes_of_reset(
     together: Sequence[Recording], row: int, world: WorldSettings
 ) -> ResetChanges | None:
     """What the reset that led to a row has changed in a world of these settings; None: nothing.
@@ -172,7 +172,7 @@ def _settings(recording: Recording, values: Values) -> SimulationSettings:
         values = Values(values | {"terrain": "none"})
     elif values.text("terrain") not in _GROUNDS:
         raise RecordingError(f"the recording lacks its terrain, {values.text('terrain')}")
-    settings = make_settings(values)
+    settings = make_simulation_settings(values)
     world = replace(settings.world, terrain=terrain)
     return replace(settings, world=world, command_delay_ticks=0)
 

@@ -33,7 +33,7 @@ from msgs_config.runtime.ros_environment import (
     LOCALHOST,
     is_discovery_off,
 )
-from sim_node.simulation_factory import make_settings
+from sim_node.simulation_factory import make_simulation_settings
 
 _START_TIMEOUT = 120.0  # s until the first answer, on a machine that may be busy with other things
 _VIEWER_TIMEOUT = 30.0  # s until its page is there
@@ -294,7 +294,7 @@ def run_in_process(
     write_parameters(directory, "sim_node", plan.simulator)
     write_parameters(directory, "controller_node", plan.controller)
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
-    terrain = make_settings(plan.simulator).world.terrain
+    terrain = make_simulation_settings(plan.simulator).world.terrain
     measurement = Measurement(known, reader_for(plan.character, terrain))
     controller = make_controller(plan.character, plan.reference, plan.controller)
     mode = None

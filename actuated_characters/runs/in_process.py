@@ -13,7 +13,7 @@ from controller_node.parameters import make_controller
 from msgs_config.messages.clock import TickClock
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 Watch = Callable[[Simulation], object]
 """Is called with the simulation after each tick."""
@@ -40,7 +40,7 @@ def ticks_in_process(
     balls = ThrowQueue()
     for throw in throws:
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))
-    with Simulation([setup], make_settings(plan.simulator)) as simulation:
+    with Simulation([setup], make_simulation_settings(plan.simulator)) as simulation:
         simulation.watches_contacts = controller.needs_contacts
         (character,) = simulation.characters
         episode_ns = character.state.stamp_ns

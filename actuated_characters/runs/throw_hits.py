@@ -12,7 +12,7 @@ from msgs_config.arrays import FloatArray
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.sphere_sweep import BallAndCharacter
 from sim_node.physics.world import World, WorldSettings
-from sim_node.simulation_factory import make_settings
+from sim_node.simulation_factory import make_simulation_settings
 
 _LEAST_CHANGE = 1e-3  # m/s, of a ball's velocity in a tick beside that without the character
 _NEAR = 5e-3  # m between surfaces that have just touched, and half of what the ball moves in a tick
@@ -60,7 +60,7 @@ def find_hit(
     became, near a link, another one than gravity, the ground and the other balls would give it.
     `ball` is its place among the throws, which are in their order in time.
     """
-    settings = make_settings(plan.simulator)
+    settings = make_simulation_settings(plan.simulator)
     step = 1.0 / settings.rate_hz
     with World(settings.world) as alone, World(WorldSettings(ground=False)) as world:
         both = BallAndCharacter(world, plan.character, in_order[ball].throw.radius)

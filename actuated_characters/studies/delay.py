@@ -14,7 +14,7 @@ from actuated_characters.studies.framework.tracking import (
     delayed_spectral_radius,
     joint_errors,
 )
-from controller_node.parameters import make_settings
+from controller_node.parameters import make_controller_settings
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 
@@ -54,7 +54,7 @@ def _growth_by_theory(plan: RunPlan, rate: int, delay: int) -> float:
     `rate` is that of control in Hz, `delay` the ticks by which commands come late.
     """
     character = plan.character
-    gains = make_settings(character, plan.controller).gains
+    gains = make_controller_settings(character, plan.controller).gains
     model = DynamicsModel(character)
     model.update(np.array(character.rest_position), np.zeros(character.layout.size))
     return delayed_spectral_radius(

@@ -15,7 +15,7 @@ from actuated_characters.studies.framework.study import WALK, RunResult, RunSpec
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 TITLE = "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part"
 RUNS = 3
@@ -92,7 +92,7 @@ def _time_parts(walk: RunResult) -> dict[str, float]:
     controller = make_controller(plan.character, plan.reference, plan.controller)
     setup = make_character_setup(plan.character, plan.simulator)
     physics, control = [], []
-    with Simulation([setup], make_settings(plan.simulator)) as simulation:
+    with Simulation([setup], make_simulation_settings(plan.simulator)) as simulation:
         (character,) = simulation.characters
         episode_ns = character.state.stamp_ns
         for _ in range(plan.ticks):

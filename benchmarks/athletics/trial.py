@@ -19,7 +19,7 @@ from controller_node.behaviours.base import Observation
 from controller_node.behaviours.state_machine.description import Machine
 from controller_node.behaviours.state_machine.factory import kit_of
 from controller_node.behaviours.state_machine.machine import StateMachine
-from controller_node.parameters import make_settings
+from controller_node.parameters import make_controller_settings
 from controller_node.references.steering.reference import Course, SteeredReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.effort_limits import EffortLimits
@@ -34,8 +34,7 @@ from msgs_config.geometry.single_rotations import (
 )
 from msgs_config.messages.clock import TickClock
 from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup
-from sim_node.simulation_factory import make_settings as make_simulation_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def moments(trial: Trial, machine: Machine, plan: RunPlan | None = None) -> Iter
     character, rate = plan.character, trial.rate
     kit = kit_of(machine, character, plan.simulator.number("gravity"), 1.0 / rate)
     behaviour, clock = StateMachine(kit), TickClock(rate)
-    gains = make_settings(character, plan.controller).gains
+    gains = make_controller_settings(character, plan.controller).gains
     limits = EffortLimits(character.layout, gains.effort_limits)
     wrenches = push_schedule(plan, [parse_push(text, plan) for text in trial.pushes])
     still: Any = None  # of the reference's pose, which a machine does not look at

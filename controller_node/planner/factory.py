@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING
 
 from controller_node.planner.base import Planner
 from controller_node.planner.recorded import RecordedPlanner
-from controller_node.planner.settings import NO_PLANNER, RECORDED, check_planner, make_settings
+from controller_node.planner.settings import (
+    NO_PLANNER,
+    RECORDED,
+    check_planner,
+    make_planner_settings,
+)
 from controller_node.references.files.reconstructed import ReconstructedClip
 from controller_node.references.offsets import RecordedPlan
 from msgs_config.character.model import Character
@@ -28,7 +33,7 @@ def check_planning(character: Character, values: Values) -> None:
     if name == RECORDED:
         _recorded_plan(character, values)
     else:
-        make_settings(character, values)
+        make_planner_settings(character, values)
 
 
 def check_installed(values: Values) -> None:
@@ -53,7 +58,7 @@ def make_planner(character: Character, values: Values) -> Planner | None:
     if name == RECORDED:
         plan = _recorded_plan(character, values)
         return RecordedPlanner(plan, _commands_in_flight(character, values))
-    settings = make_settings(character, values)
+    settings = make_planner_settings(character, values)
     with saying_what_it_needs(name):
         from controller_node.planner.planner import PredictivePlanner
     return PredictivePlanner(

@@ -127,7 +127,7 @@ def check_planner(character: Character, values: Values) -> None:
         raise ConfigurationError(f"planner '{planner}' is for {wanted}; 'behaviour' is {behaviour}")
 
 
-def make_settings(character: Character, values: Values) -> PlannerSettings:
+def make_planner_settings(character: Character, values: Values) -> PlannerSettings:
     """The settings of planning ahead. Raises ConfigurationError if times contradict each other."""
     rate = values.integer("rate")
     period, knots = (_ticks(values, name, rate) for name in ("plan.period", "plan.knots"))

@@ -13,11 +13,11 @@ import pytest
 import actuated_characters as ac
 from actuated_characters.render.engine.renderer import Renderer
 from actuated_characters.runs.plan import make_plan
-from controller_node.parameters import make_settings
+from controller_node.parameters import make_controller_settings
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.file import shipped_characters
 from msgs_config.errors import SimulationError
-from sim_node.simulation_factory import make_settings as make_simulation_settings
+from sim_node.simulation_factory import make_simulation_settings
 from tests.support.physics import character, random_state
 
 Copied = TypeVar("Copied")
@@ -143,7 +143,7 @@ def test_settings_are_copied(duplicate: Callable[[object], object]) -> None:
     assert duplicate(plan.simulator) == plan.simulator
     settings = make_simulation_settings(plan.simulator)
     assert duplicate(settings) == settings
-    own = make_settings(plan.character, plan.controller)
+    own = make_controller_settings(plan.character, plan.controller)
     assert repr(duplicate(own)) == repr(own)
 
 

@@ -33,7 +33,7 @@ from msgs_config.shared_parameters import placed
 from sim_node.initial_state import begins_with_reference
 from sim_node.parameters import CharacterParameters, load_parameters
 from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.ros import Process, Processes, ReceivedMessages, SimulatorClient, stamp_ns
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -216,7 +216,7 @@ def ends_of(file: str, parts: Sequence[CharacterParameters]) -> dict[str, Ending
         states[part.name] = motion.first_state()
     setups = [make_character_setup(part.character, part.values, part.name) for part in parts]
     hashes = {part.name: StateHash() for part in parts}
-    with Simulation(setups, make_settings(parts[0].values)) as simulation:
+    with Simulation(setups, make_simulation_settings(parts[0].values)) as simulation:
         simulation.begin_in(states)
         begin_ns = simulation.stamp_ns
         for tick in range(TICKS + 1):

@@ -14,7 +14,7 @@ from sim_node.parameters import (
     character_parameters,
     load_parameters,
 )
-from sim_node.simulation_factory import make_settings
+from sim_node.simulation_factory import make_simulation_settings
 from sim_node.world_parameters import WORLD_PARAMETERS
 from tests.support.physics import (
     FLOATING_TURNED_FRAMES,
@@ -313,6 +313,6 @@ def test_a_terrain_that_is_not_there_or_no_sound_urdf_is_refused(
     values = load_parameters({"character": "lift", "terrain": terrain}).values
 
     with pytest.raises(CharacterError, match=why) as caught:
-        make_settings(values)
+        make_simulation_settings(values)
 
     assert "\n" not in str(caught.value)

@@ -15,7 +15,7 @@ from msgs_config.messages import configuration
 from sim_node.parameters import load_parameters
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.physics import DATA
 
 
@@ -49,7 +49,7 @@ def test_a_urdf_is_parsed_once_and_loaded_to_be_read_probed_and_simulated(
     (loaded,) = load_parameters({"character": str(file)}).characters
     sample = measure_probe(loaded.character, 9.81)
     setup = make_character_setup(loaded.character, loaded.values)
-    with Simulation([setup], make_settings(loaded.values)):
+    with Simulation([setup], make_simulation_settings(loaded.values)):
         robot_description(loaded.character)
         configuration.describe(loaded.character, loaded.values, probe=sample)
 

@@ -18,7 +18,7 @@ from msgs_config.parameters import resolve
 from msgs_config.shared_parameters import placed
 from sim_node.parameters import load_parameters
 from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def brawl_in_process(scene: Scene, ticks: int) -> Brawl:
     positions, efforts, together = [], [], []
     modes: tuple[list[str], list[str]] = ([], [])
     setups = [make_character_setup(part.character, part.values, part.name) for part in parts]
-    with Simulation(setups, make_settings(parts[0].values)) as simulation:
+    with Simulation(setups, make_simulation_settings(parts[0].values)) as simulation:
         simulation.watches_contacts = True
         simulation.begin_in(dict(zip(scene.characters, starts, strict=True)))
         begin_ns = simulation.stamp_ns

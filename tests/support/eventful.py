@@ -15,7 +15,7 @@ from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 from msgs_config.parameters import Values
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.bags import RawMessage, raw_configuration, raw_references, raw_states
 from tests.support.bags import add_timed as add_timed
 from tests.support.bags import write_timed as write_timed
@@ -80,7 +80,7 @@ def eventful_run(
     names = [link.name for link in plan.character.links]
     setup = make_character_setup(plan.character, plan.simulator)
     now = START_NS
-    with Simulation([setup], make_settings(plan.simulator)) as simulation:
+    with Simulation([setup], make_simulation_settings(plan.simulator)) as simulation:
         simulation.watches_contacts = True
         (simulated,) = simulation.characters
         episode_ns = simulated.state.stamp_ns

@@ -25,7 +25,7 @@ from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
 from sim_node.physics.wrenches import WrenchQueue
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.physics import read_wrenches
 
 
@@ -77,7 +77,7 @@ class _Run:
         plan = self._plan
         controller = make_controller(plan.character, plan.reference, plan.controller)
         setup = make_character_setup(plan.character, plan.simulator)
-        with Simulation([setup], make_settings(plan.simulator)) as simulation:
+        with Simulation([setup], make_simulation_settings(plan.simulator)) as simulation:
             simulation.watches_contacts = self._case.contacts or controller.needs_contacts
             balls = self._throw_schedule(simulation)
             schedule, (simulated,) = self._schedule(simulation), simulation.characters

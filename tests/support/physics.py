@@ -30,7 +30,11 @@ from sim_node.physics.simulated_character import CharacterSetup, SimulatedCharac
 from sim_node.physics.simulation import Simulation, SimulationSettings
 from sim_node.physics.world import World, WorldSettings
 from sim_node.physics.wrenches import ExternalWrench
-from sim_node.simulation_factory import make_character_setup, make_settings, make_simulation
+from sim_node.simulation_factory import (
+    make_character_setup,
+    make_simulation,
+    make_simulation_settings,
+)
 
 DATA = Path(__file__).parents[1] / "data"
 TURNED_FRAMES = [str(path) for path in sorted(DATA.glob("turned_frames*.yaml"))]
@@ -283,7 +287,7 @@ def simulation(name: str, **given: object) -> LoneSimulation:
     whole = character(name)
     parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
     values = resolve(parameters, given)
-    return LoneSimulation(make_character_setup(whole, values), make_settings(values))
+    return LoneSimulation(make_character_setup(whole, values), make_simulation_settings(values))
 
 
 def joint_simulation(given: Mapping[str, object]) -> Simulation:

@@ -16,7 +16,7 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.messages import topics
 from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.ros import Processes, SimulatorClient, stamp_ns, tick_of, wrench_message
 from tests.support.runs import Run, run_plan, summary_of
 
@@ -216,7 +216,7 @@ def planned_positions(plan: RunPlan, begin: int) -> list[list[float]]:
     """The positions of an episode that begins at a tick, in one process without ROS."""
     driver = make_controller(plan.character, plan.reference, plan.controller)
     setup = make_character_setup(plan.character, plan.simulator)
-    with Simulation([setup], make_settings(plan.simulator)) as run:
+    with Simulation([setup], make_simulation_settings(plan.simulator)) as run:
         while run.tick < begin:
             run.reset()
         (character,) = run.characters

@@ -25,7 +25,7 @@ from msgs_config.errors import RecordingError
 from msgs_config.messages import configuration
 from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.versions import installed_versions
-from sim_node.simulation_factory import make_settings
+from sim_node.simulation_factory import make_simulation_settings
 from tests.support.bags import (
     CONFIGURATION,
     Made,
@@ -346,7 +346,7 @@ def test_terrain_lies_in_the_recording(tmp_path: Path) -> None:
     file.write_text(SLOPE)
     made = make_run("humanoid", 0.2, WALK, terrain=str(file))
 
-    terrain = make_settings(made.plan.simulator).world.terrain
+    terrain = make_simulation_settings(made.plan.simulator).world.terrain
     text = configuration.describe(made.plan.character, made.plan.simulator, terrain=terrain)
     message = (CONFIGURATION, serialize_message(String(data=text)))
     bag = write_bag(tmp_path / "bag", [message, *made.messages()[1:]])

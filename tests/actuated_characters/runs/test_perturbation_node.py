@@ -30,7 +30,7 @@ from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.physics import character
 from tests.support.ros import Processes, SimulatorClient
 from tests.support.runs import family, run_plan
@@ -76,7 +76,7 @@ def states_without_ros(plan: RunPlan, pushes: Sequence[ExternalWrench]) -> list[
     """The states of a plan when simulation and controller are called one after the other."""
     controller = make_controller(plan.character, plan.reference, plan.controller)
     setup = make_character_setup(plan.character, plan.simulator)
-    with Simulation([setup], make_settings(plan.simulator)) as run:
+    with Simulation([setup], make_simulation_settings(plan.simulator)) as run:
         (simulated,) = run.characters
         states = [simulated.state]
         for _ in range(plan.ticks):

@@ -13,7 +13,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.physics import LoneSimulation, run_together
 from tests.support.struck import HUMANOID, LINKS, RATE_HZ, ProjectileThrow, driver, run
 
@@ -57,7 +57,7 @@ def clip_run(clip: str) -> LoneSimulation:
         },
     )
     setup = make_character_setup(HUMANOID, values)
-    simulation = LoneSimulation(setup, make_settings(values))
+    simulation = LoneSimulation(setup, make_simulation_settings(values))
     simulation.watches_contacts = True
     return simulation
 

@@ -8,7 +8,7 @@ import pytest
 
 from controller_node.control_laws import GainArrays, stable_pd_effort
 from controller_node.parameters import PARAMETERS as CONTROLLER
-from controller_node.parameters import character_parameters, make_settings
+from controller_node.parameters import character_parameters, make_controller_settings
 from controller_node.planner.compiled import linear, mass_matrix, soft_limits
 from controller_node.planner.compiled.draws import normal_draws
 from controller_node.planner.compiled.rollout import Desired, RolloutModel
@@ -39,7 +39,7 @@ def gains(**given: object) -> GainArrays:
     """The humanoid's gains with a planner."""
     named = {"planner": "predictive", **given}
     values = resolve(CONTROLLER + character_parameters(HUMANOID, named), named)
-    return make_settings(HUMANOID, values).gains
+    return make_controller_settings(HUMANOID, values).gains
 
 
 def clip(name: str) -> ClipReference:

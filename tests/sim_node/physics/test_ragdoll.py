@@ -157,10 +157,14 @@ def test_as_a_behaviour_it_has_no_effort_and_falls() -> None:
 
 
 def test_its_law_cannot_be_changed_while_it_runs() -> None:
-    from controller_node.parameters import PARAMETERS, character_parameters, make_settings
+    from controller_node.parameters import (
+        PARAMETERS,
+        character_parameters,
+        make_controller_settings,
+    )
     from msgs_config.parameters import resolve
 
     declared = PARAMETERS + character_parameters(HUMANOID)
     values = resolve(declared, {"behaviour": "ragdoll", "law": "pd"})
 
-    assert make_settings(HUMANOID, values).law == "zero"
+    assert make_controller_settings(HUMANOID, values).law == "zero"

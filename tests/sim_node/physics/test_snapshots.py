@@ -12,7 +12,7 @@ from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.state import StampedState
 from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from sim_node.world_parameters import STEADY_CONTACTS
 
 TICKS = 36
@@ -44,7 +44,8 @@ def simulation(plan: RunPlan) -> Iterator[Simulation]:
 
 def fresh(plan: RunPlan) -> Simulation:
     return Simulation(
-        [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
+        [make_character_setup(plan.character, plan.simulator)],
+        make_simulation_settings(plan.simulator),
     )
 
 

@@ -18,7 +18,7 @@ from msgs_config.parameters import Values
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import MOST_BALLS, ThrowQueue
 from sim_node.physics.world import WorldSettings
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.physics import (
     DATA,
     LoneWorld,
@@ -70,7 +70,8 @@ def walk() -> RunPlan:
 
 def fresh(plan: RunPlan) -> Simulation:
     return Simulation(
-        [make_character_setup(plan.character, plan.simulator)], make_settings(plan.simulator)
+        [make_character_setup(plan.character, plan.simulator)],
+        make_simulation_settings(plan.simulator),
     )
 
 

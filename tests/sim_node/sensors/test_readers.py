@@ -14,7 +14,7 @@ from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.sensors.link_motion import LinkKinematics
 from sim_node.sensors.readers import ForceReader, ImuReader, SensingSettings, SensorReader
-from sim_node.simulation_factory import make_character_setup, make_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.physics import (
     FLOATING_TURNED_FRAMES,
     LoneSimulation,
@@ -70,7 +70,7 @@ def of_character(whole: Character, **given: object) -> LoneSimulation:
     """A simulation of a character that is no shipped one."""
     parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
     values = resolve(parameters, given)
-    return LoneSimulation(make_character_setup(whole, values), make_settings(values))
+    return LoneSimulation(make_character_setup(whole, values), make_simulation_settings(values))
 
 
 # IMU
