@@ -20,7 +20,7 @@ endif
 # and for each worker of the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help venv demo backflip play test quick docs hashes pages other-numpy bench soak kills noise long-recording documented robots format clean distclean
+.PHONY: help venv demo backflip play test quick nightly docs hashes pages other-numpy bench soak kills noise long-recording documented robots format clean distclean
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
@@ -50,7 +50,11 @@ quick: .venv/.installed-test ## Check style and types, run the tests that are no
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow" --durations 5 --durations-min 5
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow and not nightly" --durations 5 --durations-min 5
+
+nightly: .venv/.installed-test ## What takes too long for each change: more tests, endurance, documented commands, other numpys (hours)
+	$(BIN)/python -m pytest -n auto --dist worksteal -m nightly
+	$(MAKE) soak noise kills long-recording other-numpy documented
 
 hashes: .venv/.installed-test ## Renew the golden hashes, after a change that is meant to alter states
 	$(BIN)/python -m tests.support.golden

@@ -8,7 +8,18 @@ from tests.support import golden
 
 TABLE = golden.golden()
 QUICK = {"kuka_hold", "pendulum", "walk_reconstructed"}
+NIGHTLY = {  # the others hold the same code
+    *("planned_reactive_hit", "planned_active_ragdoll_hit", "planned_steered", "planned_backflip"),
+    *("kick", "spin", "spinkick", "dance_a", "dance_b", "roll", "crawl", "punch", "getup_faceup"),
+}
 OVER_TOPICS = ["reactive_hit", "walk_480_delay", "panda_sine", "walk_reconstructed"]  # of each kind
+
+
+def marks_of(name: str) -> list[pytest.MarkDecorator]:
+    if name in NIGHTLY:
+        return [pytest.mark.nightly]
+    return [] if name in QUICK else [pytest.mark.slow]
+
 
 pytestmark = pytest.mark.skipif(not golden.HOLD_HERE, reason=golden.WHY_NOT)
 
@@ -21,7 +32,7 @@ def test_the_engines_are_those_of_the_table() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in TABLE["runs"]],
+    [pytest.param(name, marks=marks_of(name)) for name in TABLE["runs"]],
 )
 def test_a_golden_run_has_the_states_of_the_table(name: str, tmp_path: Path) -> None:
     summary = golden.summary_here(TABLE["runs"][name]["arguments"], tmp_path / "run")
@@ -30,7 +41,10 @@ def test_a_golden_run_has_the_states_of_the_table(name: str, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", OVER_TOPICS)
+@pytest.mark.parametrize(
+    "name",
+    [OVER_TOPICS[0], *(pytest.param(name, marks=pytest.mark.nightly) for name in OVER_TOPICS[1:])],
+)
 def test_over_topics_it_has_them_too(name: str, domain: int, tmp_path: Path) -> None:
     del domain
 

@@ -28,6 +28,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 RATE = 240  # Hz
 PUSHES = ("--push", "chest:300,0,0@0.5", "--push", "right_knee:100,50,0@0.55")
 THROW = ("--throw", "mass=3 speed=8 at=1 from=left target=chest")
+QUICK_PLAN = ("--set", "controller_node.plan.samples:=8", "--set", "controller_node.plan.rounds:=1")
 REACTIVE = ("--clip", "walk", "--behaviour", "reactive", "--duration", "2", *PUSHES, *THROW)
 
 
@@ -75,8 +76,9 @@ def first_different(one: Recording, other: Recording) -> int | None:
     return None
 
 
-def test_ten_forks_without_a_change_are_the_original(reactive: Path) -> None:
-    rows = np.random.default_rng(21).integers(0, 2 * RATE, 10).tolist()
+@pytest.mark.parametrize("count", [1, pytest.param(9, marks=pytest.mark.nightly)])
+def test_forks_without_a_change_are_the_original(reactive: Path, count: int) -> None:
+    rows = np.random.default_rng(count).integers(0, 2 * RATE, count).tolist()
 
     hashes = {hash_of(fork(reactive, row / RATE)) for row in rows}
 
@@ -109,7 +111,10 @@ def test_a_fork_says_where_it_comes_from(
     assert str(reactive) in (directory / "report" / "index.html").read_text()
 
 
-@pytest.mark.parametrize("at", [0, 1, 11, 36, 69, 70, 71, 101])
+NIGHTLY = [pytest.param(at, marks=pytest.mark.nightly) for at in (1, 36, 69, 71)]
+
+
+@pytest.mark.parametrize("at", [0, 11, 70, 101, *NIGHTLY])
 def test_pushes_resets_pauses_and_what_a_controller_is_asked_come_again(
     eventful: Path, at: int
 ) -> None:
@@ -121,10 +126,13 @@ def test_pushes_resets_pauses_and_what_a_controller_is_asked_come_again(
 @pytest.mark.parametrize(
     "options",
     [
-        ("--behaviour", "ragdoll"),
+        pytest.param(("--behaviour", "ragdoll"), marks=pytest.mark.nightly),
         ("--behaviour", "active_ragdoll", "--composed", "--sensor", "all"),
-        ("--planner", "predictive"),
-        ("--set", "sim_node.real_time_factor:=4", "--compression", "zstd"),
+        ("--planner", "predictive", *QUICK_PLAN),
+        pytest.param(
+            ("--set", "sim_node.real_time_factor:=4", "--compression", "zstd"),
+            marks=pytest.mark.nightly,
+        ),
         ("--exclude", "contacts", "--exclude", "odom", "--log-time", "simulated"),
     ],
     ids=" ".join,

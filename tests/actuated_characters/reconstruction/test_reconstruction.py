@@ -193,7 +193,10 @@ def kick(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Reconstruction
     return file, reconstruct(job(file))
 
 
-@pytest.mark.parametrize(("rate", "delay", "pushes"), [(240, 0, ()), (480, 1, PUSHES)])
+@pytest.mark.parametrize(
+    ("rate", "delay", "pushes"),
+    [(240, 0, ()), pytest.param(480, 1, PUSHES, marks=pytest.mark.nightly)],
+)
 def test_over_topics_it_is_what_was_found_bit_for_bit(
     domain: int, tmp_path: Path, rate: int, delay: int, pushes: tuple[str, ...]
 ) -> None:

@@ -400,7 +400,7 @@ def balance(folder: Path) -> Path:
     return folder / "balance" / "run"
 
 
-@pytest.mark.parametrize("unheard", [0, 40])
+@pytest.mark.parametrize("unheard", [pytest.param(0, marks=pytest.mark.nightly), 40])
 def test_a_controller_that_needs_sensors_is_played_their_readings(
     processes: Processes, balance: Path, tmp_path: Path, *, unheard: int
 ) -> None:

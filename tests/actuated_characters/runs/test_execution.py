@@ -390,8 +390,10 @@ def test_a_divergence_ends_the_run_with_the_simulators_own_message(
 
 # The end that it does not choose
 
+NIGHTLY, OTHERS = pytest.mark.nightly, ("sim_node", "controller_node", "composed")
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=NIGHTLY)])
 def test_a_signal_ends_it_in_seconds_and_keeps_what_was_recorded(
     processes: Processes, tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -417,7 +419,9 @@ def test_no_process_outlives_a_run_that_is_killed(processes: Processes, tmp_path
     wait_until(lambda: run.family == {}, "the end of all its processes", SECONDS)
 
 
-@pytest.mark.parametrize("node", ["sim_node", "controller_node", "composed", "recorder"])
+@pytest.mark.parametrize(
+    "node", ["recorder", *(pytest.param(name, marks=NIGHTLY) for name in OTHERS)]
+)
 def test_a_node_that_is_killed_ends_the_run_and_is_named(
     processes: Processes, tmp_path: Path, node: str
 ) -> None:

@@ -52,7 +52,7 @@ def test_a_run_over_topics_is_the_one_in_one_process_and_is_replayed_to_the_bit(
     assert again.identical and again.states == 721
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_jump_over_topics_is_the_one_in_one_process_and_flies_by_its_recorded_contacts(
     tmp_path: Path,
 ) -> None:

@@ -357,7 +357,7 @@ def test_a_state_that_comes_while_a_plan_is_sought_is_no_news(again: int) -> Non
     assert found == expected[:10] + expected[again:]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_processors_kernels_do_not_matter(tmp_path: Path) -> None:
     """Code for any x86-64 gives what code for this one gives."""
     script = "from tests.controller_node.planner import test_planner as t\nprint(t.states_of(0.1))"

@@ -418,6 +418,7 @@ def test_a_signal_amid_code_from_a_text_ends_a_node_well_too(
 
 # The command
 
+ONE_SIGNAL = [SIGNALS[0], *(pytest.param(each, marks=pytest.mark.nightly) for each in SIGNALS[1:])]
 RUN = ("run", "--character", "pendulum", "--duration", "1e6")
 
 
@@ -428,7 +429,7 @@ def assert_interrupted(run: Run) -> None:
     assert run.family == {}
 
 
-@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("number", ONE_SIGNAL)
 @pytest.mark.parametrize("stage", ["", "_multiarray_umath", "/pybullet.", "/libmujoco."])
 def test_a_signal_ends_a_run_that_is_being_planned(
     processes: Processes, tmp_path: Path, stage: str, number: signal.Signals
@@ -442,7 +443,7 @@ def test_a_signal_ends_a_run_that_is_being_planned(
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("number", ONE_SIGNAL)
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_signal_ends_a_run_whose_nodes_are_starting_and_its_domain_is_free_again(
     processes: Processes, tmp_path: Path, count: int, number: signal.Signals
@@ -458,7 +459,7 @@ def test_a_signal_ends_a_run_whose_nodes_are_starting_and_its_domain_is_free_aga
     assert [path for path in locks.rglob("*") if path.is_file()] == []
 
 
-@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("number", ONE_SIGNAL)
 def test_a_signal_ends_a_run_in_one_process(
     processes: Processes, tmp_path: Path, number: signal.Signals
 ) -> None:

@@ -80,7 +80,14 @@ def test_it_turns_and_goes_sideways() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["0.9,0,0.5", "0.6,-0.2,0", "1.2,0.3,-0.5", "-0.4,-0.3,0.5"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        *("0.9,0,0.5", "1.2,0.3,-0.5"),
+        pytest.param("0.6,-0.2,0", marks=pytest.mark.nightly),
+        pytest.param("-0.4,-0.3,0.5", marks=pytest.mark.nightly),
+    ],
+)
 def test_it_stays_upright_in_bends_and_aside(command: str) -> None:
     """Where it fell within 6 s while steps were those of a straight way."""
     positions, _, states = run(planned(8.0, f"{command}@0.5"))
