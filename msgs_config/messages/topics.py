@@ -269,6 +269,29 @@ NET_WRENCH = Topic(
         "react inside the character, so alone they give zero; a nonzero value is the root's"
     ),
 )
+JOINT_TRAJECTORY = Topic(
+    "~/joint_trajectory",
+    "trajectory_msgs/msg/JointTrajectory",
+    STREAM,
+    "any node → controller_node",
+    nodes=(CONTROLLER_NODE,),
+    accepted_on="~/active_trajectory",
+    content=(
+        "a trajectory to track from its stamp on, in place of the present reference; stamp "
+        "0: from the next answered state on. Unnamed DoF stop"
+    ),
+)
+ACTIVE_TRAJECTORY = Topic(
+    "~/active_trajectory",
+    "trajectory_msgs/msg/JointTrajectory",
+    LATCHED,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    content=(
+        "latched: the last accepted trajectory, stamped with its start; the episode's end "
+        "discards it"
+    ),
+)
 CMD_VEL = Topic(
     "cmd_vel",
     "geometry_msgs/msg/Twist",
@@ -297,29 +320,6 @@ ACTIVE_CMD_VEL = Topic(
     content=(
         "latched: each accepted velocity, within the limits, stamped with its start; a "
         "replay sends these"
-    ),
-)
-JOINT_TRAJECTORY = Topic(
-    "~/joint_trajectory",
-    "trajectory_msgs/msg/JointTrajectory",
-    STREAM,
-    "any node → controller_node",
-    nodes=(CONTROLLER_NODE,),
-    accepted_on="~/active_trajectory",
-    content=(
-        "a trajectory to track from its stamp on, in place of the present reference; stamp "
-        "0: from the next answered state on. Unnamed DoF stop"
-    ),
-)
-ACTIVE_TRAJECTORY = Topic(
-    "~/active_trajectory",
-    "trajectory_msgs/msg/JointTrajectory",
-    LATCHED,
-    "controller_node → all",
-    nodes=(CONTROLLER_NODE,),
-    content=(
-        "latched: the last accepted trajectory, stamped with its start; the episode's end "
-        "discards it"
     ),
 )
 STRENGTH = Topic(

@@ -381,7 +381,8 @@ def test_a_film_that_is_left_ends_its_processes() -> None:
 
 
 def test_a_process_that_dies_is_one_line() -> None:
-    pictures = Movie([standing("lift")], replace(HERE, fps=60, workers=2)).pictures()
+    # long enough that no process can have drawn its part before it dies
+    pictures = Movie([standing("lift", 4800)], replace(HERE, fps=60, workers=2)).pictures()
     next(pictures)
     multiprocessing.active_children()[0].kill()
 

@@ -27,6 +27,7 @@ from actuated_characters.replay.players.controller_parameters import (
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.replay.through_topics import replay_commands, replay_states
 from actuated_characters.runs.run_directory import SUMMARY, read_metrics
+from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.topics import CMD_VEL_STAMPED
 from tests.support.physics import character
@@ -427,6 +428,9 @@ def without_first_commands(bag: Path, target: Path, ticks: int) -> Path:
     return rewrite(bag, target, change)
 
 
+TRAJECTORIES = topics.JOINT_TRAJECTORY.of(topics.CONTROLLER_NODE).name
+
+
 def with_a_request(bag: Path, target: Path) -> Path:
     """A copy of a bag with a trajectory that somebody asked for, in place of the contacts."""
     requests = iter([serialize_message(JointTrajectory())])
@@ -435,10 +439,10 @@ def with_a_request(bag: Path, target: Path) -> Path:
         return next(requests, None) if message.topic == "/contacts" else message.raw
 
     def rename(name: str) -> str:
-        return f"/{REQUESTS[0].name}" if name == "/contacts" else name
+        return f"/{TRAJECTORIES}" if name == "/contacts" else name
 
     rewrite(bag, target, change, rename)
-    assert read_rare_messages(target, read_recording(target)).requested == {REQUESTS[0].name}
+    assert read_rare_messages(target, read_recording(target)).requested == {TRAJECTORIES}
     return target
 
 
