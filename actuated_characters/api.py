@@ -40,14 +40,17 @@ from sim_node.simulation_factory import make_character_setup, make_simulation_se
 if TYPE_CHECKING:
     from sensor_msgs.msg import JointState
 
-_NONE: Mapping[str, object] = MappingProxyType({})
+_NOTHING: Mapping[str, object] = MappingProxyType({})
 
 
 class Controller:
     """Inverse dynamics: the efforts that `controller_node` answers a state with."""
 
     def __init__(
-        self, character: Character, parameters: Mapping[str, object] = _NONE, **more: object
+        self,
+        character: Character,
+        parameters: Mapping[str, object] = _NOTHING,
+        **more: object,
     ) -> None:
         """Make a controller of `controller_node`'s parameters.
 
@@ -153,7 +156,7 @@ class Simulation:
         self,
         character: Character,
         start: StampedState | None = None,
-        parameters: Mapping[str, object] = _NONE,
+        parameters: Mapping[str, object] = _NOTHING,
         *,
         watch_contacts: bool = True,
         **more: object,
@@ -173,7 +176,7 @@ class Simulation:
         """
         given = plain_parameters(parameters, more)
         character = placed(character, given)
-        begins: Mapping[str, object] = _NONE
+        begins: Mapping[str, object] = _NOTHING
         if start is not None:
             begins = as_values(finite_state(start, character.layout.size))
         everything = {"commanded_joints": _drivable(character), **begins, **given}
@@ -375,8 +378,8 @@ def run(
     in_process: bool = False,
     composed: bool = False,
     overwrite: bool = False,
-    simulator: Mapping[str, object] = _NONE,
-    controller: Mapping[str, object] = _NONE,
+    simulator: Mapping[str, object] = _NOTHING,
+    controller: Mapping[str, object] = _NOTHING,
     **reference: object,
 ) -> dict[str, object]:
     """Run simulator, controller and recorder as processes over topics; returns the figures.

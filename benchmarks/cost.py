@@ -28,7 +28,7 @@ from sim_node.simulation_factory import make_simulation
 
 _CHAINS = (1, 8, 32, 100)  # hinges
 _HUMANOIDS = (1, 2, 4, 8)
-_APART = 3.0  # m between humanoids
+_SPACING = 3.0  # m between humanoids
 _WARM_UP, _TICKS = 100, 1500
 _SMALL_TURN = 0.01  # rad by which each hinge is off the vertical
 
@@ -104,7 +104,7 @@ def chain(directory: Path, hinges: int) -> dict[str, object]:
 def humanoids(count: int) -> dict[str, object]:
     """Parameters of a simulator of limp humanoids in a row."""
     names = [f"humanoid_{index}" for index in range(count)]
-    places = {f"{n}.placement": [0.0, _APART * i, 0.0, 0.0] for i, n in enumerate(names)}
+    places = {f"{n}.placement": [0.0, _SPACING * i, 0.0, 0.0] for i, n in enumerate(names)}
     return {"character": "humanoid", "characters": names, **places}
 
 

@@ -29,7 +29,7 @@ _RATE = 240  # Hz
 _WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
 _DURATION = 1.2  # s of the walk that is planned
 _MOMENTS = (0.1, 0.3, 0.5, 0.7, 0.9, 1.1)  # s of the walk from which it looks ahead
-_AHEAD = (0.1, 0.3, 0.5)  # s
+_FORESEEN_SECONDS = (0.1, 0.3, 0.5)  # s
 _CHECK = 24  # ticks, 0.1 s
 _HORIZON = 120  # ticks
 _SAMPLES = 40
@@ -57,7 +57,7 @@ def measure_planning(console: Console) -> list[Ratio]:
     for column in ("after", "median", "largest"):
         foresight.add_column(column, justify="right")
     errors = np.array([world.errors(moment) for moment in _MOMENTS])
-    for ahead, column in zip(_AHEAD, errors.T, strict=True):
+    for ahead, column in zip(_FORESEEN_SECONDS, errors.T, strict=True):
         foresight.add_row(f"{ahead:g} s", f"{np.median(column):.4f}", f"{column.max():.4f}")
     console.print(foresight)
     return ratios
@@ -102,7 +102,7 @@ class _World:
         return _SAMPLES * _HORIZON / min(durations)
 
     def errors(self, moment: float) -> FloatArray:
-        """How far the centre of mass is off that foreseen, m, after each of `_AHEAD`."""
+        """How far the centre of mass is off that foreseen, m, after each of `_FORESEEN_SECONDS`."""
         desired = self._desired(moment)
         features, sound = RolloutPool(self._model, 1).simulate(
             desired.positions[0], desired.velocities[0], self._knots[None], desired, self._body
@@ -110,7 +110,7 @@ class _World:
         assert sound.all()
         foreseen, _ = self._residual_model.balance(features[0])
         centres = list(self._centres(moment))
-        after = [round(ahead * _RATE) for ahead in _AHEAD]
+        after = [round(ahead * _RATE) for ahead in _FORESEEN_SECONDS]
         return np.array(
             [np.linalg.norm(foreseen[tick // _CHECK - 1] - centres[tick - 1]) for tick in after]
         )

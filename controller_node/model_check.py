@@ -10,9 +10,9 @@ from msgs_config.errors import CharacterError
 from msgs_config.geometry import fixed_order
 from msgs_config.messages.probe import DynamicsSample
 
-_LARGEST = 0.01  # where the two engines themselves differ by less than a millionth
+_MAX_DIFFERENCE = 0.01  # where the two engines themselves differ by less than a millionth
 _SINGULAR = 1e-6  # of all that a joint moves: the part that joints before it do not move
-_TINY = 1e-150  # keeps 0 / 0 away
+_TINY_DIVISOR = 1e-150  # keeps 0 / 0 away
 
 
 def check_inertia(model: DynamicsModel, character: Character) -> None:
@@ -40,9 +40,9 @@ def check_agreement(model: DynamicsModel, layout: JointLayout, probe: DynamicsSa
     measured = [*fixed_order.apply(mass_matrix, probe.acceleration), probe.kinetic_energy]
     expected = [*(probe.effort - model.bias_force()), model.kinetic_energy()]
     size = np.maximum(np.abs(measured), np.abs(expected))
-    differences = np.abs(np.subtract(measured, expected)) / np.maximum(size, _TINY)
+    differences = np.abs(np.subtract(measured, expected)) / np.maximum(size, _TINY_DIVISOR)
     worst = int(np.argmax(differences))  # a NaN is the largest
-    if not differences[worst] <= _LARGEST:
+    if not differences[worst] <= _MAX_DIFFERENCE:
         _check_regular(mass_matrix, layout)
         whats = [*(f"what accelerates '{name}'" for name in layout.dof_names), "kinetic energy"]
         raise CharacterError(

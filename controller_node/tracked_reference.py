@@ -17,7 +17,7 @@ from msgs_config.messages.clock import TickClock
 
 # Ticks that are sampled at once. Most of a sampling's time goes into its beginning: 64 take not
 # twice as long as 16 do, and more would be felt in the tick in which it is done.
-_TOGETHER = 64
+_BATCH_TICKS = 64
 
 TimedState: TypeAlias = tuple[float, ReferenceState]
 """A reference's state, and its time in s since the episode's first state."""
@@ -102,7 +102,7 @@ class TrackedReference:
         if self._together is None:
             time = self.time(tick)
             return [(time, self._coupled(self._reference.sample(time)))]
-        times = [self.time(each) for each in range(tick, tick + _TOGETHER)]
+        times = [self.time(each) for each in range(tick, tick + _BATCH_TICKS)]
         states = self._together.samples(times)
         if self._character.coupling:
             states = [self._coupled(state) for state in states]

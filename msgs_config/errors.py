@@ -2,7 +2,7 @@
 
 from difflib import get_close_matches
 
-_SHOWN = 200  # characters of a value
+_MAX_SHOWN = 200  # characters of a value
 
 
 class ActuatedCharactersError(Exception):
@@ -67,7 +67,7 @@ class ClosedError(ActuatedCharactersError):
 
 def one_of(what: str, value: object, choices: list[str], prefix: str = "") -> str:
     """The sentence for a name that is not among the valid ones; `prefix` leads to its place."""
-    name = str(value)[:_SHOWN]
+    name = str(value)[:_MAX_SHOWN]
     close = get_close_matches(name, choices, n=1)
     hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"unknown {what} {(prefix + name)[:_SHOWN]!r}; {hint}there are: {', '.join(choices)}"
+    return f"unknown {what} {(prefix + name)[:_MAX_SHOWN]!r}; {hint}there are: {', '.join(choices)}"

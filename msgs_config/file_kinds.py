@@ -10,7 +10,7 @@ _POINTER = b"version https://git-lfs.github.com/spec/"
 _ROS_1 = b"#ROSBAG V"
 _ROOT = re.compile(rb"<(?![?!])([A-Za-z][\w.:-]*)")
 _COMMENT = re.compile(rb"<!--.*?(-->|\Z)", re.DOTALL)
-_READ = 4096  # bytes of a file's beginning
+_READ_BYTES = 4096  # bytes of a file's beginning
 
 _CHARACTER = "a robot goes where a character does: --character"
 _SCENE = "Blender makes a .bvh of its motion, which 'motion import' reads"
@@ -96,7 +96,7 @@ def _kind(path: Path, suffixes: Collection[str]) -> tuple[str, str] | None:
         if not path.is_file():
             return None
         with path.open("rb") as file:
-            begin = file.read(_READ)
+            begin = file.read(_READ_BYTES)
     except (OSError, ValueError):  # ValueError: a NUL in the path
         return None
     suffix = path.suffix.lower()

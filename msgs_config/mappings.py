@@ -7,7 +7,7 @@ from typing import Any
 from msgs_config.errors import ActuatedCharactersError, one_of
 
 LARGEST = sys.float_info.max
-_SHOWN = 200  # characters
+_MAX_SHOWN = 200  # characters
 
 
 class MappingReader:
@@ -39,7 +39,7 @@ class MappingReader:
 
     def wrong(self, key: str, value: object, right: str) -> ActuatedCharactersError:
         """The error for a value; `right` is what it must be."""
-        name = f"{self.prefix}{key}"[:_SHOWN]
+        name = f"{self.prefix}{key}"[:_MAX_SHOWN]
         return self._error(f"{self.place}: {name} is {show_value(value)}; it must be {right}")
 
     def check_keys(self, known: Iterable[str]) -> None:
@@ -127,7 +127,7 @@ def show_value(value: object) -> str:
         return f"a {type(value).__name__}"
     if isinstance(value, int) and abs(value) > LARGEST:
         return "a number of too many digits"
-    return repr(value)[:_SHOWN]
+    return repr(value)[:_MAX_SHOWN]
 
 
 def _say_bounds(least: float, most: float) -> str:

@@ -15,7 +15,7 @@ from msgs_config.shared_parameters import PLANE
 
 GIVEN, REFERENCE = "given", "reference"
 INITIAL_STATE, POSITION, VELOCITY = "initial_state", "initial_position", "initial_velocity"
-_ROUNDING = 1e-9  # rad or m by which a position may be beyond its limits
+_LIMIT_ROUNDING = 1e-9  # rad or m by which a position may be beyond its limits
 
 
 def initial_state_parameters(character: Character) -> list[Parameter]:
@@ -78,7 +78,7 @@ def check_state(character: Character, state: StampedState, speed_limit: float) -
     `speed_limit` in rad/s or m/s is the largest velocity of a degree of freedom.
     """
     lower, upper = character.position_bounds()
-    low, high = lower - _ROUNDING, upper + _ROUNDING
+    low, high = lower - _LIMIT_ROUNDING, upper + _LIMIT_ROUNDING
 
     def first_of(wrong: BoolArray) -> int | None:
         return int(np.argmax(wrong)) if wrong.any() else None

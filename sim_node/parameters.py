@@ -22,7 +22,7 @@ from sim_node.initial_state import (
 )
 from sim_node.world_parameters import WORLD_PARAMETERS
 
-_FIRST = (CHARACTER, COLLISION, PLACEMENT)  # the others depend on them
+_NEEDED_FIRST = (CHARACTER, COLLISION, PLACEMENT)  # the others depend on them
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
 CHARACTERS = Parameter(
@@ -151,7 +151,9 @@ def load_parameters(given: Mapping[str, object]) -> SimulatorParameters:
     """
     names = _names(given)
     characters = tuple(_load_one(name, _given_to(name, names, given)) for name in names)
-    own_parameters = [[*_FIRST, *character_parameters(each.character)] for each in characters]
+    own_parameters = [
+        [*_NEEDED_FIRST, *character_parameters(each.character)] for each in characters
+    ]
     shared = {parameter.name for own in own_parameters for parameter in own}
     values = {name: value for name, value in given.items() if name not in shared}
     declared = [CHARACTERS, *WORLD_PARAMETERS]
@@ -188,8 +190,8 @@ def _given_to(name: str, names: list[str], given: Mapping[str, object]) -> dict[
 
 def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
     try:
-        first = {p.name: given[p.name] for p in _FIRST if p.name in given}
-        alone = resolve(_FIRST, first)
+        first = {p.name: given[p.name] for p in _NEEDED_FIRST if p.name in given}
+        alone = resolve(_NEEDED_FIRST, first)
         character = placed(load_character(alone.text(CHARACTER.name), collides(alone)), alone)
         values = resolve_alone(character, given)
         check_given(values, given)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import rclpy
+from hypothesis import settings
 from rclpy.context import Context
 
 from actuated_characters.runs.ros_domain import own_domain
@@ -16,6 +17,10 @@ from tests.support.ros import DDS_PROFILES, RANGE, ControllerClient, Processes, 
 os.environ[DDS_PROFILES] = str(
     Path(__file__).parents[1] / "msgs_config/runtime/fastdds_localhost.xml"
 )
+
+# On a machine that is busy with other things an example takes as long as it takes.
+settings.register_profile("any load", deadline=None)
+settings.load_profile("any load")
 
 
 def pytest_xdist_auto_num_workers() -> int:

@@ -31,7 +31,7 @@ _CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name
 _MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
 _PLAN = topics.PLAN.of(topics.CONTROLLER_NODE).name
 _REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
-_UNREADABLE = (ValueError, KeyError, TypeError, RecursionError)  # JSON of another controller
+_UNREADABLE_JSON = (ValueError, KeyError, TypeError, RecursionError)  # JSON of another controller
 _MOST_EARLY = 50_000  # messages before the configuration, which is latched and comes first
 _MOST_NAMED = 3  # gaps
 
@@ -271,7 +271,7 @@ class CharacterTimeline:
         if text == self._controller_text:  # latched, it comes to each new listener
             return
         self._controller_text = text
-        with suppress(*_UNREADABLE):
+        with suppress(*_UNREADABLE_JSON):
             content = json.loads(text)
             parameters = dict(content["parameters"])
             since_ns = content.get(SINCE)
@@ -283,7 +283,7 @@ class CharacterTimeline:
             self.plans[plan.stamp_ns] = plan
 
     def _take_mode(self, raw: bytes, published_ns: int) -> None:
-        with suppress(*_UNREADABLE):
+        with suppress(*_UNREADABLE_JSON):
             facts = dict(json.loads(decode(raw, String).data))
             change = ModeChange(int(facts.pop("stamp_ns")), str(facts.pop("mode")), facts)
             if change not in self.modes[-1:]:  # latched, it comes to each new listener

@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # they take a second to import
     from actuated_characters.render.engine.camera_pose import Size
 
 _COUNT = 8
-_MOST = 10_000  # pictures
+_MAX_PICTURES = 10_000  # pictures
 _FPS = 30
 _MOVIE = ".mp4"
 _GHOSTS = ("beside", "over", "none")
@@ -95,8 +95,8 @@ def _check(options: argparse.Namespace, is_movie: bool) -> None:
 
 def _render_strip(options: argparse.Namespace) -> None:
     times = _COUNT if options.count is None else options.count
-    if times > _MOST:
-        raise ConfigurationError(f"--count is {times}; it must be {_MOST} or less")
+    if times > _MAX_PICTURES:
+        raise ConfigurationError(f"--count is {times}; it must be {_MAX_PICTURES} or less")
     if options.times is not None:
         times = _times(options.times)
     size = None if options.size is None else _size(options.size)

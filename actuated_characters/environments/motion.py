@@ -3,7 +3,7 @@
 from controller_node.references.base import Reference, ReferenceState, SampledTogether
 from msgs_config.messages.clock import TickClock
 
-_TOGETHER = 64  # ticks that are sampled at once
+_BATCH_TICKS = 64  # ticks that are sampled at once
 _KEPT = 4  # such batches: of the past, of the present, and of what is looked ahead to
 
 
@@ -22,15 +22,15 @@ class EpisodeMotion:
 
     def at(self, tick: int) -> ReferenceState:
         """The state that is desired so many ticks after the episode's first state."""
-        number, place = divmod(tick, _TOGETHER)
+        number, place = divmod(tick, _BATCH_TICKS)
         if (batch := self._batches.get(number)) is None:
-            batch = self._batches[number] = self._sampled(number * _TOGETHER)
+            batch = self._batches[number] = self._sampled(number * _BATCH_TICKS)
             if len(self._batches) > _KEPT:
                 del self._batches[next(iter(self._batches))]
         return batch[place]
 
     def _sampled(self, first: int) -> list[ReferenceState]:
-        ticks = range(first, first + _TOGETHER)
+        ticks = range(first, first + _BATCH_TICKS)
         times = [self.start + self._clock.time_after(tick) for tick in ticks]
         if isinstance(self._reference, SampledTogether):
             return self._reference.samples(times)

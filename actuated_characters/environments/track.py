@@ -46,7 +46,7 @@ from msgs_config.shared_parameters import collides, placed
 if TYPE_CHECKING:
     from actuated_characters.environments.camera import FollowingCamera
 
-_NONE: Mapping[str, object] = MappingProxyType({})
+_NOTHING: Mapping[str, object] = MappingProxyType({})
 _POSES_IN_VIEW, _TIME_IN_VIEW = 16, 4.0  # of the reference, s, that the camera is far enough for
 
 
@@ -94,8 +94,8 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         random_start: bool = False,
         render_mode: str | None = None,
         render_size: Size = (480, 360),
-        simulator: Mapping[str, object] = _NONE,
-        controller: Mapping[str, object] = _NONE,
+        simulator: Mapping[str, object] = _NOTHING,
+        controller: Mapping[str, object] = _NOTHING,
         **reference: object,
     ) -> None:
         """Load the character and its world.

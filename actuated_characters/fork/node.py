@@ -63,10 +63,10 @@ PARAMETERS = [
     SESSION,
 ]
 
-_ACKNOWLEDGED = Duration(seconds=10)  # until a node has what it was sent
+_ACKNOWLEDGE_TIMEOUT = Duration(seconds=10)  # until a node has what it was sent
 _PACE = "real_time_factor"
 _REST = 0.01  # s between looks at the topics: one waking up for many messages
-_HELD = 1e-9  # of it: the first tick is years away, while states and their answers pass
+_HELD_PACE = 1e-9  # of it: the first tick is years away, while states and their answers pass
 
 
 class ForkNode(Node):
@@ -138,7 +138,7 @@ class ForkNode(Node):
         # no limit for the start: the command that has started all knows one
         self._wait(self._is_connected, "simulator and controller", np.inf)
         # the first tick is held by its time: a paused simulator would not repeat the first state
-        self._set(topics.SIM_NODE, {_PACE: _HELD})
+        self._set(topics.SIM_NODE, {_PACE: _HELD_PACE})
         self._send(0)
         self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
         self._states = DirectSubscription(self, topics.JOINT_STATES)  # which the simulator awaits
@@ -202,7 +202,7 @@ class ForkNode(Node):
             self._wait(partial(self._is_heard, name), f"subscribers of '{name}'")
             self._outgoing[name][0].publish(message)
         for name in dict.fromkeys(name for name, _ in messages):
-            if not self._outgoing[name][0].wait_for_all_acked(_ACKNOWLEDGED):
+            if not self._outgoing[name][0].wait_for_all_acked(_ACKNOWLEDGE_TIMEOUT):
                 raise RunError(f"what was sent on '{name}' was not acknowledged")
         if stop.resets:
             self._call("reset", Trigger.Request())

@@ -24,7 +24,7 @@ from msgs_config.geometry import rotations
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.wrenches import ExternalWrench
 
-_NEAR = 1e-4
+_MAX_RESIDUAL = 1e-4
 """rad or m from a limit at which it may act: the engine's solver is iterative."""
 
 
@@ -98,8 +98,8 @@ class EquationOfMotion:
             applied=effort,
             contact=self._generalised(contacts),
             pushed=self._generalised(self._at_centres(pushes)),
-            limited=(reached < self._lower + _NEAR)
-            | (reached > self._upper - _NEAR)
+            limited=(reached < self._lower + _MAX_RESIDUAL)
+            | (reached > self._upper - _MAX_RESIDUAL)
             | self._constrained,
         )
 

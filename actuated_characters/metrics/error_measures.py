@@ -20,7 +20,7 @@ FARTHEST = 0.6
 AT_LIMIT = 1.0 - 1e-9
 """Share of its limit from which on an effort is at the limit: it was clipped in its direction."""
 
-_EXACT = 1e-12  # m or rad: more than what conversions of rotations round
+_CONVERSION_ERROR = 1e-12  # m or rad: more than what conversions of rotations round
 _LOWEST = 0.5  # of the height of the reference's centre of mass
 _BLOCK = 8192  # rows that are worked on together, so that long recordings need no more memory
 
@@ -107,8 +107,8 @@ def follows_state(
         before: Whether each vector (b,) followed in the tick before the first.
         begins: Where (r,) an episode begins, into which nothing has moved.
     """
-    exact = errors <= _EXACT
-    follows: BoolArray = exact & (moved > _EXACT) & ~begins[:, np.newaxis]
+    exact = errors <= _CONVERSION_ERROR
+    follows: BoolArray = exact & (moved > _CONVERSION_ERROR) & ~begins[:, np.newaxis]
     resting = exact & ~follows
     if resting.any() and (before.any() or follows.any()):
         rows = range(len(follows))

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from actuated_characters.render.engine.renderer import Picture
 
 _SHARE = 15  # a caption's height is one part in so many of its picture's ...
-_LEAST = 16  # ... but not less than so many pixels
+_MIN_PIXELS = 16  # ... but not less than so many pixels
 _DPI = 72  # so that a point is a pixel
 _WHITE = 255.0
 
@@ -32,7 +32,7 @@ def write_on(picture: Picture, caption: str) -> Picture:
 
 
 def _line_height(height: int) -> int:
-    return max(_LEAST, height // _SHARE)
+    return max(_MIN_PIXELS, height // _SHARE)
 
 
 @lru_cache(maxsize=64)

@@ -16,7 +16,7 @@ from actuated_characters.render.engine.renderer import FrameSpec, Picture, Rende
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import RunError
 
-_AHEAD = 2  # frames that wait for each process, so that it never waits for the next one
+_FRAMES_AHEAD = 2  # frames that wait for each process, so that it never waits for the next one
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def draw(
             for frame in frames:
                 with _interrupts_blocked():  # which a process that is started here inherits
                     drawn.append(pool.submit(_draw_in_process, frame))
-                if len(drawn) >= _AHEAD * workers:
+                if len(drawn) >= _FRAMES_AHEAD * workers:
                     yield drawn.popleft().result()
             while drawn:
                 yield drawn.popleft().result()

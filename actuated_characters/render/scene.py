@@ -16,7 +16,7 @@ from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import PLANE
 
 _RADIUS = 0.1  # m, of a ball of which it was not recorded
-_ROUNDING = 1e-9  # s: two distances are as good as equal
+_EQUAL_DISTANCES = 1e-9  # s: two distances are as good as equal
 _SHORTEST = 0.25  # of the longest arrow: the shortest one
 _OF_STATES = (
     *("stamps_ns", "published_ns", "position", "velocity"),
@@ -204,11 +204,11 @@ def nearest_rows(times: FloatArray, wanted: FloatArray) -> IntArray:
 
     `times` are those of the states (t + 1,), in order.
     """
-    after = np.searchsorted(times, wanted - _ROUNDING).clip(1, max(len(times) - 1, 1))
+    after = np.searchsorted(times, wanted - _EQUAL_DISTANCES).clip(1, max(len(times) - 1, 1))
     if len(times) == 1:
         return np.zeros_like(after)
     before = after - 1
-    nearer = wanted - times[before] <= times[after] - wanted + _ROUNDING
+    nearer = wanted - times[before] <= times[after] - wanted + _EQUAL_DISTANCES
     rows: IntArray = np.where(nearer, before, after)
     return rows
 

@@ -9,7 +9,7 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
 _PAUSE_FACTOR = 10.0  # of the usual time between two states ...
 _LEAST_PAUSE = 0.1  # s ... and at least so long
-_OFTEN = 8  # times that a state takes long, and ...
+_MIN_REPETITIONS = 8  # times that a state takes long, and ...
 _SHARE = 0.01  # ... this share of all: that is usual then, as with a planner every few states
 _LONGEST_BACKLOG = 0.1  # s that the simulator catches up with; beyond it its schedule starts over
 
@@ -60,7 +60,7 @@ def pauses(published_ns: IntArray) -> IntArray:
         return np.zeros(0, dtype=np.intp)
     longest = max(_LEAST_PAUSE, _PAUSE_FACTOR * float(np.median(steps)))
     long = steps[steps > longest]
-    if len(long) >= max(_OFTEN, _SHARE * len(steps)):
+    if len(long) >= max(_MIN_REPETITIONS, _SHARE * len(steps)):
         longest = _PAUSE_FACTOR * float(np.median(long))
     return np.flatnonzero(steps > longest)
 

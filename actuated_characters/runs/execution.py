@@ -43,7 +43,9 @@ _SIGNS = ("waiting for ", "its type must be ")  # in a node's warning about what
 _IN_PROCESS_REPORT = 100  # ticks between reports of progress
 _TICK = "tick "  # begins the recorder's lines about its progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
-_UNMEASURED: Mapping[str, object] = {  # in one process, where no message can be lost or rejected
+_COUNTS_IN_PROCESS: Mapping[
+    str, object
+] = {  # in one process, where no message can be lost or rejected
     **dict.fromkeys(("rejected_commands", "duplicate_commands"), 0),
     **dict.fromkeys(("rejected_pushes", "rejected_throws"), 0),
     **dict.fromkeys(("missing_ticks", "dropped_references"), 0),
@@ -308,5 +310,5 @@ def run_in_process(
         if count % _IN_PROCESS_REPORT == 0:
             progress(count)
     metrics = measurement.summary(wall_time=time.perf_counter() - started)
-    summary = {"character": known.character, **metrics, **_UNMEASURED}
+    summary = {"character": known.character, **metrics, **_COUNTS_IN_PROCESS}
     write_metrics(directory, summary, measurement.series())

@@ -15,7 +15,9 @@ from sim_node.physics.world import World, WorldSettings
 from sim_node.simulation_factory import make_simulation_settings
 
 _LEAST_CHANGE = 1e-3  # m/s, of a ball's velocity in a tick beside that without the character
-_NEAR = 5e-3  # m between surfaces that have just touched, and half of what the ball moves in a tick
+_NEAR_DISTANCE = (
+    5e-3  # m between surfaces that have just touched, and half of what the ball moves in a tick
+)
 _PUT_AWAY = 100.0  # m in a tick: the end of `ball_lifetime`
 
 States: TypeAlias = list[tuple[FloatArray, FloatArray]]
@@ -77,7 +79,7 @@ def find_hit(
             if np.linalg.norm(motion[ball, 7:10] - expected[ball, 7:10]) > _LEAST_CHANGE:
                 both.put_character(position)
                 gaps = both.put_ball(centre)
-                if gaps.min() < _NEAR + 0.5 * speed * step:
+                if gaps.min() < _NEAR_DISTANCE + 0.5 * speed * step:
                     return number * step, plan.character.links[int(gaps.argmin())].name
     return None
 

@@ -24,7 +24,7 @@ _RATE = 240  # Hz
 _PUSH_TIME, _PUSH_DURATION = 1.0, 0.1  # s
 _PUSHED, _STANDING = 6.0, 60.0  # s, length of the runs
 _LINK = "chest"
-_LARGEST, _RESOLUTION = 32.0, 0.5  # N s
+_MAX_IMPULSE, _IMPULSE_RESOLUTION = 32.0, 0.5  # N s
 _STANDS = 0.8  # of the height at the beginning
 _UPRIGHT = 0.7  # cosine of the trunk's tilt
 _DIRECTIONS = {
@@ -33,7 +33,7 @@ _DIRECTIONS = {
     "left": (0.0, 1.0),
     "right": (0.0, -1.0),
 }
-_GIVEN: Mapping[str, object] = {
+_PARAMETERS: Mapping[str, object] = {
     "root_assistance": False,
     "balance.enabled": True,
     # with stiff hips the trunk could not give way
@@ -117,7 +117,7 @@ def _case(
         duration,
         reference={"reference": "keyframes", "keyframes": "humanoid_stand"},
         simulator={"rate": _RATE, "wrench_duration": _PUSH_DURATION},
-        controller={**_GIVEN, **(controller or {})},
+        controller={**_PARAMETERS, **(controller or {})},
         pushes=[plan_push(_PUSH_TIME, _RATE, _LINK, force)] if any(impulse) else [],
     )
 
@@ -130,8 +130,8 @@ def _largest_impulse(runner: StudyRunner, direction: str) -> _Limit:
         label = f"{direction}_{impulse:g}Ns"
         return runner.run(_case(label, _PUSHED, impulse=(impulse * x, impulse * y)))
 
-    low, high, strongest = 0.0, _LARGEST, None
-    while high - low > _RESOLUTION:
+    low, high, strongest = 0.0, _MAX_IMPULSE, None
+    while high - low > _IMPULSE_RESOLUTION:
         middle = 0.5 * (low + high)
         outcome = pushed(middle)
         if survives(outcome):

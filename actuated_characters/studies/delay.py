@@ -26,7 +26,7 @@ _RATES = (120, 240, 480, 960)  # Hz, of control
 _DELAYS = (0, 1, 2, 4)  # ticks
 _ENGINE_RATE = 960  # Hz; the same for all, so that nothing differs but control
 _DURATION = 3.0  # s
-_WORST, _BEST = 0.6, 0.05  # rad, the ends of the map's colours
+_MAX_ERROR, _MIN_ERROR = 0.6, 0.05  # rad, the ends of the map's colours
 
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
@@ -40,7 +40,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     failed = np.reshape(np.logical_or(result.column("diverged"), falls), shape)
     lines, grid = result.add_panels(result.name, 1, 2, (13.0, 5.5))
     _draw_lines(lines, late, errors, failed)
-    _draw_map(grid, np.where(failed, _WORST, errors), [_describe(row) for row in result.rows])
+    _draw_map(grid, np.where(failed, _MAX_ERROR, errors), [_describe(row) for row in result.rows])
     result.remarks += [
         "stable PD foresees its own period, not a late command: one tick of delay is "
         "harmless from 480 Hz on, two ticks shake the character at any rate",
@@ -99,7 +99,7 @@ def _draw_lines(axes: Axes, late: FloatArray, errors: FloatArray, failed: BoolAr
     """Errors over delays in ms, a line a rate; a cross where the walk fails."""
     for rate, times, error, has_failed in zip(_RATES, late, errors, failed, strict=True):
         (line,) = axes.plot(times[~has_failed], error[~has_failed], "o-", label=f"{rate} Hz")
-        worst = [_WORST] * has_failed.sum()
+        worst = [_MAX_ERROR] * has_failed.sum()
         (crosses,) = axes.plot(times[has_failed], worst, "x", color=line.get_color())
         crosses.set(markersize=9, markeredgewidth=2)
     axes.plot([], [], "kx", label="diverges or falls")
@@ -110,9 +110,9 @@ def _draw_lines(axes: Axes, late: FloatArray, errors: FloatArray, failed: BoolAr
 
 
 def _draw_map(axes: Axes, errors: FloatArray, texts: Sequence[str]) -> None:
-    axes.imshow(np.log(errors), cmap="viridis_r", vmin=np.log(_BEST), vmax=np.log(_WORST))
+    axes.imshow(np.log(errors), cmap="viridis_r", vmin=np.log(_MIN_ERROR), vmax=np.log(_MAX_ERROR))
     for (row, column), text in zip(np.ndindex(errors.shape), texts, strict=True):
-        color = "white" if errors[row, column] > (_WORST * _BEST) ** 0.5 else "black"
+        color = "white" if errors[row, column] > (_MAX_ERROR * _MIN_ERROR) ** 0.5 else "black"
         axes.text(column, row, text, ha="center", va="center", fontsize="small", color=color)
     axes.set_xticks(range(len(_DELAYS)), [str(delay) for delay in _DELAYS])
     axes.set_yticks(range(len(_RATES)), [str(rate) for rate in _RATES])

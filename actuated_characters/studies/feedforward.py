@@ -24,7 +24,7 @@ RUNS = 8
 
 _RATE = 240  # Hz
 _PUSH_TIME, _PUSH_DURATION, _IMPULSE = 1.0, 0.1, 0.5  # s, s, N s
-_LAST = 0.5  # s, at the end of a run
+_LAST_SECONDS = 0.5  # s, at the end of a run
 _STRIP_TIMES = (0.9, 1.2, 1.5, 1.8, 2.1, 3.0)  # s
 _TILE = (240, 260)  # pixels of a picture in the strip
 _LEAST_ERROR = 1e-5  # rad; what is shown of less
@@ -88,7 +88,7 @@ def _row(character: str, loop: str, pushed: bool, quartet: _Quartet) -> Row:
     outcome, closed = quartet[loop, pushed], quartet["closed", False].recording
     run = outcome.recording
     times, error = run.times[:-1], joint_errors(run).mean(axis=1)
-    before, last = times <= _PUSH_TIME, times > times[-1] - _LAST
+    before, last = times <= _PUSH_TIME, times > times[-1] - _LAST_SECONDS
     return {
         "character": character,
         "loop": loop,

@@ -29,7 +29,7 @@ RUNS = 9
 _ARM, _HUMANOID = "kuka", "humanoid"
 _ARM_RATES, _WALK_RATES = (120, 240, 480, 960, 1920), (240, 480, 960)  # Hz
 _ARM_LENGTH, _WALK_LENGTH = 1.2, 1.5  # s
-_EARLY = 0.2  # s, after which errors are compared; later they are as large as can be
+_COMPARED_S = 0.2  # s, after which errors are compared; later they are as large as can be
 _KEYFRAMES: Mapping[float, Mapping[str, float]] = {  # the arm's: time in s, angles in rad
     0.0: {},
     0.6: {
@@ -72,8 +72,8 @@ class _Return:
 
     @property
     def early(self) -> float:
-        """The error (rad) after `_EARLY`."""
-        return float(np.interp(_EARLY, self.times, self.error))
+        """The error (rad) after `_COMPARED_S`."""
+        return float(np.interp(_COMPARED_S, self.times, self.error))
 
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
@@ -217,7 +217,7 @@ def _add_notes(
     result.remarks += [
         "The arm has a motor for each degree of freedom: its motion comes back, but for an error "
         f"in proportion to the tick ({arms[0].early:.2g} rad at {arms[0].inverse.rate} Hz, "
-        f"{arms[-1].early:.2g} rad at {arms[-1].inverse.rate} Hz, after {_EARLY:g} s).",
+        f"{arms[-1].early:.2g} rad at {arms[-1].inverse.rate} Hz, after {_COMPARED_S:g} s).",
         f"So does the walk in the air ({whole[0].early:.2g} rad and {whole[-1].early:.2g} rad), if "
         "the root gets its force and torque, too. What error there is grows without feedback.",
         f"That force is {vertical:.0f} N upwards in the mean over a cycle; the weight is "
@@ -234,7 +234,7 @@ def _draw_errors(
         for each in returns:
             axes.semilogy(each.times[1:], each.error[1:], label=f"{each.inverse.rate} Hz")
         axes.set_ylim(1e-6, 5.0)
-        axes.axvline(_EARLY, color="grey", linewidth=0.8, linestyle=":")
+        axes.axvline(_COMPARED_S, color="grey", linewidth=0.8, linestyle=":")
         label(axes, "time (s)", "mean joint error (rad)", title, legend="lower right")
     without = "without, on the ground"
     panels[1].semilogy(joints.times[1:], joints.error[1:], color="black", label=without)
@@ -252,7 +252,12 @@ def _draw_orders(axes: Axes, families: Mapping[str, Sequence[_Return]]) -> None:
     axes.minorticks_off()
     shown = [0.5, 1.0, 2.0, 4.0, 8.0]
     axes.set_xticks(shown, [f"{tick:g}" for tick in shown])
-    label(axes, "tick (ms)", f"error after {_EARLY:g} s (rad)", "the error shrinks with the tick")
+    label(
+        axes,
+        "tick (ms)",
+        f"error after {_COMPARED_S:g} s (rad)",
+        "the error shrinks with the tick",
+    )
 
 
 def _draw_root(

@@ -24,7 +24,7 @@ _CHARACTER, _KNEE = "humanoid", "right_knee"
 _RATE, _DURATION = 240, 4.0  # Hz, s
 _SETTLED = 0.5  # s; what is before is the start
 _LONGEST_LAG = 0.4  # s
-_SHOWN = 3.0  # s
+_SHOWN_SECONDS = 3.0  # s
 _FACTORS = {  # of stiffness and damping; the lecture's two rows of three pictures
     "normal stiffness": (1.0, 1.0),
     "small stiffness": (0.1, 1.0),
@@ -141,7 +141,7 @@ def _draw(result: StudyResult, runs: _Runs) -> None:
         title = f"{name}\nlag {texts[0]}; without velocity {texts[1]}"
         label(panel, "time (s)", "right knee (rad)", title, legend=None)
         panel.title.set_fontsize("small")
-        panel.set_xlim(0.0, _SHOWN)
+        panel.set_xlim(0.0, _SHOWN_SECONDS)
         panel.set_ylim(float(reference.min()) - 0.4, 0.4)
     panels[0].plot([], [], label="theory: no inertia", **THEORY)
     panels[0].legend(loc="lower left", fontsize="x-small", ncols=2)

@@ -32,7 +32,7 @@ RUNS = 8
 
 _RATE = 1000  # Hz
 _COMPACT = Box("compact", 6.0, (0.3, 0.3, 0.3))
-_LONG = Box("long", 6.0, (1.2, 0.15, 0.15))
+_LONG_BOX = Box("long", 6.0, (1.2, 0.15, 0.15))
 _BRICK = Box("brick", 6.0, (0.6, 0.4, 0.1))
 _SPIN = (0.1, 5.0, 0.0)  # rad/s, nearly about the middle axis
 _COUPLE = (
@@ -85,7 +85,7 @@ TRIALS = (
     Trial("torque", "torque", _COMPACT, _TORQUE),
     Trial("off_centre", "force off the centre", _COMPACT, (Load(_PUSH, point=(0.0, -0.1, 0.0)),)),
     Trial("couple", "couple f, -f", _COMPACT, _COUPLE),
-    Trial("torque_long", "the same torque, long box", _LONG, _TORQUE),
+    Trial("torque_long", "the same torque, long box", _LONG_BOX, _TORQUE),
     Trial("spinning", "torque, spinning brick", _BRICK, _ABOUT_X, spin=(0.5, 1.0, 3.0)),
     Trial("middle_axis", "free spin, middle axis", _BRICK, (), 4.0, _SPIN),
     Trial("middle_axis_2000", "free spin at 2000 Hz", _BRICK, (), 4.0, _SPIN, 2 * _RATE),

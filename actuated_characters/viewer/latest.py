@@ -22,7 +22,7 @@ from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
 from msgs_config.runtime.polling import DirectSubscription
 
 _THROWS = 100  # that may come between two looks: as many as an episode can have
-_UNUSABLE = (MessageError, LayoutError)
+_UNUSABLE_MESSAGE = (MessageError, LayoutError)
 
 
 def unacknowledged(topic: Topic, depth: int = 1) -> Topic:
@@ -102,7 +102,7 @@ class CharacterReader:
             if (raw := self._states.take()) is None:
                 return False
             sample.state = state_in_layout(self._layout, self._state_decoder.decode(raw))
-        except _UNUSABLE:
+        except _UNUSABLE_MESSAGE:
             return False  # of a node that is not ours; those that use it say so
         return True
 
@@ -130,7 +130,7 @@ class BallReader:
                 released.append(self._codec.decode(raw)[1])
             raw = self._balls.take()
             return released, None if raw is None else decode_balls(raw)
-        except _UNUSABLE:
+        except _UNUSABLE_MESSAGE:
             return released, None
 
     def close(self) -> None:

@@ -13,7 +13,7 @@ from msgs_config.messages.wrenches import decode_wrenches
 from msgs_config.runtime.once_logger import OnceLogger
 from msgs_config.runtime.polling import DirectSubscription
 
-_LARGEST = 1e9  # N and N m
+_MAX_WRENCH = 1e9  # N and N m
 _MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the states waiting
 _MOST_KEPT = 5000  # ticks whose states are yet to come, as many as the queue of states holds
 
@@ -83,13 +83,13 @@ class ContactSubscription:
             return
         wrenches = np.zeros((len(self._rows), 6))
         fits = len(message.wrenches) == len(message.links)
-        if fits and (np.abs(message.wrenches) <= _LARGEST).all():  # NaN is not
+        if fits and (np.abs(message.wrenches) <= _MAX_WRENCH).all():  # NaN is not
             for link, wrench in zip(message.links, message.wrenches, strict=True):
                 if link in self._rows:
                     wrenches[self._rows[link]] += wrench
         else:
             self._once_logger.log_once(
-                f"contacts ignored: not one wrench a link, of {_LARGEST:g} N and N m at most"
+                f"contacts ignored: not one wrench a link, of {_MAX_WRENCH:g} N and N m at most"
             )
         self._wrenches[message.stamp_ns] = wrenches
         if len(self._wrenches) > _MOST_KEPT:

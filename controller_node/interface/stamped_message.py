@@ -9,7 +9,7 @@ from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.runtime.stamped_subscription import PastStampError
 
-_LARGEST = 2**25  # bytes of a message
+_MAX_BYTES = 2**25  # bytes of a message
 _LATEST_NS = 10**15  # after now
 
 
@@ -21,8 +21,8 @@ def decode_stamped(raw: bytes, message_type: type, what: str, state_ns: int) -> 
         PastStampError: its stamp is over; begins with `what`, as the next.
         MotionError: it is too long, or its stamp is too late.
     """
-    if len(raw) > _LARGEST:
-        raise MotionError(f"{what}: it has {len(raw)} bytes; it must have {_LARGEST} or fewer")
+    if len(raw) > _MAX_BYTES:
+        raise MotionError(f"{what}: it has {len(raw)} bytes; it must have {_MAX_BYTES} or fewer")
     message = decode(raw, message_type)
     stamp = message.header.stamp
     start_ns = nanoseconds(stamp) or state_ns

@@ -15,9 +15,9 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
-_FAR = 0.28  # m of the centre of mass from the reference's: it is perturbed
+_PERTURBED_AT = 0.28  # m of the centre of mass from the reference's: it is perturbed
 _FAST = 0.8  # m/s likewise; a walk that is not pushed reaches 0.63
-_HELD = 1.0  # s after which that is over; also after the reference has come to stand
+_PERTURBED_SECONDS = 1.0  # s after which that is over; also after the reference has come to stand
 _FOLLOWS_IN = 0.3  # s, time constant with which the place gives way
 _TURNS_IN = 1.0  # s, the heading
 _RETURNS_IN = 3.0  # s, both on the way back
@@ -82,10 +82,10 @@ class Anchor:
             elapsed: s since the last look.
         """
         error = state.centre - wanted.centre
-        far = _length(error) > _FAR or _length(state.velocity - wanted.velocity) > _FAST
+        far = _length(error) > _PERTURBED_AT or _length(state.velocity - wanted.velocity) > _FAST
         travels = _length(wanted.velocity) > _TRAVELS or abs(wanted.turn) > _TURNS
-        calm_from = time + _HELD if far else self.calm_from
-        settled_from = time + _HELD if travels else self.settled_from
+        calm_from = time + _PERTURBED_SECONDS if far else self.calm_from
+        settled_from = time + _PERTURBED_SECONDS if travels else self.settled_from
         anchor = replace(self, calm_from=calm_from, settled_from=settled_from)
         if anchor.is_perturbed(time) or (not travels and time < settled_from):
             anchor = anchor._followed(state, wanted, elapsed)

@@ -9,7 +9,7 @@ from msgs_config.character.model import Character
 LARGEST_NUMBER = 1e6  # rad, m, s or their quotients; more is a mistake
 SHORTEST_TIME = 1e-6  # s between two points of a motion
 
-_ROUNDING = 1e-9  # rad or m
+_LIMIT_ROUNDING = 1e-9  # rad or m
 
 
 class JointLimits:
@@ -28,7 +28,7 @@ class JointLimits:
     def excess(self, positions: FloatArray) -> FloatArray:
         """How far positions (..., n) lie beyond the limits, in rad or m; zero within."""
         beyond = np.maximum(self.lower - positions, positions - self.upper)
-        return np.where(beyond > _ROUNDING, beyond, 0.0)
+        return np.where(beyond > _LIMIT_ROUNDING, beyond, 0.0)
 
     def unit(self, index: int) -> str:
         """The unit of a degree of freedom's position."""

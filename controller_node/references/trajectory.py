@@ -18,7 +18,7 @@ from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import LayoutError, MotionError
 
-_SAME = 1e-3  # rad or m, of a first point at time 0 from where the reference is
+_SAME_POSITION = 1e-3  # rad or m, of a first point at time 0 from where the reference is
 _MOST_WAITING = 100  # trajectories
 _MOST_POINTS = 10_000
 _STOPPED = 1e-6  # rad/s or m/s
@@ -236,12 +236,12 @@ def _check_first(
     whole = knots.configurations
     first = GeneralizedPosition(whole.position[0], whole.orientations_xyzw[0])
     away = np.abs(layout.difference(now.configuration, first)[indices])
-    if away.max() > _SAME:
+    if away.max() > _SAME_POSITION:
         column = int(away.argmax())
         raise MotionError(
             f"trajectory: point 1 is at time 0, but '{points.dof_names[column]}' is "
             f"{away[column]:.3g} {unit(int(indices[column]))} away from where the reference is; "
-            f"it must be within {_SAME:g}, or come later"
+            f"it must be within {_SAME_POSITION:g}, or come later"
         )
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 
-_LONGEST = math.sqrt(3.0)  # of a vector of three entries, in its largest entry
-_ROUNDING = 1e-9
+_MAX_RATIO = math.sqrt(3.0)  # of a vector of three entries, in its largest entry
+_EPSILON = 1e-9
 
 
 class EffortLimits:
@@ -19,7 +19,7 @@ class EffortLimits:
         self.values = values
         self._layout = layout
         # (n,): where no entry is larger, no vector is too long
-        self._harmless = np.repeat(values, layout.vector_lengths) * ((1 - _ROUNDING) / _LONGEST)
+        self._harmless = np.repeat(values, layout.vector_lengths) * ((1 - _EPSILON) / _MAX_RATIO)
 
     def clipped(self, effort: FloatArray) -> FloatArray:
         """The effort (n,) as `JointLayout.clipped` has it; the same object if it is within."""

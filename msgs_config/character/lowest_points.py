@@ -10,8 +10,8 @@ from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.character.model import Character, Shape, ShapeType
 from msgs_config.geometry import fixed_order, rotations
 
-_HARMLESS = 0.05  # m; motion capture puts feet that deep into the ground
-_TOUCHING = 0.001  # m that a link which rests on the ground may be in it
+_HARMLESS_DEPTH = 0.05  # m; motion capture puts feet that deep into the ground
+_TOUCHING_DEPTH = 0.001  # m that a link which rests on the ground may be in it
 
 
 def lowest_heights(character: Character, model: DynamicsModel) -> FloatArray:
@@ -45,7 +45,7 @@ def links_in_ground(character: Character) -> dict[str, float]:
         return {}
     heights = lowest_heights(character, still_model(character, np.array(character.rest_position)))
     links = zip(character.links[1:], heights[1:].tolist(), strict=True)
-    return {link.name: -height for link, height in links if height < -_TOUCHING}
+    return {link.name: -height for link, height in links if height < -_TOUCHING_DEPTH}
 
 
 def describe_start_below_ground(character: Character, position: FloatArray) -> tuple[str, ...]:
@@ -62,7 +62,7 @@ def describe_start_below_ground(character: Character, position: FloatArray) -> t
         return ()
     heights = lowest_heights(character, still_model(character, position))
     deepest = int(np.argmin(heights))
-    if heights[deepest] >= -_HARMLESS:
+    if heights[deepest] >= -_HARMLESS_DEPTH:
         return ()
     return (
         f"it begins below the ground: link '{character.links[deepest].name}' is "

@@ -11,7 +11,7 @@ from msgs_config.geometry import frames
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 from msgs_config.mappings import MappingReader
 
-_NONE: frames.Triple = (0.0, 0.0, 0.0)
+_ZERO: frames.Triple = (0.0, 0.0, 0.0)
 _WORLD = "world"  # a frame that is there for every character
 _FARTHEST = 1e3  # m from the link's origin
 _LARGEST_ANGLE = 2.0 * math.pi  # rad; degrees are mostly more
@@ -43,10 +43,10 @@ _QUANTITIES = {
 class Noise:
     """What is added to a measured vector, per axis of the sensor, in the vector's unit."""
 
-    stddev: frames.Triple = _NONE  # of white noise, drawn at each tick
-    bias: frames.Triple = _NONE  # constant
-    bias_stddev: frames.Triple = _NONE  # of a constant bias, drawn once from the seed
-    bias_walk: frames.Triple = _NONE  # of a bias that walks, after 1 s; it grows with its root
+    stddev: frames.Triple = _ZERO  # of white noise, drawn at each tick
+    bias: frames.Triple = _ZERO  # constant
+    bias_stddev: frames.Triple = _ZERO  # of a constant bias, drawn once from the seed
+    bias_walk: frames.Triple = _ZERO  # of a bias that walks, after 1 s; it grows with its root
 
     def __bool__(self) -> bool:
         return self != Noise()
@@ -59,7 +59,7 @@ class Sensor:
     name: str
     type: SensorType
     link: str
-    position: frames.Triple = _NONE  # m
+    position: frames.Triple = _ZERO  # m
     orientation_xyzw: frames.Quaternion = IDENTITY_XYZW
     noise: dict[str, Noise] = field(default_factory=dict)
     """By the measured quantity; those without noise are left out."""

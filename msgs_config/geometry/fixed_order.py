@@ -10,7 +10,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 
-_FEW = 8  # addends, up to which whole columns are added: `accumulate` would go row by row
+_FEW_ADDENDS = 8  # addends, up to which whole columns are added: `accumulate` would go row by row
 
 _NEXT, _AFTER_NEXT = np.array((1, 2, 0)), np.array((2, 0, 1))  # of three axes, in a cycle
 
@@ -20,7 +20,7 @@ def total(values: FloatArray, axis: int = -1) -> FloatArray:
     addends = values.shape[axis]
     if not addends:
         return np.zeros(tuple(np.delete(values.shape, axis)))
-    if axis == -1 and 1 < addends <= _FEW:
+    if axis == -1 and 1 < addends <= _FEW_ADDENDS:
         columns = values[..., 0] + values[..., 1]
         for addend in range(2, addends):
             columns = columns + values[..., addend]

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
-_TINY = 1e-150  # keeps 0 / 0 away
+_TINY_DIVISOR = 1e-150  # keeps 0 / 0 away
 _SMALL_HALF = 5e-3  # rad
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -36,7 +36,7 @@ def quaternion(rotation_vector: Sequence[float]) -> Quaternion:
     """The unit quaternion of a rotation vector in rad."""
     x, y, z = rotation_vector
     half = 0.5 * math.sqrt(x * x + y * y + z * z)
-    share = 0.5 * math.sin(half) / max(half, _TINY)
+    share = 0.5 * math.sin(half) / max(half, _TINY_DIVISOR)
     return (x * share, y * share, z * share, math.cos(half))
 
 
@@ -90,10 +90,10 @@ def rotation_vector(q_xyzw: Sequence[float]) -> Triple:
     """The rotation vector in rad, of norm at most pi, of a unit quaternion."""
     x, y, z, w = q_xyzw
     sine = math.sqrt(x * x + y * y + z * z)
-    if sine > _TINY and w > 0.0:  # nearly always, and then with fewer calls
+    if sine > _TINY_DIVISOR and w > 0.0:  # nearly always, and then with fewer calls
         share = 2.0 * math.atan2(sine, w) / sine
     else:
-        share = math.copysign(2.0 * math.atan2(sine, abs(w)) / max(sine, _TINY), w)
+        share = math.copysign(2.0 * math.atan2(sine, abs(w)) / max(sine, _TINY_DIVISOR), w)
     return (x * share, y * share, z * share)
 
 

@@ -12,7 +12,9 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import elementary, fixed_order
 
 IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
-_TINY = 1e-150  # keeps 0 / 0 away; the product with a vector of length zero is zero all the same
+_TINY_DIVISOR = (
+    1e-150  # keeps 0 / 0 away; the product with a vector of length zero is zero all the same
+)
 
 _SMALL = 1e-2  # rad
 _SERIES_END = 10.0  # rad^2, just over half a turn, where 15 terms give all digits
@@ -74,7 +76,7 @@ def exp(rotation_vector: FloatArray) -> FloatArray:
     half_angle = 0.5 * _length(rotation_vector)
     q_xyzw = np.empty((*rotation_vector.shape[:-1], 4))
     q_xyzw[..., :3] = rotation_vector * (
-        0.5 * elementary.sin(half_angle) / np.maximum(half_angle, _TINY)
+        0.5 * elementary.sin(half_angle) / np.maximum(half_angle, _TINY_DIVISOR)
     )
     q_xyzw[..., 3:] = elementary.cos(half_angle)
     return q_xyzw
@@ -89,7 +91,7 @@ def log(q_xyzw: FloatArray) -> FloatArray:
     axis, w = q_xyzw[..., :3], q_xyzw[..., 3:]
     sine = _length(axis)
     angle = 2.0 * elementary.arctan2(sine, np.abs(w))
-    return axis * np.copysign(angle / np.maximum(sine, _TINY), w)
+    return axis * np.copysign(angle / np.maximum(sine, _TINY_DIVISOR), w)
 
 
 def right_jacobian_inverse(rotation_vector: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ Vector: TypeAlias = tuple[float, float, float]
 QuaternionXyzw: TypeAlias = tuple[float, float, float, float]
 
 IDENTITY: QuaternionXyzw = (0.0, 0.0, 0.0, 1.0)
-_TINY = 1e-150  # keeps 0 / 0 away
+_TINY_DIVISOR = 1e-150  # keeps 0 / 0 away
 
 
 def add(a: Vector, b: Vector) -> Vector:
@@ -81,7 +81,7 @@ def rotate(q: QuaternionXyzw, v: Vector) -> Vector:
 def exp(rotation_vector: Vector) -> QuaternionXyzw:
     """The unit quaternion of a rotation vector in rad."""
     half = 0.5 * norm(rotation_vector)
-    share = 0.5 * math.sin(half) / max(half, _TINY) if half > 0.0 else 0.5
+    share = 0.5 * math.sin(half) / max(half, _TINY_DIVISOR) if half > 0.0 else 0.5
     x, y, z = scale(share, rotation_vector)
     return (x, y, z, math.cos(half))
 

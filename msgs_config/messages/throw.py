@@ -18,7 +18,7 @@ NUMBERS = (MASS, RADIUS, *POSITION, *VELOCITY)
 
 DENSITY = 500.0  # kg/m^3, of a ball whose radius is not given: a light wood
 _BOUNDS = {MASS: (1e-3, 1e4), RADIUS: (5e-3, 5.0)}
-_FASTEST = 1000.0  # m/s
+_MAX_SPEED = 1000.0  # m/s
 _FARTHEST = 1e6  # m
 
 
@@ -43,8 +43,8 @@ class ProjectileThrow:
             if not least <= value <= most:
                 raise CommandError(f"{name} is {value:g}; it must be {least:g} to {most:g}")
         speed = float(fixed_order.norm(np.array(self.velocity)))
-        if speed > _FASTEST:
-            raise CommandError(f"its speed is {speed:g} m/s; it must be at most {_FASTEST:g} m/s")
+        if speed > _MAX_SPEED:
+            raise CommandError(f"its speed is {speed:g} m/s; it must be at most {_MAX_SPEED:g} m/s")
         if max(map(abs, self.position)) > _FARTHEST:
             raise CommandError(
                 f"its place is {self.position}; no coordinate may be beyond {_FARTHEST:g} m"

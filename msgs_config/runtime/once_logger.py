@@ -4,7 +4,7 @@ from rclpy.node import Node
 
 MOST_LOGGED = 100  # different sentences; a hostile sender must not fill the memory and the log
 UNLOGGED = "unlogged_warnings"  # the count's name in the diagnostics
-_LONGEST = 1000  # characters of a sentence, which may quote what was received
+_MAX_CHARACTERS = 1000  # characters of a sentence, which may quote what was received
 
 
 class OnceLogger:
@@ -22,8 +22,8 @@ class OnceLogger:
 
         Kinds are few, and chosen by the caller: their sentences are always logged.
         """
-        if len(sentence) > _LONGEST:
-            sentence = sentence[:_LONGEST] + " ..."
+        if len(sentence) > _MAX_CHARACTERS:
+            sentence = sentence[:_MAX_CHARACTERS] + " ..."
         logged, key = (self._kinds, kind) if kind else (self._sentences, sentence)
         if key in logged:
             return

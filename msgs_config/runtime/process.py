@@ -30,11 +30,11 @@ from msgs_config.runtime.shared_memory import remove_orphans
 EXIT_ERROR = 1
 LEAVE_TIME = 2  # s that leaving the ROS graph may take
 _FAST_DDS = "rmw_fastrtps"
-_ANYWHERE, _LOCALHOST = (
+_ANYWHERE_PROFILE, _LOCALHOST_PROFILE = (
     Path(__file__).with_name(f"{name}.xml") for name in ("fastdds", "fastdds_localhost")
 )
 _PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
-_HIDDEN = (
+_HIDDEN_WARNING = (
     f"{DISCOVERY_RANGE} is OFF: no node of another process can find this one, nor be found by it; "
     f"{LOCALHOST} lets those of this machine"
 )
@@ -188,14 +188,14 @@ def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
     Empty where the user has settings. Under LOCALHOST the file does what that range means.
     """
     given = environment.get(_PROFILES)
-    if given not in (None, str(_ANYWHERE), str(_LOCALHOST)):
+    if given not in (None, str(_ANYWHERE_PROFILE), str(_LOCALHOST_PROFILE)):
         return {}
     is_fast_dds = environment.get("RMW_IMPLEMENTATION", _FAST_DDS).startswith(_FAST_DDS)
     is_plain = not environment.get("ROS_STATIC_PEERS")
     is_plain &= environment.get("ROS_LOCALHOST_ONLY", "0") != "1"
     if environment.get(DISCOVERY_RANGE) == LOCALHOST and is_fast_dds and is_plain:
-        return {DISCOVERY_RANGE: "SYSTEM_DEFAULT", _PROFILES: str(_LOCALHOST)}
-    return {} if given is not None else {_PROFILES: str(_ANYWHERE)}
+        return {DISCOVERY_RANGE: "SYSTEM_DEFAULT", _PROFILES: str(_LOCALHOST_PROFILE)}
+    return {} if given is not None else {_PROFILES: str(_ANYWHERE_PROFILE)}
 
 
 def _start_ros(about: str) -> None:
@@ -216,7 +216,7 @@ def _start_ros(about: str) -> None:
         for file in _parameter_files(sys.argv):  # rcl takes some of them for empty ones
             refuse_other_kind(file, "a file of parameters", (".yaml", ".yml"), ConfigurationError)
         if is_discovery_off(os.environ):
-            print(f"warning: {_HIDDEN}", file=sys.stderr, flush=True)
+            print(f"warning: {_HIDDEN_WARNING}", file=sys.stderr, flush=True)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's own, of several types: a bad file or argument
         reason = " ".join(str(error).split())

@@ -27,7 +27,7 @@ _ODOMETRY_DOUBLES = 85  # position, orientation, 36 of a covariance, twist, 36 o
 _POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
 _LINEAR, _ANGULAR = slice(43, 46), slice(46, 49)
 _VARIANCES = np.concatenate((7 + 7 * np.arange(6), 49 + 7 * np.arange(6)))
-_EXACT = 1e-9  # m^2, rad^2 or their rates': a zero would mean that it is unknown
+_EXACT_VARIANCE = 1e-9  # m^2, rad^2 or their rates': a zero would mean that it is unknown
 
 
 class _WrenchPublisher(NamedTuple):
@@ -69,7 +69,7 @@ class DisplayPublishers:
             prefix + settings.frames.odom, prefix + self._joints.root
         )
         self._odometry_doubles = np.zeros(_ODOMETRY_DOUBLES)
-        self._odometry_doubles[_VARIANCES] = _EXACT
+        self._odometry_doubles[_VARIANCES] = _EXACT_VARIANCE
         x, y, z, w = self._joints.turn_xyzw.tolist()
         self._into_link = frames.conjugate((x, y, z, w))
         self._link_in_base = frames.axes((x, y, z, w))

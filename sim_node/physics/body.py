@@ -21,7 +21,7 @@ from sim_node.physics.joint_constraints import couple_joints, set_friction
 from sim_node.physics.touches import TouchedLinks, net_wrenches
 
 _QUATERNION = 4  # numbers; the engine has one for a ball joint
-_FAR = 1e3  # m, beyond which the engine need not look for what is near
+_SEARCH_DISTANCE = 1e3  # m, beyond which the engine need not look for what is near
 
 
 BaseFrame: TypeAlias = tuple[frames.Triple, frames.Quaternion, frames.Axes]
@@ -272,7 +272,7 @@ class Body:
         """
         gaps = np.full(len(self._numbers), np.inf)
         for point in pybullet.getClosestPoints(
-            self._body, other, distance=_FAR, physicsClientId=self._client
+            self._body, other, distance=_SEARCH_DISTANCE, physicsClientId=self._client
         ):
             row, distance = self._row[point[3]], point[8]
             gaps[row] = min(gaps[row], distance)

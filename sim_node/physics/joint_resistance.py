@@ -24,7 +24,7 @@ from sim_node.physics.joint_constraints import CORRECTION
 _LIMIT_CORRECTION = 0.2  # of a limit's excess in a step, as in the engine's own limits
 _MOST_TRIALS = 20
 _HEAVY = 1e9  # times a joint's own inertia: added to one that rests, which keeps it there
-_ROUNDING = 1e-9  # of a force, that may be wrong without consequence
+_FORCE_ROUNDING = 1e-9  # of a force, that may be wrong without consequence
 
 
 class JointResistance:
@@ -98,7 +98,7 @@ class JointResistance:
 
         One that a limit has stopped stays as it is: the force is the limit's.
         """
-        lets_go = rests & ~stopped & (np.abs(force) > self.friction * (1.0 + _ROUNDING))
+        lets_go = rests & ~stopped & (np.abs(force) > self.friction * (1.0 + _FORCE_ROUNDING))
         stops = (slides != 0.0) & (slides * after > 0.0) & ~stopped
         rests[:] = (rests & ~lets_go) | stops
         slides[:] = np.where(lets_go, np.copysign(self.friction, force), slides)
@@ -126,7 +126,7 @@ def _switch_limits(
     friction: FloatArray,
 ) -> bool:
     """Stop joints that go on beyond a limit, and free those that it would draw; if there are."""
-    stops = at_limit & ~stopped & (side * (after - target) < -_ROUNDING)
+    stops = at_limit & ~stopped & (side * (after - target) < -_FORCE_ROUNDING)
     frees = stopped & (side * force < -friction)
     stopped[:] = (stopped & ~frees) | stops
     return bool(stops.any() or frees.any())

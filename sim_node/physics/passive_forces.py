@@ -31,8 +31,8 @@ from sim_node.physics.joint_resistance import JointResistance
 from sim_node.physics.wrenches import ExternalWrench
 
 _MOST_PIVOTS = 50
-_EXACT = 1e-9  # rad or m, of a coupling
-_ROUNDING = 1e-12  # of a force, that may be wrong without consequence
+_COUPLING_ERROR = 1e-9  # rad or m, of a coupling
+_FORCE_ROUNDING = 1e-12  # of a force, that may be wrong without consequence
 
 
 class PassiveForces:
@@ -96,7 +96,7 @@ class PassiveForces:
         away by impulses between leaders and followers, and by what they would have moved.
         """
         moved, rate = self._coupling.violation(position), self._coupling.violation_rate(velocity)
-        if max(np.abs(moved).max(), self._step_s * np.abs(rate).max()) <= _EXACT:
+        if max(np.abs(moved).max(), self._step_s * np.abs(rate).max()) <= _COUPLING_ERROR:
             return False
         assert self._model is not None
         self._model.update(position, velocity)
@@ -216,7 +216,7 @@ def complementary_forces(bounds: Sequence[PassedBound], delassus: FloatArray) ->
                 wrong = forces[number] < 0.0
             else:
                 yielded = _dot(coupling[number], forces)
-                wrong = bound.explicit - yielded > _ROUNDING * bound.explicit
+                wrong = bound.explicit - yielded > _FORCE_ROUNDING * bound.explicit
             if wrong:
                 pushing[number] = not pushing[number]
                 break

@@ -8,7 +8,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.messages.throw import ProjectileThrow
 
-_AWAY = 10_000.0  # m along x
+_AWAY_DISTANCE = 10_000.0  # m along x
 
 
 class Projectiles:
@@ -64,7 +64,7 @@ class Projectiles:
 
         It stays a body of the engine, which goes by their order.
         """
-        self.place(ball, (_AWAY, 20.0 * ball, self.throws[ball].radius))
+        self.place(ball, (_AWAY_DISTANCE, 20.0 * ball, self.throws[ball].radius))
         pybullet.resetBaseVelocity(
             self.numbers[ball], (0.0,) * 3, (0.0,) * 3, physicsClientId=self._client
         )

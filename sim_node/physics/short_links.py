@@ -27,9 +27,9 @@ from msgs_config.parameters import Values
 from msgs_config.shared_parameters import PLANE
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
 
-_SHORT = 0.1  # m, of a pendulum that 10 m/s turn by a bound of Bullet's own at 240 Hz
+_SHORT_LENGTH = 0.1  # m, of a pendulum that 10 m/s turn by a bound of Bullet's own at 240 Hz
 _LARGEST_TURN = 100.0 / 240.0  # rad or m in an engine step
-_NAMED = 5  # joints or links in a warning
+_MAX_NAMES = 5  # joints or links in a warning
 
 
 def short_joints(character: Character) -> list[str]:
@@ -48,7 +48,7 @@ def short_joints(character: Character) -> list[str]:
         axis = fixed_order.apply(axes[0], np.array(link.joint.axis_in_child))
         across = fixed_order.cross(axis, centre - origins[0])
         moment = mass * math.sqrt(fixed_order.dot(across, across))
-        if inertia[character.layout.joint(link.joint.name).start] < _SHORT * moment:
+        if inertia[character.layout.joint(link.joint.name).start] < _SHORT_LENGTH * moment:
             short.append(link.joint.name)
     return short
 
@@ -92,5 +92,5 @@ def describe_speed_bound(character: Character, values: Values) -> tuple[str, ...
 
 def _few(items: Sequence[str]) -> str:
     """The first ones of a list, and how many more there are."""
-    more = f" and {len(items) - _NAMED} more" if len(items) > _NAMED else ""
-    return ", ".join(items[:_NAMED]) + more
+    more = f" and {len(items) - _MAX_NAMES} more" if len(items) > _MAX_NAMES else ""
+    return ", ".join(items[:_MAX_NAMES]) + more

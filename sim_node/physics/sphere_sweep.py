@@ -10,7 +10,7 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.world import World, WorldSettings
 
-_CLOSE = 1e-6  # m that count as touching
+_TOUCHING_DISTANCE = 1e-6  # m that count as touching
 _MOST_RADII = 20_000.0  # from the place where it is let go
 _LAST_STEPS = 1000  # nearer than a radius, until it touches
 
@@ -121,7 +121,7 @@ def _trace(
     left, met = distance, set[int]()
     gaps = both.put_ball(target + left * origin)
     for _ in range(_LAST_STEPS + round(distance / radius)):
-        if gaps[row] < _CLOSE:
+        if gaps[row] < _TOUCHING_DISTANCE:
             return left, met - {row}
         left -= min(gaps[row], radius)  # or it would jump over what is in the way
         gaps = both.put_ball(target + left * origin)

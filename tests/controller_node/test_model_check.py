@@ -123,7 +123,7 @@ def test_what_cannot_be_moved_is_refused_with_the_reason(tmp_path: Path, case: s
 def test_every_character_agrees_a_hundred_times_better_than_it_must(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("controller_node.model_check._LARGEST", 1e-4)
+    monkeypatch.setattr("controller_node.model_check._MAX_DIFFERENCE", 1e-4)
 
     check(character(name), measure_probe(character(name), GRAVITY))
 

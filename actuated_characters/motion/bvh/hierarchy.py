@@ -14,13 +14,13 @@ Offset3 = tuple[float, float, float]
 LARGEST = 1e9
 """Of any number in a file; a rotation may be of many turns."""
 _MOST_JOINTS = 1024
-_SHOWN = 60  # characters of a line
+_MAX_SHOWN = 60  # characters of a line
 _CHANNEL_NAMES = {name.lower(): name for name in CHANNELS}
 
 
 def wrong_line(path: Path, number: int, found: str, right: str) -> ClipError:
     """The error for a line by its number: what is there, and what must be."""
-    shown = "the end of the file" if not found else repr(found[:_SHOWN])
+    shown = "the end of the file" if not found else repr(found[:_MAX_SHOWN])
     return ClipError(f"{path}, line {number}: {shown}; there must be {right}")
 
 

@@ -15,9 +15,9 @@ from msgs_config.errors import ClipError
 from msgs_config.geometry import fixed_order, rotations
 
 _SHORTEST = 0.2  # s of a cycle
-_AHEAD = 0.1  # s over which two moments are compared
+_COMPARED_SECONDS = 0.1  # s over which two moments are compared
 _SPEEDS = (0.05, 20.0)
-_ROUNDING = 1e-9  # s
+_EPSILON = 1e-9  # s
 
 
 def trim(clip: MotionClip, start: float, end: float | None = None) -> MotionClip:
@@ -27,7 +27,7 @@ def trim(clip: MotionClip, start: float, end: float | None = None) -> MotionClip
         ClipError: a time is outside of the clip, or there are fewer than two frames between.
     """
     end = clip.duration if end is None else end
-    rows = np.flatnonzero((clip.times >= start - _ROUNDING) & (clip.times <= end + _ROUNDING))
+    rows = np.flatnonzero((clip.times >= start - _EPSILON) & (clip.times <= end + _EPSILON))
     if len(rows) < 2:
         raise ClipError(
             f"from {start:g} s to {end:g} s there are {len(rows)} frames of a clip of "
@@ -137,7 +137,7 @@ def _check_times(clip: MotionClip, start: float | None, end: float | None) -> No
     """Raise ClipError if a time in s is not within a clip."""
     latest = clip.duration + 0.5 / clip.rate  # so a duration that was rounded for display will do
     for time in (start, end):
-        if time is not None and not -_ROUNDING <= time <= latest:
+        if time is not None and not -_EPSILON <= time <= latest:
             goes_on = ", and begins again there" if clip.wraps else ""
             raise ClipError(
                 f"{time:g} s is not within the clip, which lasts {clip.duration:.3f} s{goes_on}"
@@ -179,7 +179,7 @@ def _cycle(clip: MotionClip, start: float | None, end: float | None) -> tuple[in
     features = _features(clip)
     best, found = np.inf, None
     for first in firsts.tolist():
-        allowed = lasts[clip.times[lasts] - clip.times[first] >= least - _ROUNDING]
+        allowed = lasts[clip.times[lasts] - clip.times[first] >= least - _EPSILON]
         if len(allowed):
             distances = np.square(features[allowed] - features[first]).sum(axis=1)
             nearest = int(np.argmin(distances))
@@ -196,7 +196,7 @@ def _features(clip: MotionClip) -> FloatArray:
     """What two moments have in common that are alike (f, m): pose and velocity, without place."""
     layout = clip.character.layout
     now = clip.motion
-    ahead = _samples(clip, np.minimum(clip.times + _AHEAD, clip.duration))
+    ahead = _samples(clip, np.minimum(clip.times + _COMPARED_SECONDS, clip.duration))
     turns = now.orientations_xyzw.copy()
     velocity = layout.difference(now, ahead)
     positions = now.position.copy()

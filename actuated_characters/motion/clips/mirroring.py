@@ -15,7 +15,7 @@ from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
 _WORDS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l_", "r_"), ("_l", "_r"))
-_CLOSE = 0.01  # m, and of axes
+_MAX_MIRROR_ERROR = 0.01  # m, and of axes
 
 
 def mirrored_motion(clip: MotionClip) -> GeneralizedPosition:
@@ -49,7 +49,7 @@ def mirrored_motion(clip: MotionClip) -> GeneralizedPosition:
                 turns[image], np.array(character.links[image].joint.axis_in_child)
             )
             along = float(image_axis * np.array((-1.0, 1.0, -1.0)) @ axis)
-            if abs(abs(along) - 1.0) > _CLOSE:
+            if abs(abs(along) - 1.0) > _MAX_MIRROR_ERROR:
                 raise _unequal(character, joint.name)
             positions[:, joint.start] = np.sign(along) * clip.motion.position[:, other.start]
     if layout.has_floating_base:
@@ -76,7 +76,7 @@ def _at_rest(character: Character) -> tuple[FloatArray, FloatArray]:
 
 
 def _is_image(point: FloatArray, other: FloatArray) -> bool:
-    return bool(np.abs(point * np.array((1.0, -1.0, 1.0)) - other).max() < _CLOSE)
+    return bool(np.abs(point * np.array((1.0, -1.0, 1.0)) - other).max() < _MAX_MIRROR_ERROR)
 
 
 def _counterpart(character: Character, name: str) -> str:

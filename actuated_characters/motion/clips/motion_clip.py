@@ -19,7 +19,7 @@ from msgs_config.errors import ClipError
 
 SOURCE, CONTACTS, QUALITY = "Source", "Contacts", "Quality"
 _FIGURES = ("_m", "_m_s", "_rad", "_rad_s")  # names of figures end in their units
-_ROUNDING = 1e-6  # s
+_EPSILON = 1e-6  # s
 
 Spans = tuple[tuple[float, float], ...]
 """Times in s from when to when."""
@@ -53,7 +53,7 @@ class MotionClip:
         """The frames (f,) in which a point touches the ground."""
         touches = np.zeros(len(self.times), dtype=np.bool_)
         for start, end in self.contacts.get(point, ()):
-            touches |= (self.times >= start - _ROUNDING) & (self.times <= end + _ROUNDING)
+            touches |= (self.times >= start - _EPSILON) & (self.times <= end + _EPSILON)
         return touches
 
     def edited(self, how: str, **changes: Any) -> "MotionClip":

@@ -26,7 +26,7 @@ _CHARACTER = "humanoid"
 _CLIP_SUFFIXES = (".txt", ".json")
 _HIGHEST_RATE = 60.0  # Hz, at which a recording is sampled unless told
 _UNEQUAL = 0.05  # part of a frame's duration by which another may differ
-_AWAY = 1000.0  # m: a ball farther away has been taken out of the way
+_AWAY_DISTANCE = 1000.0  # m: a ball farther away has been taken out of the way
 
 
 def read_source(
@@ -116,7 +116,7 @@ def _balls(scene: Scene) -> Iterator[BallTrajectory]:
         poses = np.full((len(names), len(states), 7), np.nan)
         for row, each in known.items():
             poses[[names.index(name) for name in each.names], row] = each.motion[:, :7]
-        poses[np.linalg.norm(poses[..., :3], axis=-1) > _AWAY] = np.nan
+        poses[np.linalg.norm(poses[..., :3], axis=-1) > _AWAY_DISTANCE] = np.nan
         prefix = f"episode_{number}_" if len(ends) > 2 else ""
         for name, radius, pose in zip(names, radii, poses, strict=True):
             yield BallTrajectory(prefix + name, radius, pose[:, :3], pose[:, 3:])

@@ -15,7 +15,7 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
 
 _MOST_FRAMES = 100_000
-_ROUNDING = 1e-6  # of a step: the last frame is not lost to it
+_STEP_ROUNDING = 1e-6  # of a step: the last frame is not lost to it
 
 Progress = Callable[[int], None]
 """Is told how many frames there are so far."""
@@ -72,11 +72,11 @@ class Trajectories:
         end, rate = last if end is None else end, self.rate if rate is None else rate
         if not 0.0 < rate < np.inf:
             raise ConfigurationError(f"{rate:g} frames a second; it must be positive and finite")
-        if not 0.0 <= start <= end <= last + _ROUNDING:
+        if not 0.0 <= start <= end <= last + _STEP_ROUNDING:
             raise ConfigurationError(
                 f"from {start:g} s to {end:g} s is not in the motion, which lasts {last:g} s"
             )
-        count = (end - start) * rate + _ROUNDING
+        count = (end - start) * rate + _STEP_ROUNDING
         if count >= _MOST_FRAMES:
             raise ConfigurationError(
                 f"there would be {count:.0f} frames; it must be {_MOST_FRAMES} or fewer: choose a "

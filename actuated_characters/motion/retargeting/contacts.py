@@ -10,8 +10,8 @@ from msgs_config.arrays import BoolArray, FloatArray
 _ENTER, _LEAVE = ((0.022, 0.20), (0.05, 0.10)), ((0.035, 0.40), (0.06, 0.15))
 """Heights in m below which, and speeds in m/s below which a point touches; either pair will do."""
 _SMOOTHED = 0.05  # s over which a speed is measured
-_LEAST, _GAP = 0.06, 0.05  # s of a contact, and of a break that is none
-_STILL = 0.05  # m from the middle of a contact, that a point may be during it
+_MIN_CONTACT, _MAX_GAP = 0.06, 0.05  # s of a contact, and of a break that is none
+_STILL_DISTANCE = 0.05  # m from the middle of a contact, that a point may be during it
 _SMOOTHED_PLACES = 0.08  # s over which places are averaged before
 _GROUND = 2.0  # per cent of the heights of a joint that may be below its height on the ground
 
@@ -79,7 +79,7 @@ def _still_part(contact: Contact, positions: FloatArray) -> Contact:
     while last > first:
         places = positions[first : last + 1, :2]
         away = np.linalg.norm(places - places.mean(axis=0), axis=-1)
-        if max(away[0], away[-1]) <= _STILL:
+        if max(away[0], away[-1]) <= _STILL_DISTANCE:
             break
         if away[0] > away[-1]:
             first += 1
@@ -92,7 +92,7 @@ def joined(touches: BoolArray, frame_time: float) -> tuple[Contact, ...]:
     """The contacts of frames (f,) that touch; short breaks closed, and short contacts left out."""
     merged: list[tuple[int, int]] = []
     for first, last in ((first, end - 1) for first, end in spans(touches)):
-        if merged and (first - merged[-1][1] - 1) * frame_time < _GAP:
+        if merged and (first - merged[-1][1] - 1) * frame_time < _MAX_GAP:
             merged[-1] = (merged[-1][0], last)
         else:
             merged.append((first, last))
@@ -107,7 +107,7 @@ def spans(chosen: BoolArray) -> list[tuple[int, int]]:
 
 
 def _least_frames(frame_time: float) -> int:
-    return max(2, round(_LEAST / frame_time))
+    return max(2, round(_MIN_CONTACT / frame_time))
 
 
 def mask(contacts: tuple[Contact, ...], frames: int) -> BoolArray:

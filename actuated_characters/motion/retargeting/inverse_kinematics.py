@@ -23,10 +23,12 @@ _DAMPING = 1e-2  # added to each block at least: the coordinates that no residua
 _STIFFENED, _EASED, _MOST_DAMPING = 8.0, 4.0, 1e6  # times, after a step that failed or did well
 _FIXED = 1e12  # added where frames are fixed
 _LARGEST_STEP = 0.4  # rad or m
-_ENOUGH = 3e-4  # rad or m of the largest step, at which an iteration ends
+_LAST_STEP = 3e-4  # rad or m of the largest step, at which an iteration ends
 _ACTIVE_SETS = 5  # solutions of a step, between which bounds come and go
 _WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and of these solved again
-_NEAR = 0.2  # m between two shapes at first, beyond which a solution does not bring them together
+_NEAR_DISTANCE = (
+    0.2  # m between two shapes at first, beyond which a solution does not bring them together
+)
 _LOWEST = 40  # points of the surface a frame that are kept over the ground, the lowest ones
 _NEAREST = 8  # pairs of shapes a frame that are kept apart, the nearest ones
 
@@ -116,7 +118,7 @@ class InverseKinematics:
                 now, damping = then, max(damping / _EASED, _DAMPING)
             else:
                 damping *= _STIFFENED
-            if float(largest.max()) < _ENOUGH or damping > _MOST_DAMPING:
+            if float(largest.max()) < _LAST_STEP or damping > _MOST_DAMPING:
                 break
         return now.motion
 
@@ -202,7 +204,7 @@ class InverseKinematics:
             self._model.update(position, still)
             origins[frame], axes[frame] = self._model.link_frames(links)
         distance = capsules.nearest(origins, axes).distance
-        return capsules.of_pairs(np.flatnonzero((distance < _NEAR).any(axis=0)))
+        return capsules.of_pairs(np.flatnonzero((distance < _NEAR_DISTANCE).any(axis=0)))
 
     def _turns(
         self, goals: Goals, axes: FloatArray, jacobians: FloatArray

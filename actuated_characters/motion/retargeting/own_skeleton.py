@@ -12,7 +12,7 @@ from actuated_characters.motion.retargeting.target_body import TargetBody
 from msgs_config.character.layout import GeneralizedPosition, JointType
 from msgs_config.geometry import rotations
 
-_CLOSE = 1e-4  # m, of offsets in the character's size
+_MAX_OFFSET_ERROR = 1e-4  # m, of offsets in the character's size
 
 
 def own_motion(motion: BvhMotion, target: TargetBody) -> GeneralizedPosition | None:
@@ -29,7 +29,7 @@ def own_motion(motion: BvhMotion, target: TargetBody) -> GeneralizedPosition | N
     lengths = np.linalg.norm(own.offsets[1:], axis=1).sum()
     scale = np.linalg.norm(skeleton.offsets[1:], axis=1).sum() / max(lengths, 1e-9)
     apart = np.abs(skeleton.offsets[1:] / max(scale, 1e-9) - own.offsets[1:])
-    if not scale > 0.0 or float(apart.max()) > _CLOSE or JointType.PRISMATIC in types:
+    if not scale > 0.0 or float(apart.max()) > _MAX_OFFSET_ERROR or JointType.PRISMATIC in types:
         return None
     poses = forward_kinematics(motion)
     down = rotations.conjugate(UPRIGHT_XYZW)

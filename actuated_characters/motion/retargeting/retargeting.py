@@ -42,7 +42,7 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
-_STILL = 1e-4  # of a leg's length, by which a root moves that does not move
+_STILL_SHARE = 1e-4  # of a leg's length, by which a root moves that does not move
 _HAND_HEIGHT = 0.05  # m of a wrist over the lowest joint of the feet, while the hand stands
 
 
@@ -174,7 +174,7 @@ def _root_moves(body: CapturedBody, skeleton: Skeleton) -> bool:
     line = ancestors(body.map["pelvis"], skeleton.parents)
     has_channels = any(name in POSITIONS for joint in line for name in skeleton.channels[joint])
     spread = float(np.ptp(body.part("pelvis"), axis=0).max())
-    return has_channels and spread > _STILL * body.leg_length
+    return has_channels and spread > _STILL_SHARE * body.leg_length
 
 
 def _share(progress: Progress | None, before: int, frames: int) -> Progress | None:

@@ -19,7 +19,7 @@ from msgs_config.geometry import rotations
 
 _UP, _LEFT, _AHEAD = np.eye(3)[2], np.eye(3)[1], np.eye(3)[0]
 _BENT = (0.15, 0.45)  # sines of the angle of knee or elbow between which its own axis takes over
-_FEW = 5  # frames on the ground that tell how a sole lies
+_MIN_FRAMES = 5  # frames on the ground that tell how a sole lies
 _TILTED = np.cos(np.radians(50.0))  # of a sole at rest, beyond which it is no sole
 
 Across = Callable[[FloatArray], FloatArray]
@@ -176,7 +176,7 @@ def _foot(
     tip = body.map[toe] if toe in body.map else body.tip(ankle)
     shown_up = body.in_joint(ankle, np.broadcast_to(_UP, shank[0].shape))
     up = _unit(-body.in_joint(ankle, shank[0]).mean(axis=0)) if up_at_rest is None else up_at_rest
-    if flat.sum() >= _FEW:
+    if flat.sum() >= _MIN_FRAMES:
         lying = _unit(shown_up[flat].mean(axis=0))
         if up_at_rest is None or float(lying @ up_at_rest) > _TILTED:
             up = lying

@@ -21,8 +21,8 @@ from msgs_config.geometry import rotations
 
 _STANDING, _HAND = 1 / 0.001, 1 / 0.01  # 1/m, of points of soles and hands
 _BLEND, _BLENDED = 0.06, 0.05  # s before and after it in which a stance takes hold, and how far
-_FLAT = 0.7  # cosine of the tilt of a sole that is put flat on the ground
-_ALONG = np.array((1.0, 1.0, 0.0))  # one that is not is held along the ground alone
+_FLAT_COSINE = 0.7  # cosine of the tilt of a sole that is put flat on the ground
+_ALONG_GROUND = np.array((1.0, 1.0, 0.0))  # one that is not is held along the ground alone
 _RAISED = 0.02  # m that a foot in the middle of its swing is lifted over the captured one
 _LEAST_LIFT, _USUAL_LIFT, _MOST_LIFT = 0.02, 0.03, 0.08  # m; the second one where it can be
 _LIFT_SPEED = 0.4  # m/s
@@ -100,7 +100,9 @@ def _hold_foot(
     )
     placed: list[_Placed] = []
     for part, contact in in_order:
-        lies = float(upright[contact.frames].mean()) < _FLAT  # as in a crawl: on its toes or back
+        lies = (
+            float(upright[contact.frames].mean()) < _FLAT_COSINE
+        )  # as in a crawl: on its toes or back
         place = moving[contact.frames, part].mean(axis=0)
         if not lies:
             place = _beside(place, part, contact, placed, moving)
@@ -108,7 +110,7 @@ def _hold_foot(
         hold = _hold(mask((contact,), frames), frame_time)
         stronger = hold > weights[:, part, 0]
         places[stronger, part] = place
-        weights[stronger, part] = hold[stronger, np.newaxis] * (_ALONG if lies else 1.0)
+        weights[stronger, part] = hold[stronger, np.newaxis] * (_ALONG_GROUND if lies else 1.0)
     for part, end in enumerate(ends):
         points.links.append(link)
         points.offsets.append(end)

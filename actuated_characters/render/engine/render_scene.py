@@ -24,7 +24,10 @@ from msgs_config.geometry import rotations
 
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # from the light
 
-_NEAR, _FAR = 0.02, 50.0  # of the view's distance: what is nearer or farther is not drawn
+_NEAR_PLANE, _FAR_PLANE = (
+    0.02,
+    50.0,
+)  # of the view's distance: what is nearer or farther is not drawn
 _LIGHT = {"lightAmbientCoeff": 0.6, "lightDiffuseCoeff": 0.45, "lightSpecularCoeff": 0.0}
 _TERRAIN_COLOR = (0.78, 0.76, 0.70, 1.0)
 _ARROW_COLOR = (0.86, 0.08, 0.24, 1.0)
@@ -114,7 +117,7 @@ class RenderScene:
 
     def draw(self, view: CameraPose, size: Size, box: PixelRegion) -> Drawing:
         """What is seen in a part of a view's picture of a size; the part is not empty."""
-        near, far = _NEAR * view.distance, _FAR * view.distance
+        near, far = _NEAR_PLANE * view.distance, _FAR_PLANE * view.distance
         width, height = size
         step = view.pixel(height) * near  # a pixel on the near plane
         columns, rows = box.right - box.left, box.bottom - box.top

@@ -39,7 +39,7 @@ PARAMETERS = [
     SESSION,
 ]
 
-_ACKNOWLEDGED = Duration(seconds=10)  # until the simulator has a push or throw
+_ACKNOWLEDGE_TIMEOUT = Duration(seconds=10)  # until the simulator has a push or throw
 
 
 class RecordedController(Node):
@@ -148,7 +148,7 @@ class RecordedController(Node):
         for throw in throws:
             stamp_ns = self._tick_clock.stamp_ns(FIRST_TICK + tick)
             self._throw_topic.publish(self._throw_codec.encode(stamp_ns, throw))
-        if throws and not self._throw_topic.wait_for_all_acked(_ACKNOWLEDGED):
+        if throws and not self._throw_topic.wait_for_all_acked(_ACKNOWLEDGE_TIMEOUT):
             raise RunError(f"the throws of tick {FIRST_TICK + tick} were not acknowledged")
 
     def _arrays(self) -> dict[str, FloatArray]:
@@ -224,7 +224,7 @@ class _CharacterTopics:
             stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
             own = replace(push, stamp_ns=stamp_ns, frame_id=self._session)
             self._wrenches.publish(encode_wrenches(own))
-            if not self._wrenches.wait_for_all_acked(_ACKNOWLEDGED):
+            if not self._wrenches.wait_for_all_acked(_ACKNOWLEDGE_TIMEOUT):
                 raise RunError(f"the push of tick {FIRST_TICK + tick} was not acknowledged")
 
     def command(self, tick: int) -> None:

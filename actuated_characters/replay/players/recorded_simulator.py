@@ -61,7 +61,7 @@ PARAMETERS = [
 ]
 
 _REPUBLISH_PERIOD = 0.5  # s, as the simulator's
-_ACKNOWLEDGED = Duration(seconds=10)  # until the controller has a trajectory or strengths
+_ACKNOWLEDGE_TIMEOUT = Duration(seconds=10)  # until the controller has a trajectory or strengths
 
 
 class RecordedSimulator(Node):
@@ -236,7 +236,7 @@ class RecordedSimulator(Node):
             publisher = self._requests[name]
             self._wait(publisher.get_subscription_count, lambda: "controller_node to subscribe")
             publisher.publish(message)
-            if not publisher.wait_for_all_acked(_ACKNOWLEDGED):
+            if not publisher.wait_for_all_acked(_ACKNOWLEDGE_TIMEOUT):
                 raise RunError(f"controller_node did not acknowledge a message on '{name}'")
 
     def _set(self, change: dict[str, Any]) -> None:

@@ -30,7 +30,7 @@ from msgs_config.messages.wrenches import decode_wrenches, encode_wrenches
 REQUESTS = tuple(topic.of(topics.CONTROLLER_NODE) for topic in topics.TABLE if topic.accepted_on)
 """What a controller is asked for while it works."""
 
-_ACTIVE = tuple(  # what the controller publishes of each request that it has accepted
+_ACCEPTED = tuple(  # what the controller publishes of each request that it has accepted
     topic.of(topics.CONTROLLER_NODE)
     for request in REQUESTS
     for topic in topics.TABLE
@@ -154,7 +154,7 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
         RecordingError: the bag cannot be read.
     """
     rare, by_topic = RareMessages(), dict[str, list[tuple[int, Request]]]()
-    types = {_name(recording, topic): topic.message_type for topic in (*REQUESTS, *_ACTIVE)}
+    types = {_name(recording, topic): topic.message_type for topic in (*REQUESTS, *_ACCEPTED)}
     for message in read_messages(find_bag(path)):
         if message.topic == _name(recording, _CONFIGURATION):
             since_ns = json.loads(decode(message.raw, String).data).get(SINCE)
@@ -166,7 +166,7 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
         elif message.topic in types:
             content = decode(message.raw, types[message.topic])
             by_topic.setdefault(message.topic, []).append((message.sent_ns, content))
-    for topic, active in zip(REQUESTS, _ACTIVE, strict=True):
+    for topic, active in zip(REQUESTS, _ACCEPTED, strict=True):
         sent = by_topic.get(_name(recording, active)) or by_topic.get(_name(recording, topic), [])
         for published_ns, content in sent:
             row = _row(recording, published_ns, content.header)

@@ -8,7 +8,7 @@ from actuated_characters.report.comparison.comparison import RecordingComparison
 from actuated_characters.report.decimation import decimated
 
 _SIZE = (11.0, 3.4)  # inches, of each character's panel
-_LEAST = 1e-17  # rad or m; stands for 0 on a logarithmic axis
+_LOG_ZERO = 1e-17  # rad or m; stands for 0 on a logarithmic axis
 
 
 def draw_comparisons(comparisons: list[RecordingComparison]) -> Figure:
@@ -25,14 +25,14 @@ def draw_comparisons(comparisons: list[RecordingComparison]) -> Figure:
         for name, values in curves.items():
             if np.isnan(values).all():
                 continue
-            times, drawn = decimated(growth.times, np.maximum(values, _LEAST)[:, np.newaxis])
+            times, drawn = decimated(growth.times, np.maximum(values, _LOG_ZERO)[:, np.newaxis])
             panel.plot(times, drawn[:, 0], linewidth=0.9, label=name)
         if comparison.first is not None:
             panel.axvline(
                 comparison.first.time, color="black", linestyle=":", label="first difference"
             )
         panel.set_yscale("log")
-        panel.set_ylim(bottom=_LEAST)
+        panel.set_ylim(bottom=_LOG_ZERO)
         has_curves = bool(panel.get_legend_handles_labels()[0])
         label(
             panel,

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable
 
-_MOST = 1000  # actions that wait: more come only from a sender that means to flood
+_MAX_WAITING = 1000  # actions that wait: more come only from a sender that means to flood
 
 Action = Callable[[], None]
 
@@ -12,7 +12,7 @@ class ActionQueue:
     """Actions in their order; the oldest are dropped where more come than are run."""
 
     def __init__(self) -> None:
-        self._actions: deque[Action] = deque(maxlen=_MOST)
+        self._actions: deque[Action] = deque(maxlen=_MAX_WAITING)
         self.put = self._actions.append
         """Adds an action; for any thread."""
 

@@ -23,7 +23,10 @@ from msgs_config.runtime.publishing import create_publisher
 
 _WALK, _RUN, _BACK, _TURN = 1.0, 2.2, -0.4, 0.8  # m/s and rad/s, by keys
 _PERIOD = 0.1  # s between two velocities
-_FIRST, _REPEATED = 0.7, 0.4  # s that a press lasts: systems begin to repeat after up to 0.66 s
+_FIRST_PRESS, _REPEATED_PRESS = (
+    0.7,
+    0.4,
+)  # s that a press lasts: systems begin to repeat after up to 0.66 s
 _SEARCH_PERIOD = 1.0  # s between looks for a controller that is steered
 _HELP = (
     "**↑ ↓ ← →** walk and turn, with **Shift** run, **space** stops. When the keys, or the button, "
@@ -87,13 +90,13 @@ class DrivingInput:
         if key.modifier is None and key.forward is None and forward == _RUN:
             forward = _WALK  # Shift was let go
         turn = before.turn if key.turn is None else key.turn
-        is_repeated = key == self.key and now - self.pressed < _REPEATED
-        until = now + (_REPEATED if is_repeated else _FIRST)
+        is_repeated = key == self.key and now - self.pressed < _REPEATED_PRESS
+        until = now + (_REPEATED_PRESS if is_repeated else _FIRST_PRESS)
         return DrivingInput(Velocity(forward, 0.0, turn), until, key, now)
 
     def hold(self, velocity: Velocity, now: float) -> "DrivingInput":
         """What is asked for by the button, ten times a second while it is down."""
-        return DrivingInput(velocity, now + _REPEATED)
+        return DrivingInput(velocity, now + _REPEATED_PRESS)
 
 
 class DrivingControls:

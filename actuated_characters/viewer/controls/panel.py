@@ -25,7 +25,7 @@ _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 
 _PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
 _HELP = "Drag a body to push it. Shift and click throws a ball at it."
 _TEXT_PERIOD = 0.2  # s between texts: the page lays each out
-_ALONE = "alone"  # the character of a simulator that has one, without a name
+_NAMELESS = "alone"  # the character of a simulator that has one, without a name
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Panel:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
         self._state = gui.add_markdown("no simulator")
-        self._which: Any = gui.add_dropdown("Character", (_ALONE,), visible=False)
+        self._which: Any = gui.add_dropdown("Character", (_NAMELESS,), visible=False)
         self._add_run()
         self._told = gui.add_markdown(_HELP)
         self._drive = DrivingControls(node, gui, actions)
@@ -116,7 +116,7 @@ class Panel:
         Shows the time of its newest state, and hands out what nodes have responded.
         """
         self.requests.poll()
-        names = tuple(below.lstrip("/") or _ALONE for below in known)
+        names = tuple(below.lstrip("/") or _NAMELESS for below in known)
         if names and names != self._names:
             self._names = names
             self._which.options = names

@@ -25,8 +25,8 @@ _GHOST = (90, 120, 220)
 _GHOST_OPACITY = 0.25
 _CONTACT, _PUSH, _CENTRE, _SUPPORT = (30, 150, 60), (230, 60, 20), (250, 200, 0), (40, 110, 200)
 _METRES_A_WEIGHT = 0.5  # of an arrow: the length that stands for the character's own weight
-_LONGEST = 2.0  # m, of an arrow
-_LEAST = 1e-3  # of the weight, that an arrow shows
+_MAX_ARROW_LENGTH = 2.0  # m, of an arrow
+_MIN_ARROW_SHARE = 1e-3  # of the weight, that an arrow shows
 _ABOVE_GROUND = 0.004  # m, of what is drawn on it
 _GRAVITY = 9.81
 
@@ -201,11 +201,11 @@ class DrawnCharacter:
                 row = self._rows.get(link)
                 force = wrenches.wrenches[number, :3] / (self.character.mass * _GRAVITY)
                 size = float(np.linalg.norm(force))
-                if row is None or size < _LEAST:
+                if row is None or size < _MIN_ARROW_SHARE:
                     continue
                 points = wrenches.points
                 at = self.point(row, points[number] if len(points) else self._centres[row])
-                along = force * min(_METRES_A_WEIGHT, _LONGEST / size)
+                along = force * min(_METRES_A_WEIGHT, _MAX_ARROW_LENGTH / size)
                 arrows.append((at, at + along) if what == "contacts" else (at - along, at))
         handle = self._arrows[what]
         handle.visible = bool(arrows)

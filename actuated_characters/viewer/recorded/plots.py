@@ -15,7 +15,7 @@ from msgs_config.arrays import FloatArray
 
 _SPANS = 600  # of the time: more are not seen on a panel
 _ASPECT = 2.6
-_LEAST = 1e-3  # that the height of a plot stands for
+_MIN_HEIGHT = 1e-3  # that the height of a plot stands for
 _COLOUR, _CURSOR = "#2a6fbb", "#d9480f"
 _ERROR, _EFFORT, _CONTACT = "largest joint error (rad)", "largest effort / limit", "force / weight"
 
@@ -75,7 +75,7 @@ class Plots:
         self._shown, self._at = [], -1
         for title, each in values.items():
             curve = span_maxima(each, _SPANS)
-            top = max(1.05 * float(np.nanmax(curve)), _LEAST)
+            top = max(1.05 * float(np.nanmax(curve)), _MIN_HEIGHT)
             with self._folder:
                 handle = self._gui.add_uplot(
                     (self._times, curve, np.full_like(curve, np.nan)),

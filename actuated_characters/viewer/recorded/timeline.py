@@ -4,7 +4,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 
-_ROUNDING = 1e-9  # s: two times are as good as equal
+_EQUAL_TIMES = 1e-9  # s: two times are as good as equal
 
 
 class Timeline:
@@ -64,10 +64,10 @@ class Timeline:
 
 def row_at(times: FloatArray, time: float) -> int:
     """The row of the last of rising times (t,), s, that is not after a time; at least the first."""
-    return max(int(np.searchsorted(times, time + _ROUNDING, side="right")) - 1, 0)
+    return max(int(np.searchsorted(times, time + _EQUAL_TIMES, side="right")) - 1, 0)
 
 
 def frame_times(start: float, end: float, step: float) -> list[float]:
     """Times of frames, s, from a start to an end, both included, a step apart."""
-    count = int((end - start) / step + _ROUNDING) + 1
+    count = int((end - start) / step + _EQUAL_TIMES) + 1
     return [start + number * step for number in range(count)]

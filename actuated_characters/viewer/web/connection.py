@@ -12,7 +12,7 @@ MOST_BYTES = 1 << 16
 """Of a control message; the page's own have at most some hundreds."""
 _MOST_PICTURE_BYTES = 1 << 25  # of a message with a picture: a PNG of the page's window
 _RATE, _BURST = 500.0, 500.0  # messages a second, and at once; a page sends at most some 200
-_UNUSABLE = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_TOO_BIG)
+_UNUSABLE_CODES = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_TOO_BIG)
 
 Reject = Callable[[str], None]
 """Is told, in the server's thread, what was rejected, and why."""
@@ -56,7 +56,7 @@ class CheckedConnection(ServerConnection):
             try:
                 raw = await super().recv(decode)
             except ConnectionClosed as closed:
-                if closed.sent is not None and closed.sent.code in _UNUSABLE:
+                if closed.sent is not None and closed.sent.code in _UNUSABLE_CODES:
                     self._gate.reject(f"rejected a message: {closed.sent.reason}")
                 raise
             fault = self._gate.message_fault(raw, awaits_picture=self._awaits_picture)

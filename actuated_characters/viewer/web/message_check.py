@@ -19,9 +19,9 @@ _MOST_TEXT = 1000  # characters of a text field
 _MOST_PIXELS = 1 << 14  # of a window's width or height
 _MOST_AREA = 1 << 25  # pixels of a picture: a small file may have very many
 _FARTHEST = 1e6  # m, or pixels: what is farther comes from no mouse
-_ROUNDING = 1e-9  # by which a page's slider may miss its own end
+_SLIDER_ROUNDING = 1e-9  # by which a page's slider may miss its own end
 _UNIT_TOLERANCE = 1e-3  # of the length of a direction
-_LONGEST = 60  # characters of a value that a line shows
+_MAX_SHOWN = 60  # characters of a value that a line shows
 _PNG_HEAD = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
 _Fault = str | None
@@ -133,7 +133,7 @@ def _value_fault(handle: Any, value: Any) -> _Fault:
         least = -math.inf if handle.min is None else handle.min
         most = math.inf if handle.max is None else handle.max
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        is_within = is_number and least - _ROUNDING <= value <= most + _ROUNDING
+        is_within = is_number and least - _SLIDER_ROUNDING <= value <= most + _SLIDER_ROUNDING
         return None if is_within else f"it must be a number from {least:g} to {most:g}"
     return "it takes none"
 
@@ -178,4 +178,4 @@ def _label(handle: Any) -> str:
 
 def _shown(value: object) -> str:
     text = repr(value)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+    return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]} ..."

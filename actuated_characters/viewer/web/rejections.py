@@ -4,7 +4,7 @@ from collections import deque
 
 _MOST_WAITING = 100  # sentences between two looks
 _MOST_TOLD = 100  # different sentences: a hostile sender must not fill memory and log
-_LONGEST = 300  # characters
+_MAX_CHARACTERS = 300  # characters
 
 
 class Rejections:
@@ -20,7 +20,7 @@ class Rejections:
         """The sentences since the last call that were not told before."""
         new = []
         while self._untold and len(self._told) <= _MOST_TOLD:
-            sentence = self._untold.popleft()[:_LONGEST]
+            sentence = self._untold.popleft()[:_MAX_CHARACTERS]
             if len(self._told) == _MOST_TOLD:
                 sentence = f"more than {_MOST_TOLD} different rejections; further ones are not told"
             if sentence not in self._told:

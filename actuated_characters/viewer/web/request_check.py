@@ -17,7 +17,7 @@ _LOCAL = "localhost"
 _SCHEMES = ("http", "https")
 _SOURCES = ("websocket", "playbackPath")  # that viser's page takes from its address
 _SCHEMES_OF_SOURCES = ("http", "https", "ws", "wss")
-_LONGEST = 100  # characters of a header that a line shows
+_MAX_SHOWN = 100  # characters of a header that a line shows
 
 
 class RequestCheck:
@@ -97,4 +97,4 @@ def _name(host: str) -> str | None:
 
 
 def _shown(values: Sequence[str]) -> str:
-    return repr(", ".join(values)[:_LONGEST]) if values else "no name"
+    return repr(", ".join(values)[:_MAX_SHOWN]) if values else "no name"

@@ -42,7 +42,7 @@ from msgs_config.geometry.single_rotations import (
 
 _SWIVEL = (10.0, 0.5)  # N m/rad and N m s/rad: keeps the knee of a leg that stands above its foot
 _LEVEL = (80.0, 0.8)  # likewise, keeps its sole on the ground
-_SOON = 0.015  # s, of an arrival at least: errors are not made good within a tick
+_MIN_ARRIVAL = 0.015  # s, of an arrival at least: errors are not made good within a tick
 _LEFT = (0.0, 1.0, 0.0)
 
 
@@ -141,7 +141,7 @@ class EffortMaker:
         body, heading, root = at.body, at.course.heading, hold.root
         above, climb = hold.ground + root.height - body.root[2], float(body.velocity[2])
         if root.arrival > 0.0:
-            rest = max(hold.rest, _SOON)
+            rest = max(hold.rest, _MIN_ARRIVAL)
             rise = laws.arrival_acceleration(above, climb, root.climb, rest)
         else:
             p, d = root.height_gains

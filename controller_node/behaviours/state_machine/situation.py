@@ -13,7 +13,7 @@ from msgs_config.geometry.single_rotations import Vector, add, subtract
 
 _LEAST_HEIGHT = 0.3  # m, of the centre of mass, for the rate of the pendulum
 _STEADY = 0.6  # of a sole, from its middle, that bears a body that stands
-_LONGEST = 4.0  # units of the pendulum's time, that it is predicted
+_MAX_PREDICTED = 4.0  # units of the pendulum's time, that it is predicted
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Situation:
 
     def later(self, pressure: Vector, time: float) -> tuple[tuple[float, float], ...]:
         """Place and velocity of the centre of mass, along x and y, after a time on a pressure."""
-        grown = math.exp(min(self.rate * max(time, 0.0), _LONGEST))
+        grown = math.exp(min(self.rate * max(time, 0.0), _MAX_PREDICTED))
         cosh, sinh = 0.5 * (grown + 1.0 / grown), 0.5 * (grown - 1.0 / grown)
         pairs = []
         for axis in (0, 1):

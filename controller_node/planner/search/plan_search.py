@@ -20,9 +20,9 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
 _FIRST_ROUNDS = 6  # of the first plan: nothing has moved yet
-_WIDE = 2.5  # every other round looks so much farther: it may find another way out
+_WIDE_FACTOR = 2.5  # every other round looks so much farther: it may find another way out
 _MORE = 3  # times the samples, in the rounds after the first
-_LARGEST = 0.9  # sigma, of an offset
+_MAX_OFFSET = 0.9  # sigma, of an offset
 _PENALTY = 0.2  # of an offset, for each sigma
 _FEWEST_DRAWS = 6
 
@@ -105,7 +105,7 @@ class PlanSearch:
         count = self._settings.samples * (_MORE if number else 1)
         size = self._knot_count(tick) * len(self._unit)
         draws = normal_draws(seed, (number, tick), count * size).reshape(count, size)
-        return _WIDE * draws if number % 2 else draws
+        return _WIDE_FACTOR * draws if number % 2 else draws
 
     def _left(self, plan: Plan | None, tick: int) -> FloatArray:
         """What is left of a plan at a tick (d,), in units."""
@@ -135,7 +135,7 @@ class PlanSearch:
         penalty = _PENALTY * settings.noise
         knots = self._knot_count(desired.rollout.first_tick)
         return LeastSquaresProblem(
-            deviations, residuals, penalty * penalty / knots, _LARGEST / settings.noise
+            deviations, residuals, penalty * penalty / knots, _MAX_OFFSET / settings.noise
         )
 
     def _knot_count(self, tick: int) -> int:

@@ -19,7 +19,7 @@ from controller_node.planner.contact_model import ContactModel
 from controller_node.references.offsets import Offsets, knot_before
 from msgs_config.arrays import BoolArray, FloatArray
 
-_LARGEST = 1e4  # of a feature; beyond, a rollout has come to nothing
+_MAX_FEATURE = 1e4  # of a feature; beyond, a rollout has come to nothing
 
 
 class RolloutPool:
@@ -87,7 +87,7 @@ class RolloutPool:
         for done in futures:
             done.result()
         with np.errstate(invalid="ignore"):
-            sound &= (np.abs(features) < _LARGEST).all(axis=(1, 2))  # NaN is not
+            sound &= (np.abs(features) < _MAX_FEATURE).all(axis=(1, 2))  # NaN is not
         features[~sound] = 0.0
         return features, sound
 

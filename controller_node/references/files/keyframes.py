@@ -22,7 +22,7 @@ from msgs_config.geometry import rotations
 
 _KEYS = ["interpolation", "loop", "period", "keyframes"]
 _KEYFRAME_KEYS = ["time", "pose"]
-_SHOWN = 200  # characters
+_MAX_SHOWN = 200  # characters
 
 
 @dataclass(frozen=True)
@@ -184,4 +184,4 @@ def _shown(value: object) -> str:
     """A value as an error shows it: a few lines of YAML can stand for millions of entries."""
     if isinstance(value, (list, dict, tuple)):
         return f"a {type(value).__name__}"
-    return repr(value)[:_SHOWN]
+    return repr(value)[:_MAX_SHOWN]

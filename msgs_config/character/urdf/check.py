@@ -23,9 +23,9 @@ _RIGHT_TYPES = (
     "revolute, continuous, prismatic, spherical or fixed; floating is for the only joint of a base "
     "link without <inertial>"
 )
-_LARGEST = 1e30  # the engine's single precision ends at 3e38
+_MAX_NUMBER = 1e30  # the engine's single precision ends at 3e38
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-_ANY, _POSITIVE = -_LARGEST, 0.0
+_ANY, _POSITIVE = -_MAX_NUMBER, 0.0
 MOMENTS = ("ixx", "iyy", "izz")
 NUMBERS = {  # by element and attribute: how many, and the least that they may be
     "origin": {"xyz": (3, _ANY), "rpy": (3, _ANY)},
@@ -158,7 +158,7 @@ def _check_numbers(path: Path, part: ElementTree.Element) -> None:
         for attribute, (count, minimum) in NUMBERS.get(element.tag, {}).items():
             text = element.get(attribute)
             if text is not None and not _are_numbers(text, count, minimum):
-                bound = f" of at least {minimum:g}" if minimum > -_LARGEST else ""
+                bound = f" of at least {minimum:g}" if minimum > -_MAX_NUMBER else ""
                 raise CharacterError(
                     f"{path}: {part.tag} {part.get('name')!r}: {attribute} of <{element.tag}> is "
                     f"{text[:100]!r}; it must be {count} finite number{'s' * (count > 1)}{bound}"
@@ -216,7 +216,7 @@ def _are_numbers(text: str, count: int, minimum: float) -> bool:
     # the engine takes what C does: no `_`, `nan` or `inf`, and nothing that is no number
     pieces = text.split()
     return len(pieces) == count and all(
-        _NUMBER.fullmatch(piece) and minimum <= float(piece) <= _LARGEST for piece in pieces
+        _NUMBER.fullmatch(piece) and minimum <= float(piece) <= _MAX_NUMBER for piece in pieces
     )
 
 

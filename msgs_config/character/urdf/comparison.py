@@ -14,7 +14,7 @@ from msgs_config.character.model import Link, UrdfOptions
 from msgs_config.character.urdf.inertia import read_inertial
 from msgs_config.errors import CharacterError
 
-_LARGEST = 1e-9  # of the largest entry
+_MAX_DIFFERENCE = 1e-9  # of the largest entry
 
 
 def check_links(links: Sequence[Link], repaired: ElementTree.Element, loading: UrdfOptions) -> None:
@@ -55,7 +55,7 @@ def _mass(robot: ElementTree.Element) -> float:
 
 def _compare(where: str, what: str, read: ArrayLike, given: ArrayLike) -> None:
     size = max(np.abs(read).max(), np.abs(given).max())
-    if not np.abs(np.subtract(read, given)).max() <= _LARGEST * size:
+    if not np.abs(np.subtract(read, given)).max() <= _MAX_DIFFERENCE * size:
         values = [" ".join(f"{value:.6g}" for value in np.ravel(side)) for side in (read, given)]
         raise CharacterError(
             f"{where}: the engine has {what} of {values[0]}; the URDF's text has {values[1]}"

@@ -20,7 +20,7 @@ from msgs_config.geometry import rotations
 
 _JOINT_TYPES = {"revolute", "continuous", "prismatic", "fixed"}
 _SHAPES = {"box", "sphere", "cylinder", "mesh"}
-_UNLIMITED = 1e9  # m, N, N m or their rates: URDF's limits must be numbers
+_MAX_NUMBER = 1e9  # m, N, N m or their rates: URDF's limits must be numbers
 
 
 def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str:
@@ -64,7 +64,7 @@ def _write_joints(robot: ElementTree.Element, joints: DescribedJoints) -> None:
     for joint in joints.moving:
         _write_mimic(elements[joint.name], joint.mimic)
         limit = elements[joint.name].find("limit")
-        effort = min(joint.effort_limit, _UNLIMITED)
+        effort = min(joint.effort_limit, _MAX_NUMBER)
         if limit is None or joint.mimic is not None:  # no motor drives a follower
             continue
         if float(limit.get("effort", "0")) != effort:
@@ -183,7 +183,7 @@ def _joint(joint: DescribedJoint) -> ElementTree.Element:
         limits = {"effort": joint.effort_limit, "velocity": math.inf}
         if not is_endless:
             limits |= {"lower": joint.lower, "upper": joint.upper}
-        bounded = {n: max(min(value, _UNLIMITED), -_UNLIMITED) for n, value in limits.items()}
+        bounded = {n: max(min(value, _MAX_NUMBER), -_MAX_NUMBER) for n, value in limits.items()}
         ElementTree.SubElement(element, "limit", {n: repr(v) for n, v in bounded.items()})
     if joint.mimic is not None:
         leader, multiplier, offset = joint.mimic
