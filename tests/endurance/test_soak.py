@@ -4,6 +4,7 @@ import itertools
 
 import pytest
 
+from msgs_config.messages.topic import STREAM
 from msgs_config.runtime.polling import DirectSubscription
 from tests.endurance import soak as soak_module
 from tests.endurance import soak_report
@@ -15,15 +16,17 @@ def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     del domain  # the processes inherit it
-    monkeypatch.setattr(soak_report, "SETTLED", 2_000)
+    # A publisher keeps what a reader of a busy machine has not taken yet, up to its depth.
+    settled = STREAM.depth + 1_000
+    monkeypatch.setattr(soak_report, "SETTLED", settled)
     for module in (soak_module, soak_report):
         monkeypatch.setattr(module, "MEMORY_PERIOD", 500)
 
-    found = soak(5_000, seed=2, progress=lambda tick: None)
+    found = soak(settled + 3_000, seed=2, progress=lambda tick: None)
 
     assert found.problems == []
-    assert found.ticks == 5_000
-    assert all(len(samples) == 11 for samples in found.megabytes.values())
+    assert found.ticks == settled + 3_000
+    assert all(len(samples) == 19 for samples in found.megabytes.values())
     assert set(found.growth) == {"sim_node", "controller_node"}
     assert set(found.disturbances) == {"push", "pause", "reset", "set_gain", "set_duration"}
 
