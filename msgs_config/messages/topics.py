@@ -431,7 +431,13 @@ DIAGNOSTICS = Topic(
     ),
 )
 JOINT_STATES_THROTTLE = JOINT_STATES.throttled
-CONTACTS_THROTTLE = CONTACTS.throttled
+CONTACTS_THROTTLE = replace(
+    CONTACTS.throttled,
+    content=(
+        "of `contacts` the first message in each sixtieth of a second of wall time; the last one "
+        "only if the contacts of its tick were found; for displays alone"
+    ),
+)
 APPLIED_WRENCH_THROTTLE = APPLIED_WRENCH.throttled
 THROWN_THROTTLE = THROWN.throttled
 REFERENCE_THROTTLE = REFERENCE.throttled
