@@ -7,9 +7,9 @@ import os
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, BinaryIO, Self, TypeVar
 
 import yaml
 from mcap.writer import CompressionType, Writer
@@ -96,15 +96,15 @@ class BagWriter:
 
     def _open(self, compression: CompressionType) -> None:
         self.path.mkdir(parents=True)
-        try:
+        with ExitStack() as failed:
+            failed.callback(shutil.rmtree, self.path, ignore_errors=True)  # it was not there before
             self._file = (self.path / f"{self.path.name}{SUFFIXES[MCAP]}").open("wb")
+            failed.callback(_close, self._file)
             self._writer = Writer(self._file, compression=compression)
             self._writer.start("ros2", "actuated_characters")
             self._file.flush()
             self._lock = DirectoryLock(self.path)  # against a recovery meanwhile
-        except OSError:
-            shutil.rmtree(self.path, ignore_errors=True)  # it was not there before
-            raise
+            failed.pop_all()
 
     def __enter__(self) -> Self:
         return self
@@ -266,12 +266,17 @@ class BagWriter:
             return act(*arguments)
         except OSError as error:
             self._is_open = False
-            with suppress(OSError):  # it flushes once more, to the same full disk
-                self._file.close()
+            _close(self._file)
             self._lock.release()
             raise RecordingError(
                 f"recording {self.path} is incomplete, cannot write: {reason(error)}"
             ) from error
+
+
+def _close(file: BinaryIO) -> None:
+    """Close a file that is given up: it flushes once more, maybe to the same full disk."""
+    with suppress(OSError):
+        file.close()
 
 
 def _check_choice(what: str, value: str, choices: Iterable[str]) -> None:

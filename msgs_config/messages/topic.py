@@ -148,7 +148,7 @@ def find_message_class(type_name: str) -> type:
     """The class of a message type, as `sensor_msgs/msg/JointState`.
 
     Raises:
-        ImportError: its package is not installed.
+        ImportError, AttributeError, ValueError: it is not installed, or is no type's name.
     """
     package, _, name = type_name.replace("/", ".").rpartition(".")
     found: type = getattr(import_module(package), name)

@@ -2,12 +2,12 @@
 
 import json
 from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from msgs_config.errors import RecordingError
+from msgs_config.messages.topic import find_message_class
 from msgs_config.runtime.endpoint_types import type_name
 
 
@@ -26,9 +26,8 @@ def find_message_type(name: str) -> Any:
     Raises:
         RecordingError: it is not installed.
     """
-    *namespace, last = name.split("/")
     try:
-        return getattr(import_module(".".join(namespace)), last)
+        return find_message_class(name)
     except (ImportError, AttributeError, ValueError) as error:
         raise RecordingError(f"message type {name} is not installed") from error
 
