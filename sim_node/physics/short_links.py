@@ -53,17 +53,21 @@ def short_joints(character: Character) -> list[str]:
     return short
 
 
-def speed_bound(
-    character: Character, step_s: float, speed_limit: float, *, has_ground: bool
-) -> float:
+def speed_bounds(character: Character, step_s: float, speed_limit: float) -> dict[bool, float]:
     """The largest speed of any degree of freedom at engine steps of `step_s`, rad/s or m/s.
 
-    At most half of `speed_limit`, beyond which a speed counts as divergence: where a joint mimics
-    another, the coupling may add to a speed. So by its speed alone such a character never diverges.
+    By whether there is a ground. At most half of `speed_limit`, beyond which a speed counts as
+    divergence: where a joint mimics another, the coupling may add to a speed. So by its speed alone
+    such a character never diverges.
     """
-    if short_joints(character) or (has_ground and links_in_ground(character)):
-        return min(_LARGEST_TURN / step_s, 0.5 * speed_limit)
-    return UNLIMITED_SPEED
+    bound = _bound(step_s, speed_limit)
+    if short_joints(character):
+        return {False: bound, True: bound}
+    return {False: UNLIMITED_SPEED, True: bound if links_in_ground(character) else UNLIMITED_SPEED}
+
+
+def _bound(step_s: float, speed_limit: float) -> float:
+    return min(_LARGEST_TURN / step_s, 0.5 * speed_limit)
 
 
 def describe_speed_bound(character: Character, values: Values) -> tuple[str, ...]:
@@ -73,7 +77,7 @@ def describe_speed_bound(character: Character, values: Values) -> tuple[str, ...
     if not (short or deep):
         return ()
     step_s = 1.0 / (values.integer("rate") * values.integer("substeps"))
-    bound = speed_bound(character, step_s, values.number("speed_limit"), has_ground=has_ground)
+    bound = _bound(step_s, values.number("speed_limit"))
     slower = f"no joint and no base is let be faster than {bound:.4g} rad/s or m/s"
     warnings = []
     if deep:

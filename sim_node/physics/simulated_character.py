@@ -15,7 +15,7 @@ from sim_node.initial_state import check_length
 from sim_node.physics.body import Body
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.projectiles import Projectiles
-from sim_node.physics.short_links import speed_bound
+from sim_node.physics.short_links import speed_bounds
 from sim_node.physics.touches import TouchedLinks
 from sim_node.physics.wrenches import ExternalWrench
 
@@ -94,10 +94,7 @@ class SimulatedCharacter:
         )
         self._step_s = step_s
         self._delay_ticks = delay_ticks
-        self.speed_bounds = {
-            has_ground: speed_bound(setup.character, step_s, speed_limit, has_ground=has_ground)
-            for has_ground in (False, True)
-        }
+        self.speed_bounds = speed_bounds(setup.character, step_s, speed_limit)
         # (2, n) largest position and velocity of a sound state
         self._bounds = np.array([[np.finfo(float).max], [speed_limit]]).repeat(self.layout.size, 1)
 

@@ -15,7 +15,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.messages.state import StampedState
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
-from sim_node.physics.short_links import short_joints, speed_bound
+from sim_node.physics.short_links import short_joints, speed_bounds
 from tests.support.hands import box_link, hand_on_a_body, hinge
 from tests.support.physics import TURNED_FRAMES, character
 
@@ -102,7 +102,7 @@ def test_no_speed_of_a_shipped_character_is_bound(name: str) -> None:
     whole = character(name)
 
     assert short_joints(whole) == []
-    assert speed_bound(whole, STEP, LIMIT, has_ground=True) == UNLIMITED_SPEED
+    assert speed_bounds(whole, STEP, LIMIT)[True] == UNLIMITED_SPEED
 
 
 @pytest.mark.parametrize("length", [0.13, 0.17])
@@ -120,9 +120,7 @@ def test_the_bound_grows_with_the_substeps_and_is_well_below_what_counts_as_dive
 ) -> None:
     whole = load(tmp_path, hand_on_a_body())
 
-    bounds = [
-        speed_bound(whole, STEP / substeps, LIMIT, has_ground=True) for substeps in (1, 2, 4, 16)
-    ]
+    bounds = [speed_bounds(whole, STEP / substeps, LIMIT)[True] for substeps in (1, 2, 4, 16)]
 
     assert bounds == pytest.approx([100.0, 200.0, 0.5 * LIMIT, 0.5 * LIMIT])
 
