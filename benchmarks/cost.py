@@ -17,10 +17,10 @@ from benchmarks.support.nodes import Nodes
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.timed import timed
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.polling import DirectSubscription, PollingExecutor
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
-from msgs_config.runtime.publishing import create_publisher
 from sim_node.parameters import CharacterParameters, SimulatorParameters, load_parameters
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.world import World

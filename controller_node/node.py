@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import Any
 
 from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import Surroundings
@@ -17,6 +16,10 @@ from controller_node.interface.simulators import Simulators
 from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.interface.state_decoder import StateDecoder
 from controller_node.parameters import PARAMETERS, character_parameters, check_world
+from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
+from msgs_config.bus.live_parameters import LiveParameters
+from msgs_config.bus.node import BusNode, Executor, Stop
+from msgs_config.bus.once_logger import UNLOGGED, OnceLogger
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
@@ -24,33 +27,28 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.session import ANONYMOUS, given_session
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
-from msgs_config.runtime.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns
-from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
-from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.ros_parameters import LiveParameters, declare, given_parameters
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, collides, placed
 
 
 class ControllerNode(ComposableNode):
     """Subscribes to `joint_states`; publishes `joint_torques` and `~/reference`."""
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, node: BusNode | None = None) -> None:
         """Read the parameters, build the controller, and offer the topics.
 
-        `options` are rclpy's own of every node.
+        Without a place on a bus it is a node of ROS.
 
         Raises:
             ActuatedCharactersError: a parameter, the character or the clip cannot be used.
         """
-        super().__init__(topics.CONTROLLER_NODE, **options)
-        given = given_parameters(self)
+        super().__init__(node or ros_node(topics.CONTROLLER_NODE))
+        given = self.node.given_parameters()
         loaded = load_character(str(given.get("character", DEFAULT_CHARACTER)), collides(given))
         self._character = placed(loaded, given)
         self._layout = self._character.layout
         declared = PARAMETERS + character_parameters(self._character, given)
         values = resolve(declared, given)
-        declare(self, declared, values)
+        self.node.declare(declared, values)
         self._setups = ControllerSetups(self._character, declared, values)
         self._log_warnings(self._character.warnings)
         self._log_warnings(self._setups.in_force.warnings)
@@ -59,35 +57,37 @@ class ControllerNode(ComposableNode):
         self._is_answering = False
         self._upcoming: Values | None = None
         self._episode_ns: int | None = None
-        self._once_logger = OnceLogger(self)
-        self._report = AnswerReport(self, self._character.name)
+        self._once_logger = OnceLogger(self.node.get_logger())
+        self._report = AnswerReport(self.node, self._character.name)
         self._serve: Callable[[], None] = lambda: None
         self._open_topics()
         self._publish_first_state()
-        LiveParameters(self, declared, values, self._take_parameters, self._check_parameters)
+        LiveParameters(self.node, declared, values, self._take_parameters, self._check_parameters)
 
     def _log_warnings(self, warnings: Iterable[str]) -> None:
         for warning in warnings:
-            self.get_logger().warning(warning)
+            self.node.get_logger().warning(warning)
 
     def _open_topics(self) -> None:
         controller, logger = self._controller, self._once_logger
         self._decoder = StateDecoder(self._layout, controller.clock)
         self._simulators = Simulators(
-            self,
+            self.node,
             given_session(self._values),
             controller.clock,
             lambda found: check_simulator(self._controller, self._character, self._values, found),
             logger,
         )
-        self._awaited = AwaitedMessages(self, controller, self._character, self._simulators, logger)
+        self._awaited = AwaitedMessages(
+            self.node, controller, self._character, self._simulators, logger
+        )
         self._pending_state: bytes | None = None  # a state, for what is awaited with it
         # after them: a simulator that has found this subscription has found the others as well
-        self._states = DirectSubscription(self, topics.JOINT_STATES)
+        self._states = self.node.subscription(topics.JOINT_STATES)
         self._outputs = Publishers(
-            self, self._layout, self._setups.in_force.driven, self._simulators.bound
+            self.node, self._layout, self._setups.in_force.driven, self._simulators.bound
         )
-        self._stamped_topics = StampedTopics(self, controller, self._outputs, logger)
+        self._stamped_topics = StampedTopics(self.node, controller, self._outputs, logger)
         self._publish_configuration()
 
     @property
@@ -113,7 +113,7 @@ class ControllerNode(ComposableNode):
             self._published_first = first
             self._outputs.publish_initial_state(first)
 
-    def turns(self, stop: StopSignal, executor: PollingExecutor) -> Turns:
+    def turns(self, stop: Stop, executor: Executor) -> Turns:
         """Answer states until `stop`.
 
         Raises:
@@ -129,7 +129,7 @@ class ControllerNode(ComposableNode):
             self._report.publish(self._other_counts, at_once=True)
             self._outputs.flush()
 
-    def _spin_once(self, executor: PollingExecutor) -> float:
+    def _spin_once(self, executor: Executor) -> float:
         """Answer a state if there is one; the turn's result."""
         self._report.publish(self._other_counts)
         self._simulators.look(time.monotonic())

@@ -2,17 +2,15 @@
 
 import time
 
+from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
+from msgs_config.bus.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
+from msgs_config.bus.node import BusNode, Executor, Stop
+from msgs_config.bus.once_logger import UNLOGGED, OnceLogger
 from msgs_config.errors import SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import OwnSession, make_session
 from msgs_config.parameters import Values
-from msgs_config.runtime.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns
-from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
-from msgs_config.runtime.once_logger import UNLOGGED, OnceLogger
-from msgs_config.runtime.polling import PollingExecutor
-from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.ros_parameters import given_parameters
 from sim_node.interface.character_interface import CharacterInterface
 from sim_node.interface.episode_parameters import EpisodeParameters
 from sim_node.interface.initial_state_topic import InitialStates, log_warnings
@@ -44,20 +42,22 @@ _MOST_COMMANDS = 1000  # that are taken in a row in real time; a flood must not 
 class SimNode(ComposableNode):
     """Publishes the states of each tick; advances when they are answered, or when it is time."""
 
-    def __init__(self) -> None:
+    def __init__(self, node: BusNode | None = None) -> None:
         """Read the parameters, build the world, and offer the topics.
+
+        Without a place on a bus it is a node of ROS.
 
         Raises:
             ActuatedCharactersError: a parameter or a character cannot be used.
         """
-        super().__init__(topics.SIM_NODE)
-        loaded = load_parameters(given_parameters(self))
+        super().__init__(node or ros_node(topics.SIM_NODE))
+        loaded = load_parameters(self.node.given_parameters())
         self._settings = make_node_settings(loaded.values)
         self._build_simulation(loaded)
-        self._given = EpisodeParameters(self, loaded, self._change_parameters)
-        self.session = self._settings.session or make_session(self.get_fully_qualified_name())
+        self._given = EpisodeParameters(self.node, loaded, self._change_parameters)
+        self.session = self._settings.session or make_session(self.node.get_fully_qualified_name())
         """The session of all messages of this simulator."""
-        self._once_logger = OnceLogger(self)
+        self._once_logger = OnceLogger(self.node.get_logger())
         self._open_topics()
         self._watchdog = Watchdog(self._settings.republish_period, self._settings.lockstep_timeout)
         self._rate_limiter = RateLimiter(self._settings.tick_period)
@@ -68,20 +68,27 @@ class SimNode(ComposableNode):
         )
         self._next_diagnostics, self._timeouts, self._begun = 0.0, 0, False
         self._control = RunControl()
-        self._run_services = Services(self, self._control, self._resume, self._reset)
+        self._run_services = Services(
+            self.node, self._control, lambda: self._settings.step_ticks, self._resume, self._reset
+        )
+
+    @property
+    def characters(self) -> list[str]:
+        """The names of the characters; empty of one that is alone and below no name."""
+        return [each.name for each in self._characters]
 
     def _build_simulation(self, loaded: SimulatorParameters) -> None:
         """Build the world, and probe the engine."""
         gravity = loaded.values.number("gravity")
         self._samples = [measure_probe(each.character, gravity) for each in loaded.characters]
         self._simulation = make_simulation(loaded)
-        self._initial_states = InitialStates(self, self._simulation.characters, loaded)
+        self._initial_states = InitialStates(self.node, self._simulation.characters, loaded)
 
     def _open_topics(self) -> None:
         own_session = OwnSession(self.session, self._once_logger.log_once)
         self._characters = [
             CharacterInterface(
-                self,
+                self.node,
                 character,
                 self._simulation.clock,
                 self._settings,
@@ -90,18 +97,18 @@ class SimNode(ComposableNode):
             )
             for character in self._simulation.characters
         ]
-        self._world = WorldInterface(self, self._simulation, own_session, self._once_logger)
+        self._world = WorldInterface(self.node, self._simulation, own_session, self._once_logger)
         publishers = [each.publishers for each in self._characters]
         self._publisher = SimulatorPublisher(
-            self, self._simulation, self._world, publishers, self._samples
+            self.node, self._simulation, self._world, publishers, self._samples
         )
-        self._diagnostics = DiagnosticsPublisher(self)
-        self._conflict_log = ConflictLog(self, self._once_logger)
+        self._diagnostics = DiagnosticsPublisher(self.node)
+        self._conflict_log = ConflictLog(self.node, self._once_logger)
         self._others = OtherSimulators(
-            self, [each.states for each in self._characters], self.session, self._once_logger
+            self.node, [each.states for each in self._characters], self.session, self._once_logger
         )
 
-    def turns(self, stop: StopSignal, executor: PollingExecutor) -> Turns:
+    def turns(self, stop: Stop, executor: Executor) -> Turns:
         """Simulate until `max_ticks`, or until `stop`.
 
         Raises:
@@ -118,7 +125,9 @@ class SimNode(ComposableNode):
             self._publish_diagnostics()
             seconds = _FLUSH_TIME if self._finished else _STOP_FLUSH_TIME
             if not (self._publisher.is_acknowledged(seconds) and self._diagnostics.flush(seconds)):
-                self.get_logger().warning("a subscriber has not acknowledged the last messages")
+                self.node.get_logger().warning(
+                    "a subscriber has not acknowledged the last messages"
+                )
             self._simulation.close()
 
     @property
@@ -130,7 +139,7 @@ class SimNode(ComposableNode):
     def _complete(self) -> bool:
         return all(each.commands.complete for each in self._characters)
 
-    def _begin(self, stop: StopSignal) -> Turns:
+    def _begin(self, stop: Stop) -> Turns:
         """Begin the first episode when initial states and subscribers are there."""
         states = yield from self._initial_states.wait(stop)
         if stop:
@@ -139,13 +148,13 @@ class SimNode(ComposableNode):
             self._simulation.begin_in(states)
         self._given.begin_in(states)
         if not self._settings.session:  # else a run has said so
-            log_warnings(self, self._given.in_force)
+            log_warnings(self.node, self._given.in_force)
         self._publisher.publish_configurations(self._given.in_force)
         count = self._settings.wait_for_subscribers
-        yield from wait_for_subscribers(self, self._publisher.of_characters, count, stop)
+        yield from wait_for_subscribers(self.node, self._publisher.of_characters, count, stop)
         self._begin_episode()
 
-    def _spin_once(self, executor: PollingExecutor) -> float:
+    def _spin_once(self, executor: Executor) -> float:
         """Take commands, and advance if the tick is complete and due; the turn's result."""
         received, idle_seconds = self._receive(), AT_ONCE
         if received:
@@ -208,7 +217,7 @@ class SimNode(ComposableNode):
         if self._settings.is_realtime:
             self._conflict_log.add(character.conflict, character.torques)
         else:
-            self._raise_fault(describe_conflict(self, character.conflict, character.torques))
+            self._raise_fault(describe_conflict(self.node, character.conflict, character.torques))
 
     def _run_watchdog(self) -> None:
         self._publisher.make_up()
@@ -223,13 +232,15 @@ class SimNode(ComposableNode):
             if event is WatchdogEvent.REPUBLISH:
                 self._publisher.republish(with_states=waits, with_episode=self._others.seen)
             elif waits and event is WatchdogEvent.EXPLAIN:
-                self.get_logger().warning(self._describe_waiting())
+                self.node.get_logger().warning(self._describe_waiting())
             elif waits and self._simulation.tick > FIRST_TICK:  # before that it just waits
                 self._on_timeout()
 
     def _describe_waiting(self) -> str:
         incomplete = [each for each in self._characters if each.missing]
-        return "; ".join(describe_waiting(self, each.torques, each.missing) for each in incomplete)
+        return "; ".join(
+            describe_waiting(self.node, each.torques, each.missing) for each in incomplete
+        )
 
     def _on_timeout(self) -> None:
         action = self._settings.on_timeout
@@ -237,7 +248,7 @@ class SimNode(ComposableNode):
         if action == "abort":
             self._control.fault = sentence
             raise SimulationError(sentence)
-        self.get_logger().warning(f"{sentence}; on_timeout: {action}")
+        self.node.get_logger().warning(f"{sentence}; on_timeout: {action}")
         if action == "pause":
             self._pause(sentence)
             return
@@ -249,7 +260,7 @@ class SimNode(ComposableNode):
         if self._settings.on_fault == "abort":
             self._control.pause(sentence, diverged=diverged)
             raise SimulationError(sentence)
-        self.get_logger().error(f"{sentence}; paused")
+        self.node.get_logger().error(f"{sentence}; paused")
         self._pause(sentence, diverged=diverged)
 
     def _pause(self, fault: str, *, diverged: bool = False) -> None:

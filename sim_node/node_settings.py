@@ -24,6 +24,7 @@ class NodeSettings:
     on_fault: str
     command_timeout_ns: int  # of simulated time
     push_ticks: int  # that a push lasts
+    step_ticks: int  # of a call of `~/step`
     display_ticks: int  # from what viewers show to the next
     frames: FrameNames
     clock: TickClock
@@ -51,6 +52,7 @@ def make_node_settings(values: Values) -> NodeSettings:
         on_fault=values.text("on_fault"),
         command_timeout_ns=round(values.number("command_timeout") * NANOSECONDS_PER_SECOND),
         push_ticks=max(round(values.number("wrench_duration") * rate), 1),
+        step_ticks=values.integer("step_count"),
         display_ticks=max(round(rate / values.number("display_rate")), 1),
         frames=FrameNames.of(values),
         clock=TickClock(rate),

@@ -1,14 +1,21 @@
 """The nodes of the executable `composed`: a simulator, and a controller for each character."""
 
+from typing import Any
+
 from rclpy.parameter import Parameter
 
 from controller_node.node import ControllerNode
+from msgs_config.bus.composition import (
+    ComposableNode,
+    Composition,
+    destroy_nodes,
+    errors_of,
+    ros_node,
+)
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION
-from msgs_config.runtime.composition import ComposableNode, Composition, destroy_nodes, errors_of
 from sim_node.node import SimNode
-from sim_node.parameters import CHARACTERS
 
 
 def compose() -> Composition:
@@ -23,7 +30,7 @@ def compose() -> Composition:
         with errors_of(topics.SIM_NODE):
             simulator = SimNode()
         nodes.append(simulator)
-        for character in simulator.get_parameter(CHARACTERS.name).value or [""]:
+        for character in simulator.characters:
             with errors_of(f"{character}/{topics.CONTROLLER_NODE}".lstrip("/")):
                 nodes.append(_make_controller(simulator, character))
         _check_names(nodes)
@@ -35,18 +42,20 @@ def compose() -> Composition:
 
 def _make_controller(simulator: SimNode, character: str) -> ControllerNode:
     """A controller in a character's namespace, below that of the simulator, and for it alone."""
-    own = [Parameter(SESSION.name, value=simulator.session)]
+    options: dict[str, Any] = {
+        "parameter_overrides": [Parameter(SESSION.name, value=simulator.session)]
+    }
     if not character:
-        return ControllerNode(parameter_overrides=own)
+        return ControllerNode(ros_node(topics.CONTROLLER_NODE, **options))
     # a node's own rule precedes a `__ns` for the whole process, which precedes `namespace`
-    namespace = f"{simulator.get_namespace().rstrip('/')}/{character}"
+    namespace = f"{simulator.node.get_namespace().rstrip('/')}/{character}"
     arguments = ["--ros-args", "-r", f"__ns:={namespace}"]
-    return ControllerNode(cli_args=arguments, parameter_overrides=own)
+    return ControllerNode(ros_node(topics.CONTROLLER_NODE, cli_args=arguments, **options))
 
 
 def _check_names(nodes: list[ComposableNode]) -> None:
     """Raise ConfigurationError if a rule for the whole process has given nodes one name."""
-    names = [node.get_fully_qualified_name() for node in nodes]
+    names = [each.node.get_fully_qualified_name() for each in nodes]
     for name in names:
         if names.count(name) > 1:
             raise ConfigurationError(

@@ -15,9 +15,7 @@ from typing import Any
 import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.client import Client
-from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from std_srvs.srv import SetBool, Trigger
 
 from actuated_characters.bags.recording import read_recording
@@ -35,6 +33,10 @@ from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_
 from actuated_characters.runs.planned_files import Planned
 from actuated_characters.runs.planned_throws import read_throws
 from actuated_characters.runs.planned_wrenches import read_pushes
+from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.node import Publisher
+from msgs_config.bus.polling import DirectSubscription, PollingExecutor
+from msgs_config.bus.ros_parameters import declare, given_parameters, set_request
 from msgs_config.errors import ReplayError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK, TickClock
@@ -44,10 +46,7 @@ from msgs_config.messages.session import SESSION, given_session, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, Values, resolve
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.publishing import create_publisher
-from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 from msgs_config.versions import describe_changes, installed_versions
 
 PARAMETERS = [
@@ -63,7 +62,7 @@ PARAMETERS = [
     SESSION,
 ]
 
-_ACKNOWLEDGE_TIMEOUT = Duration(seconds=10)  # until a node has what it was sent
+_ACKNOWLEDGE_TIMEOUT = 10.0  # s until a node has what it was sent
 _PACE = "real_time_factor"
 _REST = 0.01  # s between looks at the topics: one waking up for many messages
 _HELD_PACE = 1e-9  # of it: the first tick is years away, while states and their answers pass
@@ -191,7 +190,7 @@ class ForkNode(Node):
             self._wait_for_answer(row - 1)
         for node, settings in stop.settings:
             self._set(node, settings)
-        messages: list[tuple[str, Any]] = [*self._requests.get(row, ())]
+        messages: list[tuple[str, bytes]] = [*self._requests.get(row, ())]
         for push in stop.pushes:
             content = replace(push.arrays(), frame_id=self._session)
             messages.append((topics.EXTERNAL_WRENCH.name, encode_wrenches(content)))
@@ -202,7 +201,7 @@ class ForkNode(Node):
             self._wait(partial(self._is_heard, name), f"subscribers of '{name}'")
             self._outgoing[name][0].publish(message)
         for name in dict.fromkeys(name for name, _ in messages):
-            if not self._outgoing[name][0].wait_for_all_acked(_ACKNOWLEDGE_TIMEOUT):
+            if not self._outgoing[name][0].is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
                 raise RunError(f"what was sent on '{name}' was not acknowledged")
         if stop.resets:
             self._call("reset", Trigger.Request())

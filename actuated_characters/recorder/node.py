@@ -28,16 +28,16 @@ from actuated_characters.recorder.topics import (
 )
 from actuated_characters.runs.forked_from import given_origin
 from actuated_characters.runs.run_directory import metrics_directory, write_metrics
+from msgs_config.bus.once_logger import OnceLogger
+from msgs_config.bus.polling import PollingExecutor
+from msgs_config.bus.ros_parameters import declare, given_parameters
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import REMEDY, SESSION, given_session, named
 from msgs_config.messages.topic import LISTENING_DEPTH
 from msgs_config.parameters import Values, resolve
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.ros_parameters import declare, given_parameters
 
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
 _LONGEST_END = 20.0  # s for the messages that are on their way at the stop
@@ -63,7 +63,7 @@ class RecorderNode(Node):
         self._directory = Path(values.text("directory"))
         self._progress_period = values.number("progress_period")
         self._failure: str | None = None
-        self._once_logger = OnceLogger(self)
+        self._once_logger = OnceLogger(self.get_logger())
         self._filter = SessionFilter(given_session(values), self._once_logger.log_once)
         self._readers: list[TopicReader] = []
         characters = values.texts("characters") or ("",)

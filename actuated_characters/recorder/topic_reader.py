@@ -7,7 +7,7 @@ from rclpy.node import Node
 
 from actuated_characters.recorder.loss_count import LossCount
 from actuated_characters.recorder.topics import RecordedTopic
-from msgs_config.runtime.polling import DirectSubscription
+from msgs_config.bus.polling import DirectSubscription
 
 
 class TopicReader:

@@ -4,23 +4,22 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.serialization import serialize_message
 
 from actuated_characters.runs.planned_throws import read_throws
 from actuated_characters.runs.planned_velocities import read_velocities
 from actuated_characters.runs.planned_wrenches import read_pushes
+from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.polling import DirectSubscription, PollingExecutor
+from msgs_config.bus.ros_parameters import declare, given_parameters
 from msgs_config.messages import topics
+from msgs_config.messages.cdr import encode
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import SESSION, given_session
 from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.publishing import create_publisher
-from msgs_config.runtime.ros_parameters import declare, given_parameters
 
 PARAMETERS = [
     Parameter("file", "pushes.json", "the pushes, as a run writes them"),
@@ -34,7 +33,7 @@ PARAMETERS = [
     SESSION,
 ]
 
-_TIMEOUT = Duration(seconds=10)  # until the simulator has the messages
+_TIMEOUT = 10.0  # s until the simulator has the messages
 
 
 class PerturbationNode(Node):
@@ -78,7 +77,7 @@ class PerturbationNode(Node):
                 _PlannedPublisher(
                     self,
                     topics.CMD_VEL_STAMPED,
-                    [bytes(serialize_message(each.message())) for each in velocities],
+                    [encode(each.message()) for each in velocities],
                     values.integer("velocity_subscribers"),
                 )
             )
@@ -120,4 +119,4 @@ class _PlannedPublisher:
         """Send all; they have arrived when this returns."""
         for message in self._messages:
             self._publisher.publish(message)
-        self._publisher.wait_for_all_acked(_TIMEOUT)
+        self._publisher.is_acknowledged(_TIMEOUT)

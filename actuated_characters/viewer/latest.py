@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from rclpy.node import Node
 
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.polling import DirectSubscription
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import LayoutError, MessageError
 from msgs_config.messages import topics
@@ -19,7 +20,6 @@ from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.topic import Quality, Topic
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
-from msgs_config.runtime.polling import DirectSubscription
 
 _THROWS = 100  # that may come between two looks: as many as an episode can have
 _UNUSABLE_MESSAGE = (MessageError, LayoutError)

@@ -22,13 +22,13 @@ from actuated_characters.viewer.web.server import (
     start_server,
     stop_server,
 )
+from msgs_config.bus.once_logger import OnceLogger
+from msgs_config.bus.polling import PollingExecutor
+from msgs_config.bus.ros_parameters import declare, given_parameters
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
 from msgs_config.parameters import resolve
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.ros_parameters import declare, given_parameters
 
 _SEARCH_PERIOD = 1.0  # s between looks for simulators
 _FIRST_SEARCH_PERIOD = 0.2  # s, while none is known
@@ -50,7 +50,7 @@ class ViewerNode(Node):
         values = resolve(PARAMETERS, given_parameters(self))
         declare(self, PARAMETERS, values)
         self._period = 1.0 / values.number("fps")
-        self._once_logger = OnceLogger(self)
+        self._once_logger = OnceLogger(self.get_logger())
         host = values.text("host")
         self._rejections = Rejections()
         listening = open_socket(host, values.integer("port") or None)

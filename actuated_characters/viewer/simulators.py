@@ -9,11 +9,11 @@ from std_msgs.msg import Header, String
 
 from actuated_characters.bags.rebuilding import Rebuilt, rebuild
 from actuated_characters.viewer.latest import BallReader, CharacterReader
+from msgs_config.bus.polling import DirectSubscription
 from msgs_config.errors import ActuatedCharactersError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode
 from msgs_config.messages.session import episode_session
-from msgs_config.runtime.polling import DirectSubscription
 
 _CONFIGURATION = "/" + topics.CONFIGURATION.of(topics.SIM_NODE).name
 

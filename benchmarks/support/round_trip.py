@@ -18,13 +18,13 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.polling import DirectSubscription, PollingExecutor
 from msgs_config.character.layout import JointLayout
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.topic import Topic
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal, run_node
-from msgs_config.runtime.publishing import create_publisher
 
 _PING = replace(topics.JOINT_STATES, name="ping")
 _PONG = replace(topics.JOINT_TORQUES, name="pong")

@@ -4,16 +4,15 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 
-from rclpy.node import Node
-
-from msgs_config.runtime.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
+from msgs_config.bus.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
+from msgs_config.bus.node import BusNode
 from msgs_config.runtime.durations import Durations
 
 
 class AnswerReport:
     """Counts, and publishes the counts of this and others from time to time."""
 
-    def __init__(self, node: Node, character: str) -> None:
+    def __init__(self, node: BusNode, character: str) -> None:
         """`character` is the name of the hardware in the diagnostics."""
         self.counts: Counter[str] = Counter(answered=0, repeated=0, ignored=0, overtaken=0)
         self.answer_times = Durations()

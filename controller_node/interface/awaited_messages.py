@@ -1,14 +1,13 @@
 """The messages beside a state that a behaviour needs to answer it."""
 
-from rclpy.node import Node
-
 from controller_node.behaviours.base import Surroundings
 from controller_node.controller import Controller
 from controller_node.interface.contact_subscription import ContactSubscription
 from controller_node.interface.opponent_subscription import OpponentSubscription, states_of
 from controller_node.interface.simulators import Simulators
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.character.model import Character
-from msgs_config.runtime.once_logger import OnceLogger
 
 
 class AwaitedMessages:
@@ -16,7 +15,7 @@ class AwaitedMessages:
 
     def __init__(
         self,
-        node: Node,
+        node: BusNode,
         controller: Controller,
         character: Character,
         simulators: Simulators,

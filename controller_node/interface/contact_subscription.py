@@ -1,17 +1,16 @@
 """The contacts that go with each state, as they come over a topic."""
 
 import numpy as np
-from rclpy.node import Node
 
 from controller_node.interface.simulators import Simulators
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.character.model import Character
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import read_frame_id
 from msgs_config.messages.wrenches import decode_wrenches
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import DirectSubscription
 
 _MAX_WRENCH = 1e9  # N and N m
 _MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the states waiting
@@ -22,10 +21,10 @@ class ContactSubscription:
     """Takes `contacts` of the bound simulator, and has those of each state ready."""
 
     def __init__(
-        self, node: Node, character: Character, simulators: Simulators, logger: OnceLogger
+        self, node: BusNode, character: Character, simulators: Simulators, logger: OnceLogger
     ) -> None:
         self._simulators = simulators
-        self._inbox = DirectSubscription(node, topics.CONTACTS)
+        self._inbox = node.subscription(topics.CONTACTS)
         self._rows = {link.name: row for row, link in enumerate(character.links)}
         self._once_logger = logger
         self._until_ns = -1  # of the last state of the episode that has had its contacts

@@ -3,17 +3,16 @@
 import time
 
 import numpy as np
-from rclpy.node import Node
 
 from controller_node.interface.simulators import Simulators
 from msgs_config.arrays import FloatArray, all_finite
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.character.layout import ROOT
 from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.topic import Topic
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import DirectSubscription
 
 _AXES = tuple(f"{ROOT}_{axis}" for axis in "xyz")
 _MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the own states waiting
@@ -21,7 +20,7 @@ _EXPLAIN_AFTER = 2.0  # s of wall time
 _MOST_KEPT = 5000  # ticks whose own states are yet to come, as of contacts
 
 
-def states_of(node: Node, opponent: str) -> Topic:
+def states_of(node: BusNode, opponent: str) -> Topic:
     """The topic of an opponent's states; raises ConfigurationError if there can be none."""
     world, _, own = node.get_namespace().rpartition("/")
     if not own or own == opponent:
@@ -39,11 +38,11 @@ class OpponentSubscription:
     """
 
     def __init__(
-        self, node: Node, opponent: str, simulators: Simulators, logger: OnceLogger
+        self, node: BusNode, opponent: str, simulators: Simulators, logger: OnceLogger
     ) -> None:
         """Subscribe. Raises ConfigurationError if the node is in no character's namespace."""
         self.opponent, topic = opponent, states_of(node, opponent)
-        self._inbox = DirectSubscription(node, topic)
+        self._inbox = node.subscription(topic)
         self._simulators, self._once_logger = simulators, logger
         self._name, self._decoder = topic.name, JointStateDecoder()
         self._places = dict[int, FloatArray]()  # by stamp

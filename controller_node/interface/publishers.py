@@ -6,10 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped
-from rclpy.node import Node
-from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 from controller_node.actuation import net_wrench
@@ -19,20 +16,15 @@ from controller_node.planner.outlook import Outlook
 from controller_node.references.steering.velocity import VelocityCommand
 from controller_node.strength import Strengths
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.bus.node import BusNode, Publisher
+from msgs_config.bus.publishing import Outgoing, flush, has_subscribers, publish_together
 from msgs_config.character.layout import JointLayout
 from msgs_config.frame_names import WORLD
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import DoublesEncoder, split_stamp
+from msgs_config.messages.cdr import DoublesEncoder, encode, encode_string, split_stamp
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference, StampedState
-from msgs_config.runtime.publishing import (
-    Outgoing,
-    create_publisher,
-    flush,
-    has_subscribers,
-    publish_together,
-)
 from msgs_config.runtime.throttle import Throttle
 
 _FLUSH_TIME = 0.5  # s that subscribers may take to acknowledge messages
@@ -53,7 +45,7 @@ class Publishers:
     """The publishers of a controller. A topic without subscribers costs nothing."""
 
     def __init__(
-        self, node: Node, layout: JointLayout, commanded: IntArray, session: str | None
+        self, node: BusNode, layout: JointLayout, commanded: IntArray, session: str | None
     ) -> None:
         """Offer the topics; `commanded` are the entries of the effort that are sent.
 
@@ -64,18 +56,18 @@ class Publishers:
         self._undriven = commanded[:0]
         self.bind(session or ANONYMOUS)
         self._wrench_encoder = DoublesEncoder(WORLD)
-        self._initial_states = create_publisher(node, topics.INITIAL_STATE)
-        self._references = create_publisher(node, topics.REFERENCE)
-        self._throttled_references = create_publisher(node, topics.REFERENCE_THROTTLE)
+        self._initial_states = node.publisher(topics.INITIAL_STATE)
+        self._references = node.publisher(topics.REFERENCE)
+        self._throttled_references = node.publisher(topics.REFERENCE_THROTTLE)
         self._throttle = Throttle()
-        self._wrenches = create_publisher(node, topics.NET_WRENCH)
-        self._torques = create_publisher(node, topics.JOINT_TORQUES)
-        self._configurations = create_publisher(node, topics.CONFIGURATION)
-        self._trajectories = create_publisher(node, topics.ACTIVE_TRAJECTORY)
-        self._velocities = create_publisher(node, topics.ACTIVE_CMD_VEL)
-        self._strengths = create_publisher(node, topics.ACTIVE_STRENGTH)
-        self._modes = create_publisher(node, topics.MODE)
-        self._plans = create_publisher(node, topics.PLAN)
+        self._wrenches = node.publisher(topics.NET_WRENCH)
+        self._torques = node.publisher(topics.JOINT_TORQUES)
+        self._configurations = node.publisher(topics.CONFIGURATION)
+        self._trajectories = node.publisher(topics.ACTIVE_TRAJECTORY)
+        self._velocities = node.publisher(topics.ACTIVE_CMD_VEL)
+        self._strengths = node.publisher(topics.ACTIVE_STRENGTH)
+        self._modes = node.publisher(topics.MODE)
+        self._plans = node.publisher(topics.PLAN)
         self._published_mode: ModeReport | None = None
         self._published_outlook: Outlook | None = None
 
@@ -105,7 +97,7 @@ class Publishers:
     @property
     def torque_subscribers(self) -> int:
         """How many subscribe to the torques."""
-        return int(self._torques.get_subscription_count())
+        return self._torques.get_subscription_count()
 
     def make_reply(
         self, raw: bytes, state: StampedState, effort: FloatArray, reference: StampedReference
@@ -146,11 +138,11 @@ class Publishers:
 
     def publish_configuration(self, text: str) -> None:
         """Publish what the controller is and has in force, as JSON."""
-        self._configurations.publish(String(data=text))
+        self._configurations.publish(encode_string(text))
 
     def publish_trajectory(self, trajectory: JointTrajectory) -> None:
         """Publish a trajectory that was taken, with the stamp that it begins at."""
-        self._trajectories.publish(trajectory)
+        self._trajectories.publish(encode(trajectory))
 
     def publish_velocity(self, command: VelocityCommand, start_ns: int) -> None:
         """Publish a velocity as it was taken, with the stamp that it begins at."""
@@ -158,7 +150,7 @@ class Publishers:
         message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)
         message.twist.linear.x, message.twist.linear.y = command.forward, command.left
         message.twist.angular.z = command.turn
-        self._velocities.publish(message)
+        self._velocities.publish(encode(message))
 
     def publish_strengths(self, strengths: Strengths) -> None:
         """Publish strengths that were taken, of every joint, with the stamp that they begin at."""
@@ -166,7 +158,7 @@ class Publishers:
         message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(strengths.start_ns)
         values = strengths.by_joint(self._layout)
         message.name, message.effort = list(values), list(values.values())
-        self._strengths.publish(message)
+        self._strengths.publish(encode(message))
 
     def begin_episode(self) -> None:
         """Publish the next mode even where it is the one of before."""
@@ -183,10 +175,10 @@ class Publishers:
         if outlook is not None and outlook is not self._published_outlook:
             self._published_outlook = outlook
             if has_subscribers(self._plans):
-                self._plans.publish(plan_message(outlook, stamp_ns))
+                self._plans.publish(encode(plan_message(outlook, stamp_ns)))
         if mode is not None and mode is not self._published_mode:
             self._published_mode = mode
-            self._modes.publish(String(data=json.dumps(mode.content(), allow_nan=False)))
+            self._modes.publish(encode_string(json.dumps(mode.content(), allow_nan=False)))
 
     def _net_wrench(self, reply: Reply) -> bytes:
         """The serialised message."""

@@ -3,13 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rclpy.node import Node
-from std_msgs.msg import Header, String
-
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.errors import ActuatedCharactersError, ClockError, MessageError
 from msgs_config.messages import configuration, topics
-from msgs_config.messages.cdr import decode, read_frame_id
-from msgs_config.messages.clock import FIRST_TICK, NANOSECONDS_PER_SECOND, TickClock
+from msgs_config.messages.cdr import decode_header, decode_string, read_frame_id
+from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.session import (
     ForeignSessions,
@@ -18,8 +17,6 @@ from msgs_config.messages.session import (
     named,
     read_session,
 )
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import DirectSubscription
 
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
 _MOST_KNOWN = 8  # simulators of which something is kept
@@ -46,14 +43,14 @@ class Simulators:
 
     def __init__(
         self,
-        node: Node,
+        node: BusNode,
         session: str,
         clock: TickClock,
         check: Callable[[RunConfiguration], None],
         logger: OnceLogger,
     ) -> None:
         """`check` raises an error if a simulator is not what this controller was made for."""
-        self._count_publishers = lambda: int(node.count_publishers(topics.JOINT_STATES.name))
+        self._count_publishers = lambda: node.count_publishers(topics.JOINT_STATES.name)
         self._binding = SessionBinding(session, self._count_publishers)
         self._foreign = ForeignSessions()
         self._clock = clock
@@ -65,8 +62,8 @@ class Simulators:
         self._lacks_episode_since: float | None = None
         self._disagrees_since: float | None = None
         depth = 2 * _MOST_KNOWN  # one of the one must not push out one of the other
-        self._episodes = DirectSubscription(node, topics.EPISODE.for_listener(depth))
-        self._configurations = DirectSubscription(node, _CONFIGURATION.for_listener(depth))
+        self._episodes = node.subscription(topics.EPISODE.for_listener(depth))
+        self._configurations = node.subscription(_CONFIGURATION.for_listener(depth))
         self.runs_on = False
         """Whether the simulator runs in real time, and waits for no answer."""
 
@@ -199,12 +196,11 @@ class Simulators:
         if raw is None:
             return
         try:
-            header = decode(raw, Header)
-            session = episode_session(header.frame_id)
+            stamp_ns, frame_id = decode_header(raw)
+            session = episode_session(frame_id)
             if self._binding.bound is not None and not self._binding.hear(session):
                 self._reject(topics.EPISODE.name, session)
                 return
-            stamp_ns = header.stamp.sec * NANOSECONDS_PER_SECOND + header.stamp.nanosec
             if self._clock.tick(stamp_ns) < FIRST_TICK:
                 raise ClockError(f"its stamp, {stamp_ns} ns, is before the first tick")
         except (MessageError, ClockError) as error:
@@ -217,7 +213,7 @@ class Simulators:
         raw = self._configurations.take()
         if raw is not None:
             try:
-                self._hear_configuration(configuration.parse(decode(raw, String).data))
+                self._hear_configuration(configuration.parse(decode_string(raw)))
             except MessageError as error:
                 self._once_logger.log_once(f"configuration ignored: {error}")
 

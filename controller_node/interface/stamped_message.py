@@ -4,10 +4,10 @@ from typing import Any
 
 from builtin_interfaces.msg import Duration, Time
 
+from msgs_config.bus.stamped_subscription import PastStampError
 from msgs_config.errors import MotionError
 from msgs_config.messages.cdr import decode
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.runtime.stamped_subscription import PastStampError
 
 _MAX_BYTES = 2**25  # bytes of a message
 _LATEST_NS = 10**15  # after now

@@ -3,7 +3,6 @@
 from functools import partial
 
 from geometry_msgs.msg import Twist, TwistStamped
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
@@ -12,11 +11,12 @@ from controller_node.interface.publishers import Publishers
 from controller_node.interface.stamped_message import decode_stamped, nanoseconds
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
+from msgs_config.bus.stamped_subscription import StampedSubscription
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode, split_stamp
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.stamped_subscription import StampedSubscription
 
 
 class StampedTopics:
@@ -27,7 +27,7 @@ class StampedTopics:
     """
 
     def __init__(
-        self, node: Node, controller: Controller, outputs: Publishers, logger: OnceLogger
+        self, node: BusNode, controller: Controller, outputs: Publishers, logger: OnceLogger
     ) -> None:
         self._outputs, self._logger = outputs, logger
         self._subscribe = partial(StampedSubscription, node, rejection="refused ", logger=logger)

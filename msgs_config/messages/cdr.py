@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState, MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
@@ -101,6 +101,49 @@ def decode(raw: bytes, message_type: type) -> Any:
         return deserialize_message(raw, message_type)
     except Exception as error:  # rclpy has no exception type for bytes that it cannot decode
         raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
+
+
+def encode(message: Any) -> bytes:
+    """A message of any type, serialised."""
+    return bytes(serialize_message(message))
+
+
+def encode_string(text: str) -> bytes:
+    """A serialised std_msgs/String."""
+    content = text.encode() + b"\0"
+    return CDR_LITTLE_ENDIAN + struct.pack("<I", len(content)) + content
+
+
+def decode_string(raw: bytes) -> str:
+    """The text of a serialised std_msgs/String.
+
+    Raises:
+        MessageError: the bytes are no such message.
+    """
+    try:
+        return _read_text(raw, STAMP_START, _BYTE_ORDERS[raw[:2]])[0]
+    except (KeyError, struct.error, ValueError) as error:
+        raise MessageError(f"{len(raw)} bytes that are no String") from error
+
+
+def encode_header(stamp_ns: int, frame_id: str) -> bytes:
+    """A serialised std_msgs/Header."""
+    content = frame_id.encode() + b"\0"
+    head = with_stamp(CDR_LITTLE_ENDIAN + bytes(8), stamp_ns)
+    return head + struct.pack("<I", len(content)) + content
+
+
+def decode_header(raw: bytes) -> tuple[int, str]:
+    """The stamp, ns, and the `frame_id` of a serialised std_msgs/Header.
+
+    Raises:
+        MessageError: the bytes are no such message.
+    """
+    try:
+        order = _BYTE_ORDERS[raw[:2]]
+        return _read_stamp(raw, order), _read_text(raw, NAMES_START, order)[0]
+    except (KeyError, struct.error, ValueError) as error:
+        raise MessageError(f"{len(raw)} bytes that are no Header") from error
 
 
 class NamedLists(NamedTuple):

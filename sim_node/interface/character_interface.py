@@ -1,18 +1,17 @@
 """ROS interface of one character: subscribes to commands and wrenches, publishes its state."""
 
 import numpy as np
-from rclpy.node import Node
 
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
+from msgs_config.bus.stamped_subscription import StampedSubscription, first_tick
 from msgs_config.errors import CommandError, LayoutError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.session import OwnSession
 from msgs_config.messages.wrenches import decode_wrenches
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import DirectSubscription
-from msgs_config.runtime.stamped_subscription import StampedSubscription, first_tick
 from sim_node.interface.publishers import Publishers
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
@@ -28,7 +27,7 @@ class CharacterInterface:
 
     def __init__(
         self,
-        node: Node,
+        node: BusNode,
         character: SimulatedCharacter,
         clock: TickClock,
         settings: NodeSettings,
@@ -55,7 +54,7 @@ class CharacterInterface:
             self.commands = LockstepBarrier(names, commanded, leaders)
         self.last_effort = self.commands.effort
         self._decoder = JointStateDecoder()
-        self._torque_messages = DirectSubscription(node, self.torques)
+        self._torque_messages = node.subscription(self.torques)
         self._pushes = WrenchQueue(character.character)
         self._wrench = topics.EXTERNAL_WRENCH.under(self.name)
         self._wrench_messages = StampedSubscription(

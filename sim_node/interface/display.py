@@ -5,19 +5,17 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from rclpy.node import Node
-from rclpy.publisher import Publisher
-from std_msgs.msg import String
 
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.node import BusNode, Publisher
+from msgs_config.bus.publishing import has_subscribers
 from msgs_config.character.urdf.described_joints import DescribedJoints
 from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.geometry import fixed_order, frames, rotations
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import DoublesEncoder
+from msgs_config.messages.cdr import DoublesEncoder, encode_string
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.topic import Topic
-from msgs_config.runtime.publishing import create_publisher, has_subscribers
 from sim_node.interface.markers import MarkerEncoder
 from sim_node.interface.transforms import TransformPublisher
 from sim_node.node_settings import NodeSettings
@@ -44,7 +42,9 @@ class DisplayPublishers:
     A topic without subscribers costs nothing.
     """
 
-    def __init__(self, node: Node, character: SimulatedCharacter, settings: NodeSettings) -> None:
+    def __init__(
+        self, node: BusNode, character: SimulatedCharacter, settings: NodeSettings
+    ) -> None:
         """Offer the topics, below the character's name, and publish what never changes."""
         self._character = character
         self._ticks = settings.display_ticks
@@ -52,7 +52,7 @@ class DisplayPublishers:
         """Whether a contact wrench has a subscriber, when the last sample was published."""
 
         def create(topic: Topic) -> Publisher:
-            return create_publisher(node, topic.under(character.setup.name))
+            return node.publisher(topic.under(character.setup.name))
 
         whole, prefix = character.character, character.setup.prefix
         self._joints = DescribedJoints(whole, settings.frames.base)
@@ -60,7 +60,7 @@ class DisplayPublishers:
         self._visualization = create(topics.VISUALIZATION)
         self._joint_states = create(topics.DESCRIPTION_JOINT_STATES)
         self._description = create(topics.ROBOT_DESCRIPTION)
-        self._description.publish(String(data=robot_description(whole, settings.frames.base)))
+        self._description.publish(encode_string(robot_description(whole, settings.frames.base)))
         self._wrenches = list(self._make_wrenches(create))
         self._transforms: TransformPublisher | None = None
         if topics.TF.is_installed:

@@ -2,13 +2,11 @@
 
 from collections.abc import Callable, Mapping
 
-from rclpy.node import Node
-from rclpy.parameter import Parameter as RosParameter
-
+from msgs_config.bus.live_parameters import LiveParameters
+from msgs_config.bus.node import BusNode
 from msgs_config.errors import ConfigurationError
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values
-from msgs_config.runtime.ros_parameters import LiveParameters, declare
 from sim_node.initial_state import (
     INITIAL_STATE,
     POSITION,
@@ -27,7 +25,7 @@ class EpisodeParameters:
     """
 
     def __init__(
-        self, node: Node, loaded: SimulatorParameters, take: Callable[[Values], None]
+        self, node: BusNode, loaded: SimulatorParameters, take: Callable[[Values], None]
     ) -> None:
         """Declare the node's parameters, and hand their values to `take` after each change.
 
@@ -38,7 +36,8 @@ class EpisodeParameters:
         self._upcoming = loaded.values
         self._begun = False
         unknown = loaded.open
-        declare(node, [each for each in loaded.declared if each not in unknown], loaded.values)
+        known = [each for each in loaded.declared if each not in unknown]
+        node.declare(known, loaded.values)
         self._live = LiveParameters(node, loaded.declared, loaded.values, self._change, self._check)
 
     def begin_in(self, states: Mapping[str, StampedState]) -> None:
@@ -84,8 +83,7 @@ class EpisodeParameters:
             for name in (each.prefix + POSITION, each.prefix + VELOCITY)
         }
         self._upcoming = Values(self._upcoming | shown)
-        parameters = [RosParameter(name, value=value) for name, value in shown.items()]
-        self._node.set_parameters_atomically(parameters)
+        self._node.set_own_parameters(shown)
 
     def _check(self, values: Values) -> None:
         self.in_force.check_starts(self._upcoming, values)

@@ -3,17 +3,14 @@
 import time
 from collections.abc import Generator, Iterable, Mapping
 
-from rclpy.node import Node
-
+from msgs_config.bus.composition import UNTIL_A_MESSAGE
+from msgs_config.bus.node import BusNode, Stop
+from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.errors import LayoutError, MessageError, SimulationError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values
-from msgs_config.runtime.composition import UNTIL_A_MESSAGE
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import DirectSubscription
-from msgs_config.runtime.process import StopSignal
 from sim_node.initial_state import (
     GIVEN,
     INITIAL_STATE,
@@ -37,7 +34,10 @@ class InitialStates:
     """The initial states that controllers have to publish."""
 
     def __init__(
-        self, node: Node, characters: Iterable[SimulatedCharacter], parameters: SimulatorParameters
+        self,
+        node: BusNode,
+        characters: Iterable[SimulatedCharacter],
+        parameters: SimulatorParameters,
     ) -> None:
         """Subscribe to the controllers of the characters that begin with their references."""
         self._node = node
@@ -57,7 +57,7 @@ class InitialStates:
                 character = self._characters[each.name]
                 self._subscriptions.append(_Subscription(self._node, character, self._speed_limit))
 
-    def wait(self, stop: StopSignal) -> Generator[float, None, dict[str, StampedState]]:
+    def wait(self, stop: Stop) -> Generator[float, None, dict[str, StampedState]]:
         """Wait, in turns, for the states, by the characters' names; none if `stop` comes first.
 
         Raises:
@@ -102,7 +102,7 @@ class InitialStates:
 class _Subscription:
     """The state in which one character's reference begins, as its one controller publishes it."""
 
-    def __init__(self, node: Node, character: SimulatedCharacter, speed_limit: float) -> None:
+    def __init__(self, node: BusNode, character: SimulatedCharacter, speed_limit: float) -> None:
         self.name = character.setup.name
         self._state: StampedState | None = None
         self._character = character.character
@@ -110,9 +110,9 @@ class _Subscription:
         self._node = node
         self._topic = topics.INITIAL_STATE.of(topics.CONTROLLER_NODE).under(self.name)
         self._of = f" of '{self.name}'" if self.name else ""
-        self._once_logger = OnceLogger(node)
+        self._once_logger = OnceLogger(node.get_logger())
         self._decoder = JointStateDecoder()
-        self._messages = DirectSubscription(node, self._topic)
+        self._messages = node.subscription(self._topic)
         self._contested = False
         self._rejection = ""
 
@@ -127,7 +127,7 @@ class _Subscription:
         elif self._contested:
             self._contested = False
             self._messages.close()
-            self._messages = DirectSubscription(self._node, self._topic)
+            self._messages = self._node.subscription(self._topic)
         elif (raw := self._messages.take()) is not None:
             self._take(raw)
         return self._state
@@ -151,7 +151,7 @@ class _Subscription:
         return self._rejection or describe_publishers(self._node, self._topic)
 
 
-def log_warnings(node: Node, parameters: SimulatorParameters) -> None:
+def log_warnings(node: BusNode, parameters: SimulatorParameters) -> None:
     """Log likely mistakes in files, where a character begins below the ground, and its bounds."""
     for each in parameters.characters:
         character, values = each.character, each.values

@@ -3,49 +3,46 @@
 import time
 from collections.abc import Sequence
 
-from rclpy.node import Node
-from rclpy.qos import QoSCompatibility, qos_check_compatible
-
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.messages.session import REMEDY
 from msgs_config.messages.topic import Topic
-from msgs_config.runtime.endpoint_types import other_types, type_name
-from msgs_config.runtime.once_logger import OnceLogger
 
 _UNKNOWN_NODE = "a node whose name is not known"
 _NAMES_SHOWN = 6
-_UNKNOWN = "_UNKNOWN_"  # in what ROS says of a node whose name has not come yet
 _NAME_PATIENCE, _NAME_POLL = 1.0, 0.01  # s
 
 
-def describe_waiting(node: Node, topic: Topic, missing: list[str]) -> str:
+def describe_waiting(node: BusNode, topic: Topic, missing: list[str]) -> str:
     """One sentence: the entries that lack a command, and the publishers that there are."""
     shown = ", ".join(missing[:_NAMES_SHOWN])
     more = f" and {len(missing) - _NAMES_SHOWN} more" if len(missing) > _NAMES_SHOWN else ""
     return f"waiting for commands of {shown}{more}; {describe_publishers(node, topic)}"
 
 
-def describe_conflict(node: Node, joint: str, topic: Topic) -> str:
+def describe_conflict(node: BusNode, joint: str, topic: Topic) -> str:
     """One sentence: the entry that is commanded twice, and the nodes that publish commands."""
     return _conflict(joint, topic, publisher_names(node, topic))
 
 
-def describe_publishers(node: Node, topic: Topic) -> str:
+def describe_publishers(node: BusNode, topic: Topic) -> str:
     """One sentence: the nodes that publish on a topic, and whose type or QoS does not fit."""
-    infos = node.get_publishers_info_by_topic(topic.name)
-    if not infos:
+    endpoints = node.endpoints(topic)
+    if not endpoints:
         return f"'{topic.name}' has no publisher"
     sentence = f"'{topic.name}' is published by {', '.join(publisher_names(node, topic))}"
-    right = type_name(topic.message_type)
-    for other in other_types(infos, right):
-        sentence += f"; the type of {other.node} is {other.type_name}, and must be {right}"
-    for info in infos:
-        compatibility, reason = qos_check_compatible(info.qos_profile, topic.qos)
-        if compatibility == QoSCompatibility.ERROR:
-            sentence += f"; the QoS of {info.node_name} does not fit: {reason.strip()}"
+    others = {
+        (each.node, each.type_name) for each in endpoints if each.type_name != topic.type_name
+    }
+    for name, other_type in sorted(others):
+        sentence += f"; the type of {name} is {other_type}, and must be {topic.type_name}"
+    for each in endpoints:
+        if each.misfit:
+            sentence += f"; the QoS of {each.node.rpartition('/')[2]} does not fit: {each.misfit}"
     return sentence
 
 
-def publisher_names(node: Node, topic: Topic) -> list[str]:
+def publisher_names(node: BusNode, topic: Topic) -> list[str]:
     """Full names of the nodes that publish on a topic; with GIDs where several have one name.
 
     A publisher is discovered a moment before the name of its node, which is worth a short wait.
@@ -56,13 +53,11 @@ def publisher_names(node: Node, topic: Topic) -> list[str]:
     return _told_apart(found)
 
 
-def _found(node: Node, topic: Topic) -> dict[str, list[str]]:
+def _found(node: BusNode, topic: Topic) -> dict[str, list[str]]:
     """GIDs of the publishers of a topic, by the full names of their nodes."""
     found: dict[str, list[str]] = {}
-    for info in node.get_publishers_info_by_topic(topic.name):
-        name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-        gid = ".".join(f"{byte:02x}" for byte in info.endpoint_gid)  # as `ros2 topic info -v`
-        found.setdefault(_UNKNOWN_NODE if _UNKNOWN in name else name, []).append(gid)
+    for each in node.endpoints(topic):
+        found.setdefault(each.node or _UNKNOWN_NODE, []).append(each.identity)
     return found
 
 
@@ -83,7 +78,7 @@ def _conflict(joint: str, topic: Topic, senders: Sequence[str]) -> str:
 class ConflictLog:
     """Logs in real time which nodes compete for a joint, once for each, when they are known."""
 
-    def __init__(self, node: Node, logger: OnceLogger) -> None:
+    def __init__(self, node: BusNode, logger: OnceLogger) -> None:
         self._node = node
         self._once_logger = logger
         self._topics: dict[str, Topic] = {}  # by joint
@@ -106,7 +101,7 @@ class OtherSimulators:
     """Logs, once for each set of names, that a topic of states has more than one publisher."""
 
     def __init__(
-        self, node: Node, states: Sequence[Topic], session: str, logger: OnceLogger
+        self, node: BusNode, states: Sequence[Topic], session: str, logger: OnceLogger
     ) -> None:
         self._node = node
         self._states = states

@@ -3,28 +3,18 @@
 import time
 from collections.abc import Iterator, Sequence
 
-from builtin_interfaces.msg import Time
-from rclpy.node import Node
-from rclpy.publisher import Publisher
-from std_msgs.msg import Header, String
-
+from msgs_config.bus.composition import UNTIL_A_MESSAGE, Turns
+from msgs_config.bus.node import BusNode, Publisher, Stop
+from msgs_config.bus.publishing import Outgoing, has_subscribers, publish_together
 from msgs_config.character.model import UrdfOptions
 from msgs_config.messages import configuration, topics
-from msgs_config.messages.cdr import split_stamp, with_stamp
+from msgs_config.messages.cdr import encode_header, encode_string, with_stamp
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import SelectionEncoder, WrenchArrays, encode_wrenches
 from msgs_config.parameters import Values
-from msgs_config.runtime.composition import UNTIL_A_MESSAGE, Turns
-from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.publishing import (
-    Outgoing,
-    create_publisher,
-    has_subscribers,
-    publish_together,
-)
 from sim_node.interface.display import DisplayPublishers
 from sim_node.interface.sensors import SensorPublishers
 from sim_node.node_settings import NodeSettings
@@ -37,18 +27,18 @@ class Publishers:
     """The publishers of one character. A topic without subscribers costs nothing."""
 
     def __init__(
-        self, node: Node, character: SimulatedCharacter, settings: NodeSettings, session: str
+        self, node: BusNode, character: SimulatedCharacter, settings: NodeSettings, session: str
     ) -> None:
         """Offer the topics, below the character's name; messages name the simulator's `session`."""
         self._character = character
         self._session = session
         self._links = [link.name for link in character.character.links]
         self._last_state = b""
-        self._last_episode: Header | None = None
+        self._last_episode: bytes | None = None
         self._make_encoders()
 
         def create(topic: Topic) -> Publisher:
-            return create_publisher(node, topic.under(character.setup.name))
+            return node.publisher(topic.under(character.setup.name))
 
         self._episode = create(topics.EPISODE)
         self.configuration = create(topics.CONFIGURATION.of(node.get_name()))
@@ -70,7 +60,7 @@ class Publishers:
     @property
     def state_subscribers(self) -> int:
         """Number of subscribers of the states."""
-        return int(self._states.get_subscription_count())
+        return self._states.get_subscription_count()
 
     def wants_contacts(self, *, throttled: bool) -> bool:
         """Whether the contacts have subscribers, their wrenches for viewers, or force sensors.
@@ -111,7 +101,7 @@ class Publishers:
             characters=characters,
             session=self._session,
         )
-        self.configuration.publish(String(data=text))
+        self.configuration.publish(encode_string(text))
 
     def change_sensing(self, settings: SensingSettings) -> None:
         """Read the sensors by other settings from now on."""
@@ -119,7 +109,7 @@ class Publishers:
 
     def publish_episode(self, number: int, stamp_ns: int) -> None:
         """Publish that an episode begins with the state of this stamp."""
-        self._last_episode = _header(stamp_ns, episode_text(number, self._session))
+        self._last_episode = encode_header(stamp_ns, episode_text(number, self._session))
         self._episode.publish(self._last_episode)
 
     def before_state(self) -> Iterator[Outgoing]:
@@ -200,10 +190,10 @@ class Publishers:
 
 
 def wait_for_subscribers(
-    node: Node,
+    node: BusNode,
     publishers: Sequence[Publishers],
     wanted: int,
-    stop: StopSignal,
+    stop: Stop,
 ) -> Turns:
     """Wait, in turns, until each character's states have as many subscribers, or until `stop`."""
     watchdog = Watchdog()
@@ -215,8 +205,3 @@ def wait_for_subscribers(
                 f"waiting for {wanted} subscribers of joint_states; there are {found}; has one "
                 "not started, or ended?"
             )
-
-
-def _header(stamp_ns: int, frame_id: str) -> Header:
-    seconds, nanoseconds = split_stamp(stamp_ns)
-    return Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame_id)

@@ -4,13 +4,12 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from rclpy.node import Node
-from rclpy.publisher import Publisher
 
+from msgs_config.bus.node import BusNode, Publisher
+from msgs_config.bus.publishing import Outgoing, has_subscribers
 from msgs_config.character.sensors import SensorType
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder
-from msgs_config.runtime.publishing import Outgoing, create_publisher, has_subscribers
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.sensors.readers import SensingSettings, SensorReader, make_readers
@@ -30,7 +29,9 @@ class _SensorPublisher(NamedTuple):
 class SensorPublishers:
     """Publishes the readings of the sensors that have subscribers; nothing is read for others."""
 
-    def __init__(self, node: Node, character: SimulatedCharacter, settings: NodeSettings) -> None:
+    def __init__(
+        self, node: BusNode, character: SimulatedCharacter, settings: NodeSettings
+    ) -> None:
         """Offer a topic for each sensor, below the character's name."""
         self._character, self._clock = character, settings.clock
         self.wants_contacts = False
@@ -41,7 +42,7 @@ class SensorPublishers:
             self._sensors.append(
                 _SensorPublisher(
                     reader,
-                    create_publisher(node, topic),
+                    node.publisher(topic),
                     DoublesEncoder(character.setup.prefix + sensor.name),
                     sensor.type is SensorType.FORCE,
                 )

@@ -2,13 +2,8 @@
 
 from collections.abc import Callable
 
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.node import Node
-from rclpy.task import Future
-from std_srvs.srv import SetBool, Trigger
-
+from msgs_config.bus.node import Answer, BusNode, Executor
 from msgs_config.errors import CommandError
-from msgs_config.runtime.polling import PollingExecutor
 from sim_node.timing.run_control import RunControl
 
 
@@ -17,71 +12,62 @@ class Services:
 
     def __init__(
         self,
-        node: Node,
+        node: BusNode,
         control: RunControl,
+        step_ticks: Callable[[], int],
         resume: Callable[[], None],
         reset: Callable[[], None],
     ) -> None:
-        """`resume` asks for the present tick's commands again, `reset` begins an episode."""
-        self._node = node
+        """`step_ticks` says how many ticks a call of `~/step` is.
+
+        `resume` asks for the present tick's commands again, `reset` begins an episode.
+        """
         self._control = control
+        self._step_ticks = step_ticks
         self._resume = resume
         self._reset = reset
-        self._steps: Future | None = None  # of the reason that ended them
-        node.create_service(SetBool, "~/pause", self._on_pause)
-        # in another group: in the node's it would keep all others waiting until its steps are done
-        group = ReentrantCallbackGroup()
-        node.create_service(Trigger, "~/step", self._on_step, callback_group=group)
-        node.create_service(Trigger, "~/reset", self._on_reset)
+        self._steps: Answer | None = None  # of the call whose steps are not done yet
+        node.offer("pause", self._on_pause, takes_flag=True)
+        node.offer("step", self._on_step)
+        node.offer("reset", self._on_reset)
 
     def end_steps(self, reason: str = "") -> None:
         """Answer a call of `~/step`, if there is one; `reason` is empty if its steps are done."""
-        if self._steps is not None:
-            self._steps.set_result(reason)
-            self._steps = None
+        steps, self._steps = self._steps, None
+        if steps is not None:
+            steps.give(not reason, reason or f"{self._stepped} ticks done")
 
-    def end(self, executor: PollingExecutor) -> None:
+    def end(self, executor: Executor) -> None:
         """Answer all open calls; the simulation ends."""
         self.end_steps("the simulation ends")
         executor.serve_pending()  # the last step may have been the run's last tick
 
-    def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        response.success = True
-        if request.data:
+    def _on_pause(self, pauses: bool) -> Answer:
+        if pauses:
             self._control.pause()
             self.end_steps("paused before")
         elif self._control.paused:
             try:
                 self._control.resume()
             except CommandError as error:
-                response.success, response.message = False, str(error)
-                return response
+                return Answer(False, str(error))
             self.end_steps("resumed before")
             self._resume()
-        response.message = "paused" if self._control.paused else "running"
-        return response
+        return Answer(True, "paused" if self._control.paused else "running")
 
-    async def _on_step(
-        self, request: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
+    def _on_step(self, _: bool) -> Answer:
         """Answer when the steps are done, or when something has ended them."""
-        count = int(self._node.get_parameter("step_count").value)
+        ticks = self._step_ticks()
         try:
-            self._control.begin_steps(count)
+            self._control.begin_steps(ticks)
         except CommandError as error:
-            response.success, response.message = False, str(error)
-            return response
-        self._steps = steps = Future()
+            return Answer(False, str(error))
+        self._steps, self._stepped = Answer(), ticks
         self._resume()
-        reason = await steps
-        response.success = not reason
-        response.message = reason or f"{count} ticks done"
-        return response
+        return self._steps
 
-    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_reset(self, _: bool) -> Answer:
         self._control.reset()
         self.end_steps("reset before")
         self._reset()
-        response.success = True
-        response.message = "a new episode, paused" if self._control.paused else "a new episode"
-        return response
+        return Answer(True, "a new episode, paused" if self._control.paused else "a new episode")

@@ -3,18 +3,11 @@
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
-from rclpy.node import Node
-
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.publishing import Outgoing, flush, has_subscribers, publish_together
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.probe import DynamicsSample
-from msgs_config.runtime.publishing import (
-    Outgoing,
-    create_publisher,
-    flush,
-    has_subscribers,
-    publish_together,
-)
 from msgs_config.runtime.throttle import Throttle
 from sim_node.interface.publishers import Publishers
 from sim_node.interface.world_interface import WorldInterface
@@ -31,7 +24,7 @@ class SimulatorPublisher:
 
     def __init__(
         self,
-        node: Node,
+        node: BusNode,
         simulation: Simulation,
         world: WorldInterface,
         of_characters: Sequence[Publishers],
@@ -43,7 +36,7 @@ class SimulatorPublisher:
         self.of_characters = of_characters
         self._samples = samples
         self._is_configured = False
-        self._clock_topic = create_publisher(node, topics.CLOCK)
+        self._clock_topic = node.publisher(topics.CLOCK)
         self._throttle = Throttle()
         self._is_chosen = True  # whether the tick is published on the throttled topics
 

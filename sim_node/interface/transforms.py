@@ -3,15 +3,14 @@
 from collections.abc import Callable
 
 import numpy as np
-from rclpy.node import Node
 
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.node import BusNode
 from msgs_config.character.urdf.described_joints import DescribedJoint, DescribedJoints, pose_rows
 from msgs_config.frame_names import WORLD
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.transforms import TransformsEncoder
-from msgs_config.runtime.publishing import create_publisher
 from sim_node.frames import FrameNames
 from sim_node.physics.simulated_character import SimulatedCharacter
 
@@ -24,7 +23,7 @@ class TransformPublisher:
 
     def __init__(
         self,
-        node: Node,
+        node: BusNode,
         character: SimulatedCharacter,
         joints: DescribedJoints,
         frames: FrameNames,
@@ -32,8 +31,8 @@ class TransformPublisher:
         """Offer both topics, and publish the static frames."""
         self._character, self._joints = character, joints
         self._prefix = character.setup.prefix
-        self.publisher = create_publisher(node, topics.TF)
-        self._static = create_publisher(node, topics.TF_STATIC)
+        self.publisher = node.publisher(topics.TF)
+        self._static = node.publisher(topics.TF_STATIC)
         self._subscribers = 0  # when it was published last
         self._repetitions = 0  # still to come
         self._floats = character.layout.has_floating_base
@@ -84,4 +83,4 @@ class TransformPublisher:
             self._repetitions = max(self._repetitions - 1, 0)
 
     def _count_subscribers(self) -> int:
-        return int(self.publisher.handle.get_subscription_count())
+        return self.publisher.get_subscription_count()

@@ -2,15 +2,14 @@
 
 from collections.abc import Iterator
 
-from rclpy.node import Node
-
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
+from msgs_config.bus.publishing import Outgoing, has_subscribers
+from msgs_config.bus.stamped_subscription import StampedSubscription, first_tick
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, ball_names, encode_balls
 from msgs_config.messages.session import OwnSession
 from msgs_config.messages.throw import ProjectileThrow
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.publishing import Outgoing, create_publisher, has_subscribers
-from msgs_config.runtime.stamped_subscription import StampedSubscription, first_tick
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
 
@@ -19,7 +18,7 @@ class WorldInterface:
     """Takes throws, and publishes which ones began and where the balls are."""
 
     def __init__(
-        self, node: Node, simulation: Simulation, own_session: OwnSession, logger: OnceLogger
+        self, node: BusNode, simulation: Simulation, own_session: OwnSession, logger: OnceLogger
     ) -> None:
         """Offer the topics, in the node's own namespace."""
         self._own_session = own_session
@@ -30,9 +29,9 @@ class WorldInterface:
         self._messages = StampedSubscription(
             node, topics.THROW, "throw refused: ", self._add_throw, logger, own_session
         )
-        self._applied = create_publisher(node, topics.APPLIED_THROW)
-        self._thrown = create_publisher(node, topics.THROWN)
-        self._throttled = create_publisher(node, topics.THROWN_THROTTLE)
+        self._applied = node.publisher(topics.APPLIED_THROW)
+        self._thrown = node.publisher(topics.THROWN)
+        self._throttled = node.publisher(topics.THROWN_THROTTLE)
         self.publishers = (self._applied, self._thrown, self._throttled)
 
     def take_throws(self) -> list[ProjectileThrow]:

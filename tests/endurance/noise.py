@@ -34,6 +34,7 @@ from actuated_characters.runs.plan import make_plan  # noqa: E402
 from actuated_characters.runs.processes import Child, Children  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
 from benchmarks.support.nodes import private_memory  # noqa: E402
+from msgs_config.bus.polling import DirectSubscription  # noqa: E402
 from msgs_config.errors import MessageError  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402
 from msgs_config.messages.cdr import read_frame_id  # noqa: E402
@@ -43,7 +44,6 @@ from msgs_config.messages.joint_state import (  # noqa: E402
 )
 from msgs_config.messages.session import make_session  # noqa: E402
 from msgs_config.messages.topic import Topic  # noqa: E402
-from msgs_config.runtime.polling import DirectSubscription  # noqa: E402
 
 _RATE = 240  # Hz
 _MOST_GROWTH = 5.0  # MB

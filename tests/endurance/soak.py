@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from msgs_config.bus.dds import create_publisher
 from msgs_config.runtime.process import limit_threads
-from msgs_config.runtime.publishing import create_publisher
 
 limit_threads()
 
@@ -35,11 +35,11 @@ from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from actuated_characters.runs.processes import Child, Children  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
 from benchmarks.support.nodes import private_memory  # noqa: E402
+from msgs_config.bus.polling import DirectSubscription  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402
 from msgs_config.messages.clock import TickClock  # noqa: E402
 from msgs_config.messages.joint_state import JointStateDecoder  # noqa: E402
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches  # noqa: E402
-from msgs_config.runtime.polling import DirectSubscription  # noqa: E402
 from tests.endurance.soak_report import MEMORY_PERIOD, SoakReport  # noqa: E402
 
 _RATE = 240  # Hz

@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
+from msgs_config.bus.polling import DirectSubscription
 from msgs_config.messages.topic import STREAM
-from msgs_config.runtime.polling import DirectSubscription
 from tests.endurance import soak as soak_module
 from tests.endurance import soak_report
 from tests.endurance.soak import soak

@@ -6,9 +6,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from msgs_config.bus.endpoint_types import type_name
 from msgs_config.errors import RecordingError
 from msgs_config.messages.topic import find_message_class
-from msgs_config.runtime.endpoint_types import type_name
 
 
 class MessageDefinition(NamedTuple):

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.duration import Duration
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
@@ -18,6 +17,9 @@ from actuated_characters.replay.players.processes import PlayerReport
 from actuated_characters.replay.players.simulator_inputs import SimulatorInputs, make_inputs
 from actuated_characters.replay.world import read_world
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.polling import DirectSubscription, PollingExecutor
+from msgs_config.bus.ros_parameters import declare, given_parameters, set_request
 from msgs_config.errors import RunError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
@@ -27,10 +29,7 @@ from msgs_config.messages.session import SESSION, given_session, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.publishing import create_publisher
-from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 
 PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
@@ -39,7 +38,7 @@ PARAMETERS = [
     SESSION,
 ]
 
-_ACKNOWLEDGE_TIMEOUT = Duration(seconds=10)  # until the simulator has a push or throw
+_ACKNOWLEDGE_TIMEOUT = 10.0  # s until the simulator has a push or throw
 
 
 class RecordedController(Node):
@@ -148,7 +147,7 @@ class RecordedController(Node):
         for throw in throws:
             stamp_ns = self._tick_clock.stamp_ns(FIRST_TICK + tick)
             self._throw_topic.publish(self._throw_codec.encode(stamp_ns, throw))
-        if throws and not self._throw_topic.wait_for_all_acked(_ACKNOWLEDGE_TIMEOUT):
+        if throws and not self._throw_topic.is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
             raise RunError(f"the throws of tick {FIRST_TICK + tick} were not acknowledged")
 
     def _arrays(self) -> dict[str, FloatArray]:
@@ -224,7 +223,7 @@ class _CharacterTopics:
             stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
             own = replace(push, stamp_ns=stamp_ns, frame_id=self._session)
             self._wrenches.publish(encode_wrenches(own))
-            if not self._wrenches.wait_for_all_acked(_ACKNOWLEDGE_TIMEOUT):
+            if not self._wrenches.is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
                 raise RunError(f"the push of tick {FIRST_TICK + tick} was not acknowledged")
 
     def command(self, tick: int) -> None:

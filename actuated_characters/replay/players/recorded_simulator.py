@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.duration import Duration
 from rclpy.node import Node
 
 from actuated_characters.bags.recording import CommandArrays, Recording, read_recording
@@ -25,6 +24,10 @@ from actuated_characters.replay.players.simulator_outputs import (
     tick_topics,
 )
 from msgs_config.arrays import BoolArray
+from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.once_logger import OnceLogger
+from msgs_config.bus.polling import DirectSubscription, PollingExecutor
+from msgs_config.bus.ros_parameters import declare, given_parameters, set_request
 from msgs_config.errors import MessageError, RecordingError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import encode_clock
@@ -38,11 +41,7 @@ from msgs_config.messages.session import (
 )
 from msgs_config.messages.topic import Topic
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from msgs_config.runtime.process import StopSignal
-from msgs_config.runtime.publishing import create_publisher
-from msgs_config.runtime.ros_parameters import declare, given_parameters, set_request
 
 PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
@@ -61,7 +60,7 @@ PARAMETERS = [
 ]
 
 _REPUBLISH_PERIOD = 0.5  # s, as the simulator's
-_ACKNOWLEDGE_TIMEOUT = Duration(seconds=10)  # until the controller has a trajectory or strengths
+_ACKNOWLEDGE_TIMEOUT = 10.0  # s until the controller has a trajectory or strengths
 
 
 class RecordedSimulator(Node):
@@ -93,7 +92,7 @@ class RecordedSimulator(Node):
         fixed = values.texts("fixed")
         self._changes = parameter_changes(self._recording, fixed) if self._repeats else {}
         self._is_realtime = self._recording.parameters.get("mode") == "realtime"
-        self._decoder, self._once_logger = JointStateDecoder(), OnceLogger(self)
+        self._decoder, self._once_logger = JointStateDecoder(), OnceLogger(self.get_logger())
         self._report = PlayerReport()
         self._open_topics()
 
@@ -236,7 +235,7 @@ class RecordedSimulator(Node):
             publisher = self._requests[name]
             self._wait(publisher.get_subscription_count, lambda: "controller_node to subscribe")
             publisher.publish(message)
-            if not publisher.wait_for_all_acked(_ACKNOWLEDGE_TIMEOUT):
+            if not publisher.is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
                 raise RunError(f"controller_node did not acknowledge a message on '{name}'")
 
     def _set(self, change: dict[str, Any]) -> None:

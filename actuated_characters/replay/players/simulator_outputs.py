@@ -6,20 +6,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
-from geometry_msgs.msg import TwistStamped
-from rclpy.serialization import serialize_message
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Header, String
-from trajectory_msgs.msg import JointTrajectory
 
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import Recording, find_bag, read_recording
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode
+from msgs_config.messages.cdr import (
+    decode,
+    decode_header,
+    decode_string,
+    encode_header,
+    encode_string,
+)
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
@@ -38,8 +38,6 @@ _ACCEPTED = tuple(  # what the controller publishes of each request that it has 
 )
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
 
-Request: TypeAlias = "JointTrajectory | TwistStamped | JointState"
-
 
 @dataclass
 class RareMessages:
@@ -47,7 +45,7 @@ class RareMessages:
 
     configurations: dict[int, bytes] = field(default_factory=dict)  # the simulator's
     episodes: dict[int, bytes] = field(default_factory=dict)
-    requests: dict[int, list[tuple[str, Request]]] = field(default_factory=dict)  # topic, message
+    requests: dict[int, list[tuple[str, bytes]]] = field(default_factory=dict)  # topic, message
 
     @property
     def requested(self) -> set[str]:
@@ -76,13 +74,13 @@ class SessionRewriter:
         if topic in (topics.CONTACTS, topics.APPLIED_WRENCH):
             return encode_wrenches(replace(decode_wrenches(raw), frame_id=self._session))
         if topic is topics.EPISODE:
-            header = decode(raw, Header)
-            number = header.frame_id.partition(" ")[0]  # of older bags it is all that is there
-            header.frame_id = episode_text(int(number) if number.isdecimal() else 1, self._session)
-            return bytes(serialize_message(header))
+            stamp_ns, frame_id = decode_header(raw)
+            number = frame_id.partition(" ")[0]  # of older bags it is all that is there
+            text = episode_text(int(number) if number.isdecimal() else 1, self._session)
+            return encode_header(stamp_ns, text)
         if topic is topics.CONFIGURATION:
-            content = {**json.loads(decode(raw, String).data), "session": self._session}
-            return bytes(serialize_message(String(data=json.dumps(content, allow_nan=False))))
+            content = {**json.loads(decode_string(raw)), "session": self._session}
+            return encode_string(json.dumps(content, allow_nan=False))
         return raw
 
 
@@ -153,29 +151,29 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
     Raises:
         RecordingError: the bag cannot be read.
     """
-    rare, by_topic = RareMessages(), dict[str, list[tuple[int, Request]]]()
+    rare, by_topic = RareMessages(), dict[str, list[tuple[int, bytes]]]()
     types = {_name(recording, topic): topic.message_type for topic in (*REQUESTS, *_ACCEPTED)}
     for message in read_messages(find_bag(path)):
         if message.topic == _name(recording, _CONFIGURATION):
-            since_ns = json.loads(decode(message.raw, String).data).get(SINCE)
+            since_ns = json.loads(decode_string(message.raw)).get(SINCE)
             row = 0 if since_ns is None else np.searchsorted(recording.stamps_ns, since_ns, "right")
             rare.configurations[int(row)] = message.raw
         elif message.topic == _name(recording, topics.EPISODE):
             stamp_ns = _raw_stamp_ns(message.raw)
             rare.episodes[int(np.searchsorted(recording.stamps_ns, stamp_ns))] = message.raw
         elif message.topic in types:
-            content = decode(message.raw, types[message.topic])
-            by_topic.setdefault(message.topic, []).append((message.sent_ns, content))
+            decode(message.raw, types[message.topic])  # what is none of its type is not sent again
+            by_topic.setdefault(message.topic, []).append((message.sent_ns, message.raw))
     for topic, active in zip(REQUESTS, _ACCEPTED, strict=True):
         sent = by_topic.get(_name(recording, active)) or by_topic.get(_name(recording, topic), [])
-        for published_ns, content in sent:
-            row = _row(recording, published_ns, content.header)
+        for published_ns, raw in sent:
+            row = _row(recording, published_ns, _raw_stamp_ns(raw))
             if row is not None:
-                rare.requests.setdefault(row, []).append((topic.name, content))
+                rare.requests.setdefault(row, []).append((topic.name, raw))
     return rare
 
 
-def _row(recording: Recording, published_ns: int, header: Header) -> int | None:
+def _row(recording: Recording, published_ns: int, start_ns: int) -> int | None:
     """The state before whose answer a message came; None if there is none.
 
     The controller published what it accepted before that answer, but two topics of a bag that
@@ -185,7 +183,6 @@ def _row(recording: Recording, published_ns: int, header: Header) -> int | None:
     answered = np.array([c[0].published_ns if c else 0 for c in recording.commands])
     later = np.flatnonzero(answered >= published_ns)
     row = int(later[0]) if len(later) else len(stamps)
-    start_ns = header.stamp.sec * NANOSECONDS_PER_SECOND + header.stamp.nanosec
     if start_ns:
         row = min(row, int(np.searchsorted(stamps, start_ns, side="right")) - 1)
     return row if 0 <= row < len(stamps) else None

@@ -15,11 +15,12 @@ from typing import Any, Literal
 import viser
 from geometry_msgs.msg import Twist
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 
 from actuated_characters.viewer.controls.actions import ActionQueue
+from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.node import Publisher
 from msgs_config.messages import topics
-from msgs_config.runtime.publishing import create_publisher
+from msgs_config.messages.cdr import encode
 
 _WALK, _RUN, _BACK, _TURN = 1.0, 2.2, -0.4, 0.8  # m/s and rad/s, by keys
 _PERIOD = 0.1  # s between two velocities
@@ -147,7 +148,7 @@ class DrivingControls:
             return
         velocity = self._input.velocity if now < self._input.until else Velocity()
         if self._moves or velocity != Velocity():  # of zeros only the first
-            self._publisher.publish(velocity.message())
+            self._publisher.publish(encode(velocity.message()))
             self._next_velocity = now + _PERIOD
         self._moves = velocity != Velocity()
 
@@ -176,7 +177,7 @@ class DrivingControls:
     def _close(self) -> None:
         """Stop what was driven."""
         if self._publisher is not None and self._moves:
-            self._publisher.publish(Twist())
+            self._publisher.publish(encode(Twist()))
         for command in self._commands:
             command.remove()
         self._publisher, self._commands = None, []

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import viser
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.touch import STIFFNESS, Drag, aim_throw, spring_force
@@ -16,12 +15,13 @@ from actuated_characters.viewer.drawing.drawn_character import Bind
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene
 from msgs_config.arrays import FloatArray
+from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.node import Publisher
 from msgs_config.errors import CommandError
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
-from msgs_config.runtime.publishing import create_publisher
 
 _SPRING = (230, 60, 20)
 _GRAVITY, _WRENCH_DURATION = 9.81, 0.1  # what simulators have by default

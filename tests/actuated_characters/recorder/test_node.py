@@ -21,12 +21,12 @@ from std_msgs.msg import Header
 
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import read_recording
+from msgs_config.bus.polling import DirectSubscription
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.topic import Quality, Topic
-from msgs_config.runtime.polling import DirectSubscription
 from sim_node.sensors.readers import SensingSettings, make_readers
 from tests.support.physics import simulation
 from tests.support.ros import Client, Process, Processes, SimulatorClient, tick_of, wait_until

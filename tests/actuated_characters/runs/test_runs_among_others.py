@@ -15,11 +15,11 @@ from std_msgs.msg import Header, String
 from trajectory_msgs.msg import JointTrajectory
 
 from actuated_characters.bags.reader import read_messages
+from msgs_config.bus.polling import DirectSubscription
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import read_frame_id, split_stamp
 from msgs_config.messages.session import is_session
-from msgs_config.runtime.polling import DirectSubscription
 from tests.sim_node.interface.test_hostile_messages import mutants
 from tests.support.ros import Client, Processes, joint_state, wait_until, wrench_message
 from tests.support.runs import summary_of

@@ -6,16 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 from rclpy.context import Context
-from rclpy.parameter import Parameter
 from std_msgs.msg import String
 
 from controller_node.interface.simulators import Simulators
 from controller_node.node import ControllerNode
+from msgs_config.bus.composition import ros_node
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import resolve
-from msgs_config.runtime.polling import PollingExecutor
 from sim_node import parameters as of_simulator
 from sim_node.physics.probe import measure_probe
 from tests.support.physics import character
@@ -46,8 +45,8 @@ class Bench:
     def __init__(self, node: ControllerNode, client: ControllerClient) -> None:
         self.node, self.client = node, client
         self.configurations = client.speak(topics.CONFIGURATION.of(topics.SIM_NODE))
-        self._executor = PollingExecutor(node)
-        self._turns = node.turns(False, self._executor)  # type: ignore[arg-type]
+        self._executor = node.node.make_executor([node.node])
+        self._turns = node.turns(False, self._executor)
 
     def close(self) -> None:
         self._turns.close()
@@ -84,7 +83,13 @@ class Bench:
 
 @pytest.fixture
 def bench(context: Context, simulator: ControllerClient) -> Iterator[Bench]:
-    node = ControllerNode(context=context, cli_args=["--ros-args", "-p", "character:=pendulum"])
+    node = ControllerNode(
+        ros_node(
+            topics.CONTROLLER_NODE,
+            context=context,
+            cli_args=["--ros-args", "-p", "character:=pendulum"],
+        )
+    )
     bench = Bench(node, simulator)
     yield bench
     bench.close()
@@ -118,7 +123,7 @@ def test_a_configuration_that_comes_just_before_a_first_state_counts_for_it(
 
     monkeypatch.setattr(Simulators, "look", look_just_before_a_reset)
     bench.until(lambda: calls, "the reset")
-    bench.node.set_parameters([Parameter("gravity", value=MOON)])
+    bench.node.node.set_own_parameters({"gravity": MOON})
 
     assert bench.until(lambda: bench.torques(9), "an answer") == expected(9, MOON)
     assert expected(9, MOON) != expected(9, 9.81)

@@ -6,9 +6,9 @@ import signal
 import pytest
 from rclpy.serialization import serialize_message
 
+from msgs_config.bus.once_logger import MOST_LOGGED
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
-from msgs_config.runtime.once_logger import MOST_LOGGED
 from tests.sim_node.conftest import Join
 from tests.support.ros import (
     ControllerClient,

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rclpy.context import Context
-from rclpy.node import Node
 
+from msgs_config.bus.dds import DdsNode
 from msgs_config.character.sensors import SensorType
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import read_frame_id
@@ -178,7 +178,7 @@ def test_nothing_is_read_while_there_are_no_subscribers(
     for _, reader in make_readers(run.simulated, SETTINGS):
         monkeypatch.setattr(type(reader), "read", fail)
     settings = make_node_settings(for_simulator.load_parameters({}).values)
-    node = Node("test_sensors", context=context)
+    node = DdsNode("test_sensors", context=context)
     try:
         publishers = SensorPublishers(node, run.simulated, settings)
         assert not publishers.wants_contacts

@@ -7,12 +7,10 @@ several, so a node cannot tell whether it has its process to itself.
 import math
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from typing import Any
 
-from rclpy.node import Node
-
+from msgs_config.bus.node import BusNode, Executor, Stop
 from msgs_config.errors import ActuatedCharactersError
-from msgs_config.runtime.polling import PollingExecutor
-from msgs_config.runtime.process import StopSignal
 
 AT_ONCE = 0.0
 """Yielded by a node that has done something, and may have more to do."""
@@ -22,10 +20,18 @@ UNTIL_A_MESSAGE = math.inf
 Turns = Generator[float, None, None]
 
 
-class ComposableNode(Node):
-    """A node that can share its thread with others."""
+class ComposableNode:
+    """What works at a node's place on a bus, and can share its thread with others."""
 
-    def turns(self, stop: StopSignal, executor: PollingExecutor) -> Turns:
+    def __init__(self, node: BusNode) -> None:
+        """Work at this place on a bus."""
+        self.node = node
+
+    def destroy_node(self) -> None:
+        """Leave the bus."""
+        self.node.destroy_node()
+
+    def turns(self, stop: Stop, executor: Executor) -> Turns:
         """Work until the end or until `stop`; each turn yields for how many s it needs no other.
 
         A node that is closed before its end leaves in good order, too. It gives the executor turns
@@ -33,9 +39,16 @@ class ComposableNode(Node):
         """
         raise NotImplementedError
 
-    def run(self, stop: StopSignal) -> None:
+    def run(self, stop: Stop) -> None:
         """Work until the end or until `stop`, alone in this thread; raises what `turns` raises."""
         run_nodes([self], stop)
+
+
+def ros_node(name: str, **options: Any) -> BusNode:
+    """A place on ROS' bus; `options` are rclpy's own of every node."""
+    from msgs_config.bus.dds import DdsNode
+
+    return DdsNode(name, **options)
 
 
 class Composition:
@@ -44,7 +57,7 @@ class Composition:
     def __init__(self, nodes: Sequence[ComposableNode]) -> None:
         self._nodes = nodes
 
-    def run(self, stop: StopSignal) -> None:
+    def run(self, stop: Stop) -> None:
         """Let the nodes work until one ends or until `stop`; raises what one of them raises."""
         run_nodes(self._nodes, stop)
 
@@ -53,19 +66,19 @@ class Composition:
         destroy_nodes(self._nodes)
 
 
-def destroy_nodes(nodes: Sequence[Node]) -> None:
+def destroy_nodes(nodes: Sequence[ComposableNode]) -> None:
     """Let nodes leave the graph, the last one first."""
     for node in reversed(nodes):
         node.destroy_node()
 
 
-def run_nodes(nodes: Sequence[ComposableNode], stop: StopSignal) -> None:
+def run_nodes(nodes: Sequence[ComposableNode], stop: Stop) -> None:
     """Give each node its turn, one after the other, until one ends; then close the others.
 
     The thread rests only when no node has done anything in its last turn, and no longer than the
     most impatient one allows.
     """
-    executor = PollingExecutor(*nodes)
+    executor = nodes[0].node.make_executor([each.node for each in nodes])
     with ExitStack() as at_end:
         at_end.callback(executor.close)
         turns = [node.turns(stop, executor) for node in nodes]
@@ -89,8 +102,8 @@ def errors_of(name: str) -> Iterator[None]:
         raise type(error)(f"{name}: {error}") from error
 
 
-def _named(node: Node, turns: Turns) -> Turns:
-    with errors_of(node.get_fully_qualified_name().lstrip("/")):
+def _named(node: ComposableNode, turns: Turns) -> Turns:
+    with errors_of(node.node.get_fully_qualified_name().lstrip("/")):
         yield from turns
 
 

@@ -5,19 +5,20 @@ from collections.abc import Callable, Iterator, Sequence
 
 import pytest
 from rclpy.context import Context
-from std_msgs.msg import String
 
-from msgs_config.errors import ConfigurationError, SimulationError
-from msgs_config.messages.topic import LATCHED, Topic
-from msgs_config.runtime import composition
-from msgs_config.runtime.composition import (
+from msgs_config.bus import dds
+from msgs_config.bus.composition import (
     AT_ONCE,
     UNTIL_A_MESSAGE,
     ComposableNode,
     Turns,
+    ros_node,
     run_nodes,
 )
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
+from msgs_config.bus.polling import PollingExecutor
+from msgs_config.errors import ConfigurationError, SimulationError
+from msgs_config.messages.cdr import encode_string
+from msgs_config.messages.topic import LATCHED, Topic
 
 TOPIC = Topic("turn", "std_msgs/msg/String", LATCHED)
 
@@ -26,18 +27,18 @@ class Worker(ComposableNode):
     """Does in each turn what a test says, and notes when it has ended."""
 
     def __init__(self, context: Context, name: str, log: list[str]) -> None:
-        super().__init__(name, context=context)
+        super().__init__(ros_node(name, context=context))
         self._log = log
         self.steps: Callable[[PollingExecutor], Iterator[float]] = lambda executor: iter(())
 
     def turns(self, stop: object, executor: PollingExecutor) -> Turns:
         try:
             for seconds in self.steps(executor):
-                self._log.append(self.get_name())
+                self._log.append(self.node.get_name())
                 yield seconds
         finally:
             executor.serve_pending()  # it is not closed before its nodes
-            self._log.append(f"end of {self.get_name()}")
+            self._log.append(f"end of {self.node.get_name()}")
 
 
 class RecordingExecutor(PollingExecutor):
@@ -69,7 +70,7 @@ def workers(context: Context, log: list[str]) -> Iterator[list[Worker]]:
 def rests(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     found: list[float] = []
     monkeypatch.setattr(RecordingExecutor, "rests", found, raising=False)
-    monkeypatch.setattr(composition, "PollingExecutor", RecordingExecutor)
+    monkeypatch.setattr(dds, "PollingExecutor", RecordingExecutor)
     return found
 
 
@@ -146,14 +147,14 @@ def test_an_error_of_a_node_alone_is_as_it_was(workers: list[Worker]) -> None:
 
 def test_what_one_publishes_the_other_takes_in_its_next_turn(workers: list[Worker]) -> None:
     sender, receiver = workers
-    publisher = sender.create_publisher(String, TOPIC.name, TOPIC.qos)
-    subscription, found = DirectSubscription(receiver, TOPIC), []
+    publisher = sender.node.publisher(TOPIC)
+    subscription, found = receiver.node.subscription(TOPIC), []
 
     def speaking(executor: PollingExecutor) -> Iterator[float]:
         while not publisher.get_subscription_count():
             yield UNTIL_A_MESSAGE
         for number in range(5):
-            publisher.publish(String(data=str(number)))
+            publisher.publish(encode_string(str(number)))
             yield AT_ONCE
 
     def listening(executor: PollingExecutor) -> Iterator[float]:
@@ -171,7 +172,7 @@ def test_while_one_works_long_the_services_of_the_others_are_answered(
     workers: list[Worker], log: list[str]
 ) -> None:
     worker, served = workers
-    timer = served.create_timer(0.0, lambda: log.append("served"))
+    timer = served.node.create_timer(0.0, lambda: log.append("served"))
 
     def working(executor: PollingExecutor) -> Iterator[float]:
         while "served" not in log:

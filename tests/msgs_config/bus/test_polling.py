@@ -6,9 +6,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
+from msgs_config.bus.polling import DirectSubscription, PollingExecutor
 from msgs_config.messages.cdr import decode
 from msgs_config.messages.topic import Quality, Topic
-from msgs_config.runtime.polling import DirectSubscription, PollingExecutor
 from tests.support.ros import wait_until
 
 DEPTH = 5

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from rclpy.node import Node
 
-from msgs_config.runtime.once_logger import OnceLogger
+from msgs_config.bus.once_logger import OnceLogger
 
 _PERIOD = 1.0  # s between looks at the graph
 _UNKNOWN = "_UNKNOWN_"  # in what ROS says of a node whose name has not come yet
@@ -44,7 +44,7 @@ class EndpointTypes:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._once_logger = OnceLogger(node)
+        self._once_logger = OnceLogger(node.get_logger())
         self._counts: dict[tuple[str, bool], int] = {}  # of what has been looked at
         self._next_look = 0.0
 

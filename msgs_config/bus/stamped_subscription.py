@@ -2,15 +2,13 @@
 
 from collections.abc import Callable
 
-from rclpy.node import Node
-
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.errors import CommandError, LayoutError, MessageError, MotionError
 from msgs_config.messages.cdr import read_frame_id
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.session import OwnSession
 from msgs_config.messages.topic import Topic
-from msgs_config.runtime.once_logger import OnceLogger
-from msgs_config.runtime.polling import DirectSubscription
 
 _MOST_AT_ONCE = 100  # messages; a flood of them must not stop the node's loop
 
@@ -40,7 +38,7 @@ class StampedSubscription:
 
     def __init__(
         self,
-        node: Node,
+        node: BusNode,
         topic: Topic,
         rejection: str,
         use: Callable[[bytes], None],
@@ -58,7 +56,7 @@ class StampedSubscription:
         self._once_logger = logger
         self._session = session
         self.topic = topic.name
-        self._messages = DirectSubscription(node, topic)
+        self._messages = node.subscription(topic)
 
     def take(self) -> None:
         """Take the messages that have come; of a flood the first hundred."""

@@ -1,6 +1,6 @@
 """Warnings that are logged once, though their cause may come again at every tick."""
 
-from rclpy.node import Node
+from msgs_config.bus.node import Log
 
 MOST_LOGGED = 100  # different sentences; a hostile sender must not fill the memory and the log
 UNLOGGED = "unlogged_warnings"  # the count's name in the diagnostics
@@ -10,8 +10,8 @@ _MAX_CHARACTERS = 1000  # characters of a sentence, which may quote what was rec
 class OnceLogger:
     """A node's warnings, each sentence once; those beyond `MOST_LOGGED` are only counted."""
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
+    def __init__(self, log: Log) -> None:
+        self._log = log
         self._kinds: set[str] = set()
         self._sentences: set[str] = set()
         self.unlogged = 0
@@ -31,7 +31,7 @@ class OnceLogger:
             self._count()
             return
         logged.add(key)
-        self._node.get_logger().warning(sentence)
+        self._log.warning(sentence)
 
     def has_logged(self, kind: str) -> bool:
         """Whether a sentence of a kind was logged."""
@@ -39,7 +39,7 @@ class OnceLogger:
 
     def _count(self) -> None:
         if not self.unlogged:
-            self._node.get_logger().warning(
+            self._log.warning(
                 f"there were {MOST_LOGGED} different warnings; further ones are not logged, "
                 f"but counted ({UNLOGGED} in the diagnostics)"
             )

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.node import Node
 
+from msgs_config.bus.node import BusNode
+from msgs_config.messages.cdr import encode, split_stamp
 from msgs_config.messages.topics import DIAGNOSTICS
-from msgs_config.runtime.publishing import create_publisher, flush
 
 DIAGNOSTICS_PERIOD = 1.0  # s of wall time
 
@@ -14,9 +14,9 @@ DIAGNOSTICS_PERIOD = 1.0  # s of wall time
 class DiagnosticsPublisher:
     """Publishes a node's counts, and its fault or a warning if it has one."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: BusNode) -> None:
         self._node = node
-        self._publisher = create_publisher(node, DIAGNOSTICS)
+        self._publisher = node.publisher(DIAGNOSTICS)
 
     @property
     def is_heard(self) -> bool:
@@ -48,9 +48,10 @@ class DiagnosticsPublisher:
             values=[KeyValue(key=name, value=str(value)) for name, value in values.items()],
         )
         message = DiagnosticArray(status=[status])
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(message)
+        stamp = message.header.stamp
+        stamp.sec, stamp.nanosec = split_stamp(self._node.now_ns())
+        self._publisher.publish(encode(message))
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has the last report, at most `seconds`; whether it has."""
-        return flush([self._publisher], seconds)
+        return self._publisher.is_acknowledged(seconds)

@@ -9,14 +9,14 @@ while the loop blocks in the executor, and an idle node costs nothing.
 import os
 import time
 from collections import deque
-from typing import NamedTuple
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
+from msgs_config.bus.endpoint_types import EndpointTypes
+from msgs_config.bus.node import Received
 from msgs_config.messages.topic import Topic
-from msgs_config.runtime.endpoint_types import EndpointTypes
 
 _SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
 _SHORT_REST = 0.002  # s; waking up from the executor takes up to that
@@ -24,14 +24,6 @@ _SLEEP_ERROR = 0.0002  # s by which a sleep may be late
 _MOST_TURNS = 50  # of the executor in a row, which has one callback a turn
 _MOST_DISCARDED = 20_000  # messages, more than can wait
 _BUSY_PERIOD = 0.003  # s of taking turns with other processes before the loop blocks
-
-
-class Received(NamedTuple):
-    """A serialised message as it came."""
-
-    raw: bytes
-    published_ns: int  # wall time
-    number: int | None  # that its publisher gave it, from 1 on; None where the middleware has none
 
 
 class DirectSubscription:

@@ -1,0 +1,177 @@
+"""A node on ROS' own bus, the middleware: a node of rclpy with the ways of a `BusNode`."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.client import Client as RosClient
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.task import Future
+from std_srvs.srv import SetBool, Trigger
+
+from msgs_config.bus.node import Answer, Change, Endpoint, Handler, Refusal
+from msgs_config.bus.polling import DirectSubscription, PollingExecutor
+from msgs_config.bus.ros_parameters import declare, given_parameters, plain_value, set_request
+from msgs_config.messages.topic import Topic
+from msgs_config.parameters import Parameter, Values
+
+_UNKNOWN = "_UNKNOWN_"  # in what ROS says of a node whose name has not come yet
+
+
+def create_publisher(node: Node, topic: Topic) -> "DdsPublisher":
+    """A publisher of any node of rclpy on a topic of the contract."""
+    return DdsPublisher(node, topic)
+
+
+class DdsPublisher:
+    """A publisher of the middleware, of serialised messages."""
+
+    def __init__(self, node: Node, topic: Topic) -> None:
+        """Offer a topic of the contract."""
+        self._publisher = node.create_publisher(
+            topic.message_type,
+            topic.name,
+            topic.qos,
+            # each default callback is one thing more that the executor looks at in each turn
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )
+        # at every tick, so without rclpy's guard of the handle, which none else destroys
+        self.publish = self._publisher.handle.publish_raw
+        self.get_subscription_count = self._publisher.handle.get_subscription_count
+
+    @property
+    def topic_name(self) -> str:
+        """The topic's absolute name."""
+        return str(self._publisher.topic_name)
+
+    def is_acknowledged(self, seconds: float) -> bool:
+        """Wait until every subscriber has all that was published, at most so long; whether so."""
+        return bool(self._publisher.wait_for_all_acked(Duration(seconds=seconds)))
+
+
+class DdsClient:
+    """Calls services of another node, and sets its parameters."""
+
+    def __init__(self, node: Node, name: str) -> None:
+        self._node, self._name = node, name
+        self._setter = node.create_client(
+            SetParametersAtomically, f"{name}/set_parameters_atomically"
+        )
+        self._services: dict[str, RosClient] = {}
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the other node answers."""
+        return all(each.service_is_ready() for each in (self._setter, *self._services.values()))
+
+    def call(self, service: str, flag: bool | None = None) -> Answer:
+        """Call `~/SERVICE` of the node: a `SetBool` with a flag, a `Trigger` without."""
+        kind = Trigger if flag is None else SetBool
+        if service not in self._services:
+            self._services[service] = self._node.create_client(kind, f"{self._name}/{service}")
+        request = Trigger.Request() if flag is None else SetBool.Request(data=flag)
+        answer = Answer()
+        future = self._services[service].call_async(request)
+        future.add_done_callback(
+            lambda done: answer.give(done.result().success, done.result().message)
+        )
+        return answer
+
+    def set_parameters(self, values: Mapping[str, Any]) -> Answer:
+        """Set parameters of the node, all or none."""
+        answer = Answer()
+
+        def give(done: Future) -> None:
+            result = done.result().result
+            answer.give(result.successful, result.reason)
+
+        self._setter.call_async(set_request(values)).add_done_callback(give)
+        return answer
+
+
+class DdsNode(Node):
+    """A node of rclpy that is a `BusNode`."""
+
+    def publisher(self, topic: Topic) -> DdsPublisher:
+        """A publisher on a topic of the contract."""
+        return DdsPublisher(self, topic)
+
+    def subscription(self, topic: Topic) -> DirectSubscription:
+        """A subscription of a topic of the contract."""
+        return DirectSubscription(self, topic)
+
+    def endpoints(self, topic: Topic) -> list[Endpoint]:
+        """All that publish on a topic."""
+        found = []
+        for info in self.get_publishers_info_by_topic(topic.name):
+            name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+            gid = ".".join(f"{byte:02x}" for byte in info.endpoint_gid)  # as `ros2 topic info -v`
+            compatibility, reason = qos_check_compatible(info.qos_profile, topic.qos)
+            misfit = reason.strip() if compatibility == QoSCompatibility.ERROR else ""
+            name = "" if _UNKNOWN in name else name
+            found.append(Endpoint(name, gid, info.topic_type, misfit))
+        return found
+
+    def offer(self, service: str, handler: Handler, *, takes_flag: bool = False) -> None:
+        """Offer `~/SERVICE`: a `SetBool` where it takes a flag, else a `Trigger`.
+
+        Calls are handled between the turns of the node.
+        """
+
+        async def respond(request: Any, response: Any) -> Any:
+            answer = handler(request.data if takes_flag else True)
+            if not answer.is_given:
+                given = Future()
+                answer.when_given(lambda: given.set_result(None))
+                await given
+            response.success, response.message = answer.success, answer.message
+            return response
+
+        # in another group: in the node's an answer that is awaited would keep all others waiting
+        group = ReentrantCallbackGroup()
+        kind = SetBool if takes_flag else Trigger
+        self.create_service(kind, f"~/{service}", respond, callback_group=group)
+
+    def client(self, node: str) -> DdsClient:
+        """A client of the services of another node, by its name in this namespace."""
+        return DdsClient(self, node)
+
+    def given_parameters(self) -> dict[str, object]:
+        """The values that command line and parameter files set for this node."""
+        return given_parameters(self)
+
+    def declare(self, parameters: Iterable[Parameter], values: Values) -> None:
+        """Declare parameters with their values."""
+        declare(self, parameters, values)
+
+    def watch_parameters(self, refusal: Refusal, change: Change) -> None:
+        """Let changes of parameters be refused before any is taken, and taken together."""
+
+        def check(changes: list[RosParameter]) -> SetParametersResult:
+            reason = refusal(_by_name(changes))
+            return SetParametersResult(successful=not reason, reason=reason)
+
+        self.add_on_set_parameters_callback(check)
+        self.add_post_set_parameters_callback(lambda changes: change(_by_name(changes)))
+
+    def set_own_parameters(self, values: Mapping[str, Any]) -> None:
+        """Change this node's own parameters, as if another node did."""
+        self.set_parameters_atomically([RosParameter(n, value=v) for n, v in values.items()])
+
+    def make_executor(self, nodes: Sequence[Node]) -> PollingExecutor:
+        """An executor for nodes of rclpy, which share a thread."""
+        return PollingExecutor(*nodes)
+
+    def now_ns(self) -> int:
+        """The time of the node's clock, ns."""
+        return int(self.get_clock().now().nanoseconds)
+
+
+def _by_name(changes: Iterable[RosParameter]) -> dict[str, Any]:
+    return {change.name: plain_value(change) for change in changes}
