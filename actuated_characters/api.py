@@ -17,9 +17,10 @@ from actuated_characters.given_arrays import (
     real_array,
 )
 from actuated_characters.metrics.run_metrics import StateHash
-from actuated_characters.runs.execution import run_in_process, run_over_topics
+from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
+from actuated_characters.runs.execution import run_over_topics
+from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import choose_reference, make_plan
-from actuated_characters.runs.run_directory import prepare_directory, read_metrics
 from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import make_motion
 from controller_node.references.base import Reference
@@ -388,7 +389,7 @@ def run(
         character: Name of one that ships, or path of its YAML or URDF file.
         duration: Length in s.
         output: Directory of the results: bag, figures, parameters and logs (docs/runs.md).
-        in_process: Join simulation and controller in this process: the same states, no bag.
+        in_process: Run all nodes in this process, without ROS: the same messages, sooner.
         composed: Have simulator and controller as nodes of one process: the same, sooner.
         overwrite: Replace the results in `output`.
         simulator: Parameters of `sim_node`, by name.
@@ -399,10 +400,8 @@ def run(
         ActuatedCharactersError: a name or a value is wrong, or a process failed.
     """
     if in_process and composed:
-        raise ConfigurationError("in_process has no nodes; composed must be false")
+        raise ConfigurationError("in_process has no other process; composed must be false")
     plan = make_plan(character, duration, reference, simulator, controller)
-    if in_process and make_node_settings(plan.simulator).tick_period:
-        raise ConfigurationError("in_process takes neither 'mode' realtime nor a real_time_factor")
     directory = Path(output).absolute()
     prepare_directory(directory, overwrite=overwrite)
     if in_process:

@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.table import Table
 
 from actuated_characters.bags.recording import read_recordings
+from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.plan import make_plan
-from actuated_characters.runs.run_directory import prepare_directory
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.yardstick import yardstick_us
 from msgs_config.errors import ReplayError

@@ -7,13 +7,16 @@ begins, with the last message of each latched topic, which say what the states m
 import shutil
 from collections import deque
 from pathlib import Path
-from typing import Any
-
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from typing import TYPE_CHECKING, Any
 
 from actuated_characters.bags.format.metadata import EARLIER_BAG, load_metadata, write_metadata
+from actuated_characters.bags.format.offered_qos import is_latched
 from actuated_characters.bags.writer import BagWriter
 from msgs_config.errors import RecordingError
+from msgs_config.messages.topic import Quality
+
+if TYPE_CHECKING:
+    from rclpy.qos import QoSProfile
 
 _STATIC_SETS = 64  # of static frames, one of each character
 
@@ -26,7 +29,7 @@ class LastPartsWriter:
         self._path, self._part_bytes, self._options = path, part_bytes, options
         self._earlier = path.with_name(EARLIER_BAG)
         self._custom_data: dict[str, str] = {}
-        self._topics: dict[str, tuple[type, QoSProfile]] = {}
+        self._topics: dict[str, tuple[str, Quality | QoSProfile]] = {}
         self._latched: dict[str, deque[tuple[bytes, int | None]]] = {}
         self._size = 0  # of the messages in the newer file
         self._bag = BagWriter(path, **options)
@@ -36,10 +39,10 @@ class LastPartsWriter:
         self._custom_data[name] = text
         self._bag.set_custom_data(name, text)
 
-    def add_topic(self, topic: str, message_type: type, qos: QoSProfile) -> None:
+    def add_topic(self, topic: str, type_name: str, offered: "Quality | QoSProfile") -> None:
         """Announce a topic. Raises as `BagWriter`."""
-        self._bag.add_topic(topic, message_type, qos)
-        self._topics[topic] = message_type, qos
+        self._bag.add_topic(topic, type_name, offered)
+        self._topics[topic] = type_name, offered
 
     def write(
         self, topic: str, raw: bytes, log_time_ns: int, published_ns: int | None = None
@@ -49,7 +52,7 @@ class LastPartsWriter:
             self._begin_part(log_time_ns)
         self._bag.write(topic, raw, log_time_ns, published_ns)
         self._size += len(raw)
-        if self._topics[topic][1].durability is DurabilityPolicy.TRANSIENT_LOCAL:
+        if is_latched(self._topics[topic][1]):
             # each character of a world has static frames of its own on the one topic
             most = _STATIC_SETS if topic == "/tf_static" else 1
             latched = self._latched.setdefault(topic, deque(maxlen=most))
@@ -78,8 +81,8 @@ class LastPartsWriter:
         self._bag, self._size = BagWriter(self._path, **self._options), 0
         for name, text in self._custom_data.items():
             self._bag.set_custom_data(name, text)
-        for topic, (message_type, qos) in self._topics.items():
-            self._bag.add_topic(topic, message_type, qos)
+        for topic, (type_name, offered) in self._topics.items():
+            self._bag.add_topic(topic, type_name, offered)
         for topic, latched in self._latched.items():
             for raw, published_ns in latched:
                 self._bag.write(topic, raw, log_time_ns, published_ns)

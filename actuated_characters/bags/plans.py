@@ -4,13 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import PointCloud2, PointField
 
 from controller_node.interface.plan_message import FIELDS
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import MessageError
-from msgs_config.messages.cdr import decode
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages import topics, typed
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +28,12 @@ def decode_plan(raw: bytes) -> PlanArrays:
     Raises:
         MessageError: the bytes are no PointCloud2, or one without a plan's fields.
     """
-    message = decode(raw, PointCloud2)
+    message = typed.decode(raw, topics.PLAN.type_name)
+    double = typed.constants("sensor_msgs/msg/PointField").FLOAT64
     fields = {
         str(field.name): field.offset
         for field in message.fields
-        if field.datatype == PointField.FLOAT64 and field.count == 1
+        if field.datatype == double and field.count == 1
     }
     if not fields.keys() >= set(FIELDS):
         raise MessageError(f"a plan without its fields {', '.join(FIELDS)}")
@@ -56,6 +55,4 @@ def decode_plan(raw: bytes) -> PlanArrays:
     )
     if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) > 0.0).all()):
         raise MessageError("a plan whose times do not increase from 0 on")
-    stamp = message.header.stamp
-    stamp_ns = stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
-    return PlanArrays(stamp_ns, times, np.stack(centre, axis=1), costs, alternatives)
+    return PlanArrays(typed.stamp_of(message), times, np.stack(centre, axis=1), costs, alternatives)

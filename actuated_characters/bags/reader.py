@@ -7,8 +7,6 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rclpy.serialization import deserialize_message
-
 from actuated_characters.bags.format import limits, metadata, storage
 from actuated_characters.bags.format.definitions import find_message_type
 from actuated_characters.bags.format.mcap_file import McapFile
@@ -37,6 +35,8 @@ class RecordedMessage(NamedTuple):
         Raises:
             RecordingError: The class is not installed, or the bytes are no such message.
         """
+        from rclpy.serialization import deserialize_message
+
         try:
             return deserialize_message(self.raw, find_message_type(self.type_name))
         except RuntimeError as error:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from std_msgs.msg import String
 
 from actuated_characters.bags.node_parameters import NodeParameters, SimulatorConfigurations
 from actuated_characters.bags.plans import PlanArrays, decode_plan
@@ -16,7 +15,7 @@ from actuated_characters.bags.rebuilding import Rebuilt
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import CommandError, LayoutError, MessageError, RecordingError
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode
+from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
@@ -205,7 +204,7 @@ class CharacterTimeline:
         is_first = self.rebuilt is None
         if is_first and self._early_lost:
             raise RecordingError(f"'{CONFIGURATION}' comes only after {_MOST_EARLY} other messages")
-        self.simulator.take(decode(raw, String).data)
+        self.simulator.take(decode_string(raw))
         if not is_first:
             return
         assert self.rebuilt is not None
@@ -267,7 +266,7 @@ class CharacterTimeline:
                 self.commands.setdefault(sent.stamp_ns, []).append(command)
 
     def _take_controller(self, raw: bytes, published_ns: int) -> None:
-        text = decode(raw, String).data
+        text = decode_string(raw)
         if text == self._controller_text:  # latched, it comes to each new listener
             return
         self._controller_text = text
@@ -284,7 +283,7 @@ class CharacterTimeline:
 
     def _take_mode(self, raw: bytes, published_ns: int) -> None:
         with suppress(*_UNREADABLE_JSON):
-            facts = dict(json.loads(decode(raw, String).data))
+            facts = dict(json.loads(decode_string(raw)))
             change = ModeChange(int(facts.pop("stamp_ns")), str(facts.pop("mode")), facts)
             if change not in self.modes[-1:]:  # latched, it comes to each new listener
                 self.modes.append(change)

@@ -9,25 +9,17 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, Self, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, Self, TypeVar
 
 import yaml
 from mcap.writer import CompressionType, Writer
-from rclpy.duration import Duration, Infinite
-from rclpy.qos import LivelinessPolicy, QoSProfile
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import dump_qos_v9
 
 from actuated_characters.bags.directory_lock import DirectoryLock
 from actuated_characters.bags.format.definitions import MessageDefinition, read_definition
 from actuated_characters.bags.format.metadata import write_metadata
+from actuated_characters.bags.format.offered_qos import offered_qos
 from actuated_characters.bags.format.storage import (
     CDR,
     COMPRESSIONS,
@@ -46,11 +38,14 @@ from actuated_characters.bags.format.storage import (
     reason,
 )
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
+from msgs_config.messages.topic import Quality
+
+if TYPE_CHECKING:
+    from rclpy.qos import QoSProfile
 
 _COMPRESSIONS = {NONE: CompressionType.NONE, ZSTD: CompressionType.ZSTD}
 _VERSION = 9  # of rosbag2's metadata
 _NUMBERS = 1 << 32  # that MCAP has for a topic's messages
-_NS_PER_S = 10**9
 _T = TypeVar("_T")
 
 
@@ -121,15 +116,15 @@ class BagWriter:
         self._check_open()
         self._custom_data[name] = text
 
-    def add_topic(self, topic: str, message_type: type, qos: QoSProfile) -> None:
-        """Announce a topic, with the quality of service that its publisher offers.
+    def add_topic(self, topic: str, type_name: str, offered: "Quality | QoSProfile") -> None:
+        """Announce a topic of a type such as `std_msgs/msg/String`, and how it is published.
 
         Raises:
             RecordingError: The recording is closed or has the topic already, the definition of
                 the message type is not installed, or the disk refuses the data.
         """
         self._check_new(topic)
-        self.announce(topic, read_definition(message_type), [_offered(qos)])
+        self.announce(topic, read_definition(type_name), [offered_qos(offered)])
 
     def announce(self, topic: str, definition: MessageDefinition, offered: Sequence[Qos]) -> None:
         """Announce a topic of a type that need not be installed. Raises as `add_topic`."""
@@ -282,22 +277,3 @@ def _close(file: BinaryIO) -> None:
 def _check_choice(what: str, value: str, choices: Iterable[str]) -> None:
     if value not in choices:
         raise ConfigurationError(one_of(what, value, list(choices)))
-
-
-def _offered(qos: QoSProfile) -> Qos:
-    """The profile for rosbags; open values are those that a publisher announces, as in rosbag2."""
-    return Qos(
-        history=QosHistory(qos.history),
-        depth=qos.depth,
-        reliability=QosReliability(qos.reliability),
-        durability=QosDurability(qos.durability),
-        deadline=_qos_time(qos.deadline),
-        lifespan=_qos_time(qos.lifespan),
-        liveliness=QosLiveliness(qos.liveliness or LivelinessPolicy.AUTOMATIC),
-        liveliness_lease_duration=_qos_time(qos.liveliness_lease_duration),
-        avoid_ros_namespace_conventions=qos.avoid_ros_namespace_conventions,
-    )
-
-
-def _qos_time(duration: Duration) -> QosTime:
-    return QosTime(*divmod(duration.nanoseconds or Infinite.nanoseconds, _NS_PER_S))

@@ -76,13 +76,13 @@ def _fork(options: argparse.Namespace) -> None:
     from actuated_characters.bags.format.metadata import BAG
     from actuated_characters.fork.execution import describe_new_hits, run_fork
     from actuated_characters.fork.plan import ForkInputs, plan_fork
-    from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
-    from actuated_characters.runs.run_directory import (
+    from actuated_characters.recorder.run_directory import (
         PLOT,
         prepare_directory,
         prepare_free_directory,
         read_metrics,
     )
+    from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
     from msgs_config.errors import ConfigurationError
 
     run = options.bag.absolute()

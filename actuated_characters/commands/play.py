@@ -85,8 +85,8 @@ def _play(options: argparse.Namespace) -> None:
 
 
 def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
+    from actuated_characters.recorder.run_directory import prepare_directory
     from actuated_characters.runs.plan import count_ticks
-    from actuated_characters.runs.run_directory import prepare_directory
     from actuated_characters.scenes.execution import play_scene
 
     rate = scene.simulator.get("rate")
@@ -140,8 +140,8 @@ def _described(scene: "Scene") -> list[str]:
 
 
 def _print_figures(directory: Path, characters: list[str]) -> None:
+    from actuated_characters.recorder.run_directory import metrics_directory, read_metrics
     from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
-    from actuated_characters.runs.run_directory import metrics_directory, read_metrics
 
     shown: dict[str, list[str]] = {}
     for name in characters or [""]:

@@ -100,8 +100,8 @@ def _render_strip(options: argparse.Namespace) -> None:
     if options.times is not None:
         times = _times(options.times)
     size = None if options.size is None else _size(options.size)
+    from actuated_characters.recorder.run_directory import STRIP
     from actuated_characters.render.stills import save_png, strip
-    from actuated_characters.runs.run_directory import STRIP
 
     recordings = _read(options)
     output = _output(options, STRIP)
@@ -124,9 +124,9 @@ def _render_strip(options: argparse.Namespace) -> None:
 def _render_movie(options: argparse.Namespace) -> None:
     size = None if options.size is None else _size(options.size)
     ghost = "over" if options.reference else options.ghost
+    from actuated_characters.recorder.run_directory import VIDEO
     from actuated_characters.render.movie import MOVIE_SIZE, GhostPlace, Movie, MovieSettings
     from actuated_characters.render.video import check_video
-    from actuated_characters.runs.run_directory import VIDEO
 
     settings = MovieSettings(
         fps=_FPS if options.fps is None else options.fps,

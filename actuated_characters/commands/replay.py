@@ -252,8 +252,8 @@ def _check_summaries(bag: Path, recordings: "Sequence[Recording]", result: "Repl
 
     They are of all states that it received: of a part of them there is no hash to compare with.
     """
+    from actuated_characters.recorder.run_directory import metrics_directory
     from actuated_characters.replay.world import cut_world, worlds
-    from actuated_characters.runs.run_directory import metrics_directory
 
     for together in worlds(recordings):
         for recording, cut in zip(together, cut_world(together)[0], strict=True):
@@ -270,7 +270,7 @@ def _check_summaries(bag: Path, recordings: "Sequence[Recording]", result: "Repl
 
 
 def _written_hash(directory: Path) -> str | None:
-    from actuated_characters.runs.run_directory import SUMMARY
+    from actuated_characters.recorder.run_directory import SUMMARY
 
     try:
         content = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))

@@ -96,13 +96,13 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
-    from actuated_characters.runs.run_directory import (
+    from actuated_characters.recorder.run_directory import (
         PLOT,
         prepare_directory,
         prepare_free_directory,
         read_metrics,
     )
+    from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
 
     if options.view:
         require_extra("view", "--view")
@@ -189,21 +189,16 @@ def planned_run(options: argparse.Namespace) -> PlannedRun:
 
 def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
     """Raise ConfigurationError where options contradict each other."""
-    from sim_node.node_settings import make_node_settings
-
     if options.in_process and options.view:
-        raise ConfigurationError("--view shows what is on topics; --in-process has none")
-    if options.in_process and make_node_settings(plan.simulator).tick_period:
+        raise ConfigurationError("--view shows what is on ROS' topics; --in-process has none")
+    if options.in_process and options.topic:
         raise ConfigurationError(
-            "--in-process runs in lockstep as fast as it can; it takes neither 'mode' realtime "
-            "nor a 'real_time_factor'"
+            "--topic records what other nodes publish; with --in-process there are none"
         )
     about_bag = [name for name in _RECORDING if getattr(options, name) is not None]
-    if about_bag and (options.in_process or options.no_record):
+    if about_bag and options.no_record:
         option = about_bag[0].replace("_", "-")
-        raise ConfigurationError(
-            f"--{option} is about the bag; with --in-process or --no-record there is none"
-        )
+        raise ConfigurationError(f"--{option} is about the bag; with --no-record there is none")
     if options.exclude:
         from actuated_characters.recorder.topics import EXCLUDABLE
 
@@ -237,44 +232,34 @@ def _recording(options: argparse.Namespace, plan: "RunPlan") -> dict[str, object
 
 def _run_plan(
     options: argparse.Namespace,
-    run: PlannedRun,
+    planned: PlannedRun,
     directory: Path,
     progress: Callable[[int], None],
 ) -> list[str]:
     """Run a plan; returns of each throw whether the ball hit, and when."""
-    from actuated_characters.runs.execution import run_in_process, run_over_topics
-    from actuated_characters.runs.throw_hits import (
-        States,
-        describe_hits,
-        read_states,
-        watch_states,
-    )
+    from actuated_characters.runs.execution import run_over_topics
+    from actuated_characters.runs.in_process import run_in_process
+    from actuated_characters.runs.throw_hits import describe_hits, read_states
 
     check_interruption()  # all modules are imported by now
-    plan, pushes, throws = run.plan, run.pushes, run.throws
-    seen: States = []
-    states: States | None = seen
+    plan, pushes, throws = planned.plan, planned.pushes, planned.throws
     if options.in_process:
-        watch = partial(watch_states, seen) if throws else None
-        run_in_process(
-            plan, directory, progress=progress, pushes=pushes, throws=throws, watch=watch
-        )
+        run = run_in_process
     else:
-        run_over_topics(
-            plan,
-            directory,
-            write_bag=not options.no_record,
-            progress=progress,
-            recording=_recording(options, plan),
-            pushes=pushes,
-            throws=throws,
-            velocities=run.velocities,
-            composed=options.composed,
-            viewer=server_parameters(options) if options.view else None,
-        )
-        if throws:
-            states = None if options.no_record else read_states(directory)
-    return describe_hits(plan, throws, states)
+        viewer = server_parameters(options) if options.view else None
+        run = partial(run_over_topics, composed=options.composed, viewer=viewer)
+    run(
+        plan,
+        directory,
+        write_bag=not options.no_record,
+        progress=progress,
+        recording=_recording(options, plan),
+        pushes=pushes,
+        throws=throws,
+        velocities=planned.velocities,
+    )
+    has_states = throws and not options.no_record
+    return describe_hits(plan, throws, read_states(directory) if has_states else None)
 
 
 def _motion_name(plan: "RunPlan") -> str:

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.fork.plan import ForkPlan
+from actuated_characters.recorder.forked_from import KEY
+from actuated_characters.recorder.run_directory import PARAMETERS
 from actuated_characters.replay.players.character_files import write_character, write_urdf
-from actuated_characters.runs.execution import Progress, run_over_topics
-from actuated_characters.runs.forked_from import KEY
+from actuated_characters.runs.execution import run_over_topics
+from actuated_characters.runs.in_process import Progress
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.run_directory import PARAMETERS
 from actuated_characters.runs.throw_hits import describe_hits, read_states
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError

@@ -12,10 +12,10 @@ from actuated_characters.bags.format.metadata import read_metadata
 from actuated_characters.bags.recording import Recording, find_bag, read_recordings
 from actuated_characters.fork.inputs import ForkPoint, recorded_stops
 from actuated_characters.metrics.run_metrics import hash_of_states
+from actuated_characters.recorder.forked_from import ForkedFrom
 from actuated_characters.replay.comparison import clock_of
 from actuated_characters.replay.players.controller_parameters import first_parameters
 from actuated_characters.replay.world import simulator_values
-from actuated_characters.runs.forked_from import ForkedFrom
 from actuated_characters.runs.plan import RunPlan, count_ticks
 from actuated_characters.runs.planned_files import Planned
 from actuated_characters.runs.planned_throws import PlannedThrow, plan_throws

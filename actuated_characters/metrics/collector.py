@@ -2,17 +2,15 @@
 
 import json
 from contextlib import suppress
-
-from diagnostic_msgs.msg import DiagnosticArray
-from std_msgs.msg import String
+from typing import Any
 
 from actuated_characters.bags.rebuilding import rebuild
 from actuated_characters.metrics.falls import PostureReader, reader_for
 from actuated_characters.metrics.run_metrics import Measurement, Series
 from actuated_characters.metrics.tick_assembler import TickAssembler
 from msgs_config.errors import ActuatedCharactersError, RecordingError
-from msgs_config.messages import configuration, topics
-from msgs_config.messages.cdr import decode
+from msgs_config.messages import configuration, topics, typed
+from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
@@ -75,7 +73,7 @@ class MetricsCollector:
             ActuatedCharactersError: the message is not what its topic should carry.
         """
         if topic == CONFIGURATION:
-            self._configure(decode(raw, String).data)
+            self._configure(decode_string(raw))
         elif self._configuration is None:
             self._early_bytes += len(raw)
             if len(self._early) == _MOST_EARLY or self._early_bytes > _MOST_EARLY_BYTES:
@@ -84,9 +82,9 @@ class MetricsCollector:
         elif topic == topics.JOINT_TORQUES.name:
             self._first_command_ns = self._first_command_ns or published_ns
         elif topic == MODE:
-            self._take_mode(decode(raw, String).data)
+            self._take_mode(decode_string(raw))
         elif topic == topics.DIAGNOSTICS.name:
-            self._take_counts(decode(raw, DiagnosticArray))
+            self._take_counts(typed.decode(raw, "diagnostic_msgs/msg/DiagnosticArray"))
         elif topic in (topics.JOINT_STATES.name, REFERENCE):
             state = state_in_layout(self._configuration.layout, self._decoder.decode(raw))
             if topic == REFERENCE:
@@ -142,7 +140,7 @@ class MetricsCollector:
             content = json.loads(text)
             self._measurement.add_mode(int(content["stamp_ns"]), str(content["mode"]))
 
-    def _take_counts(self, message: DiagnosticArray) -> None:
+    def _take_counts(self, message: Any) -> None:
         """Take the simulator's counts; a status that names no session may be of any simulator."""
         assert self._configuration is not None
         for status in message.status:

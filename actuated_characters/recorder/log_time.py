@@ -1,19 +1,16 @@
 """Log times of messages in simulated time."""
 
-import re
 import struct
 import time
 from collections.abc import Iterator
 
-from actuated_characters.bags.format.definitions import find_message_type
+from actuated_characters.bags.format.definitions import first_field
 from actuated_characters.recorder.session_filter import Heard
-from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
 _STAMP_AT, _FIRST_STAMP_AT = 4, 8  # bytes of CDR before the first field, and behind a length
-_STAMPED = {"builtin_interfaces/Time", "std_msgs/Header"}
-_SEQUENCE = re.compile(r"sequence<(\w+)/(\w+)>")
+_STAMPED = {"builtin_interfaces/msg/Time", "std_msgs/msg/Header"}
 _SETTLED_NS = 100_000_000  # in which all of one moment come, also on a busy machine
 _MOST_PENDING = 1000  # messages before the first state; few topics have any then
 
@@ -87,7 +84,7 @@ class SimulatedLogTime:
         """The stamp of a message, ns; 0 if it has none."""
         name, raw = message.recorded.name, message.raw
         if name not in self._places:
-            self._places[name] = _stamp_place(message.recorded.topic.message_type)
+            self._places[name] = _stamp_place(message.recorded.topic.type_name)
         place = self._places[name]
         try:
             if place is None:
@@ -101,21 +98,11 @@ class SimulatedLogTime:
         return int(seconds) * NANOSECONDS_PER_SECOND + int(nanoseconds)
 
 
-def _stamp_place(message_type: type) -> int | None:
+def _stamp_place(type_name: str) -> int | None:
     """Where a serialised message has its stamp: its own, or that of the first of its elements."""
-    first = _first_field(message_type)
+    first = first_field(type_name)
     if first in _STAMPED:
         return _STAMP_AT
-    if element := _SEQUENCE.fullmatch(first):
-        try:
-            inner = find_message_type(f"{element[1]}/msg/{element[2]}")
-        except RecordingError:
-            return None
-        if _first_field(inner) in _STAMPED:
-            return _FIRST_STAMP_AT
+    if first.endswith("[]") and first_field(first.removesuffix("[]")) in _STAMPED:
+        return _FIRST_STAMP_AT
     return None
-
-
-def _first_field(message_type: type) -> str:
-    """The type of a message's first field, as `std_msgs/Header`."""
-    return next(iter(message_type.get_fields_and_field_types().values()), "")  # type: ignore[attr-defined]

@@ -7,7 +7,7 @@ from actuated_characters.bags.format.storage import (
     NONE,
     WALL,
 )
-from actuated_characters.runs.forked_from import FORKED_FROM
+from actuated_characters.recorder.forked_from import FORKED_FROM
 from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter
 

@@ -4,18 +4,16 @@ import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from std_msgs.msg import String
-
 from actuated_characters.bags.directory_lock import DirectoryLock, find_writer
 from actuated_characters.bags.format.metadata import BAG, METADATA
 from actuated_characters.bags.format.storage import reason
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.rewriting import Progress, RecoveredContents, rewrite, storage_files
 from actuated_characters.metrics.collector import CONFIGURATION, HEARD, MetricsCollector
-from actuated_characters.runs.run_directory import SUMMARY, metrics_directory, write_metrics
+from actuated_characters.recorder.run_directory import SUMMARY, metrics_directory, write_metrics
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode
+from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.configuration import parse_world
 
 _DAMAGED, _SCRATCH = ".damaged", ".recovering"
@@ -146,7 +144,7 @@ def _measure(run: Path, recovered: Recovered, progress: Progress) -> None:
 def _name_in_world(bag: Path, namespace: str) -> str:
     """Return the name of the character in a namespace; empty if it has none in its world."""
     message = next(read_messages(bag, [f"{namespace}/{CONFIGURATION}"]))
-    return parse_world(decode(message.raw, String).data).name
+    return parse_world(decode_string(message.raw)).name
 
 
 def _collect(

@@ -5,12 +5,10 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
-from std_msgs.msg import String
-
 from actuated_characters.recorder.topics import RecordedTopic
 from msgs_config.errors import MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode, read_frame_id
+from msgs_config.messages.cdr import decode_string, read_frame_id
 from msgs_config.messages.session import (
     ANONYMOUS,
     ForeignSessions,
@@ -42,7 +40,7 @@ def find_session(message: Heard) -> str | None:
             case SessionPlace.EPISODE:
                 return episode_session(read_frame_id(message.raw))
             case SessionPlace.CONFIGURATION:
-                return read_session(str(json.loads(decode(message.raw, String).data)["session"]))
+                return read_session(str(json.loads(decode_string(message.raw))["session"]))
             case SessionPlace.NOWHERE:
                 return None
     except (MessageError, ValueError, KeyError, TypeError, RecursionError):

@@ -10,10 +10,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.validate_topic_name import validate_topic_name
 
 from actuated_characters.bags.format.definitions import find_message_type
+from msgs_config.bus.node import BusNode
 from msgs_config.character.sensors import SensorType
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.topic import Kept, Quality, Topic
+from msgs_config.parameters import Values
 
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
 _RECORDED = [
@@ -36,8 +38,21 @@ class RecordedTopic:
     character: str | None  # None if it is of all, or of none
 
 
+def wanted_topics(node: BusNode, values: Values) -> list[RecordedTopic]:
+    """The topics that the values of `recorder`'s parameters say, in the order to subscribe.
+
+    Raises:
+        ConfigurationError: a name is wrong.
+    """
+    has_bag = values.flag("write_bag")
+    characters = values.texts("characters") or ("",)
+    found = contract_topics(node, characters, values.texts("exclude"), measured_only=not has_bag)
+    # first: the simulator begins when its states have all their subscribers
+    return (sensor_topics(node, values.texts("sensors")) if has_bag else []) + found
+
+
 def contract_topics(
-    node: Node, characters: Sequence[str], exclude: Sequence[str], *, measured_only: bool
+    node: BusNode, characters: Sequence[str], exclude: Sequence[str], *, measured_only: bool
 ) -> list[RecordedTopic]:
     """The contract's topics of these characters but the excluded ones, in the order to subscribe.
 
@@ -71,7 +86,7 @@ def contract_topics(
     ]
 
 
-def sensor_topics(node: Node, names: Sequence[str]) -> list[RecordedTopic]:
+def sensor_topics(node: BusNode, names: Sequence[str]) -> list[RecordedTopic]:
     """The topics of sensors, by their names below the recorder's namespace.
 
     Raises:
@@ -92,13 +107,13 @@ def sensor_topics(node: Node, names: Sequence[str]) -> list[RecordedTopic]:
     return found
 
 
-def simulator_name(node: Node, character: str) -> str:
+def simulator_name(node: BusNode, character: str) -> str:
     """The name of the simulator's status on `/diagnostics` that is about a character."""
     below = f"{character}/" if character else ""
     return node.resolve_topic_name(f"{below}{topics.SIM_NODE}").lstrip("/")
 
 
-def _recorded(node: Node, topic: Topic, character: str | None) -> RecordedTopic:
+def _recorded(node: BusNode, topic: Topic, character: str | None) -> RecordedTopic:
     below = topic.under(character or "")
     return RecordedTopic(below, node.resolve_topic_name(below.name), topic.name, character)
 

@@ -10,16 +10,15 @@ from typing import Any
 
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
-from std_msgs.msg import String
 
 from actuated_characters.bags.format.metadata import METADATA, load_metadata, storage_of
 from actuated_characters.bags.format.storage import MCAP, SUFFIXES
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.recording import find_bag
-from actuated_characters.runs.forked_from import KEY, ForkedFrom, read_forked_from
+from actuated_characters.recorder.forked_from import KEY, ForkedFrom, read_forked_from
 from msgs_config.errors import MessageError, RecordingError
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode
+from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
 _STATES = topics.JOINT_STATES.name
@@ -90,7 +89,7 @@ class StateMessages:
     def configure(self, message: RecordedMessage) -> None:
         """Keep a simulator's configuration, if it can be read."""
         with suppress(MessageError):
-            self.configuration = self.configuration or decode(message.raw, String).data
+            self.configuration = self.configuration or decode_string(message.raw)
 
 
 @dataclass(frozen=True)

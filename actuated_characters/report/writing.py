@@ -6,6 +6,7 @@ from pathlib import Path
 
 from actuated_characters.bags.recording import Recording, find_bag
 from actuated_characters.bags.robots.reading import RobotRecording, RobotSource, read_any
+from actuated_characters.recorder.run_directory import REPORT
 from actuated_characters.report.contents import Contents, read_contents
 from actuated_characters.report.page import (
     GENERATOR,
@@ -17,7 +18,6 @@ from actuated_characters.report.page import (
 )
 from actuated_characters.report.robot_sections import POSITIONS, RobotReport
 from actuated_characters.report.sections import NAMES, STILLS, CharacterReport
-from actuated_characters.runs.run_directory import REPORT
 from actuated_characters.whole_files import write_whole
 from msgs_config.errors import RecordingError
 

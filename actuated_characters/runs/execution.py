@@ -2,30 +2,22 @@
 
 import os
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from actuated_characters.metrics.falls import reader_for
-from actuated_characters.metrics.run_metrics import Measurement
-from actuated_characters.runs.in_process import Watch, ticks_in_process
+from actuated_characters.recorder.run_directory import (
+    LOGS,
+)
+from actuated_characters.runs.in_process import Progress
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned_files import Planned, write_planned
 from actuated_characters.runs.planned_throws import PlannedThrow
 from actuated_characters.runs.planned_velocities import PlannedVelocity
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.runs.processes import Child, Children
 from actuated_characters.runs.ros_domain import own_domain
-from actuated_characters.runs.run_directory import (
-    LOGS,
-    PARAMETERS,
-    read_metrics,
-    write_metrics,
-    write_parameters,
-)
-from controller_node.parameters import make_controller
+from actuated_characters.runs.senders import check_recorded, plan_senders
 from msgs_config.errors import RunError
-from msgs_config.messages import configuration
 from msgs_config.messages.session import SESSION, make_session
 from msgs_config.runtime.ros_environment import (
     DISCOVERY_RANGE,
@@ -33,28 +25,14 @@ from msgs_config.runtime.ros_environment import (
     LOCALHOST,
     is_discovery_off,
 )
-from sim_node.simulation_factory import make_simulation_settings
 
 _START_TIMEOUT = 120.0  # s until the first answer, on a machine that may be busy with other things
 _VIEWER_TIMEOUT = 30.0  # s until its page is there
 _POLL_PERIOD = 0.05  # s
 _SILENCE = 5.0  # s without a tick, after which the nodes' logs are of interest
 _SIGNS = ("waiting for ", "its type must be ")  # in a node's warning about what does not come
-_IN_PROCESS_REPORT = 100  # ticks between reports of progress
 _TICK = "tick "  # begins the recorder's lines about its progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
-_COUNTS_IN_PROCESS: Mapping[
-    str, object
-] = {  # in one process, where no message can be lost or rejected
-    **dict.fromkeys(("rejected_commands", "duplicate_commands"), 0),
-    **dict.fromkeys(("rejected_pushes", "rejected_throws"), 0),
-    **dict.fromkeys(("missing_ticks", "dropped_references"), 0),
-    "lost_messages": {},
-    "foreign_messages": {},
-}
-
-Progress = Callable[[int], None]
-"""Is called with the number of ticks so far."""
 
 
 def run_over_topics(
@@ -86,7 +64,7 @@ def run_over_topics(
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
     planned = {"pushes": pushes, "throws": throws, "velocities": velocities}
-    senders = _plan_senders(directory, planned, recording, fork)
+    senders = plan_senders(directory, planned, recording, fork)
     with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             progress = watch(children.start_node("viewer", viewer), progress)
@@ -96,26 +74,10 @@ def run_over_topics(
         listeners = (2 + (fork is not None), 2 + len(sender))
         loop = _start_loop(children, plan, session, listeners, composed=composed)
         wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
-    counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
-    _check_recorded(recorder, directory, plan.ticks - resets, counts)
-
-
-def _check_recorded(
-    recorder: Child, directory: Path, ticks: int, counts: Mapping[str, int]
-) -> None:
-    """Raise RunError unless the recorder has all ticks, and all inputs were accepted.
-
-    `counts` are the numbers of inputs, where they are known. A reset is a tick without figures.
-    """
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
-    recorded, _ = read_metrics(directory)
-    if recorded["ticks"] != ticks:
-        raise RunError(f"{recorded['ticks']} of {ticks} ticks were recorded")
-    for what in ("pushes", "throws"):
-        if counts.get(what, 1) and (rejected := recorded[f"rejected_{what}"]):
-            of = f"of {counts[what]} " if what in counts else ""
-            raise RunError(f"sim_node rejected {rejected} {of}{what}")
+    counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
+    check_recorded(directory, plan.ticks - resets, counts)
 
 
 def watch(viewer: Child, progress: Progress) -> Progress:
@@ -162,49 +124,6 @@ def _start_loop(
         return [children.start_composed("composed", both, *arguments)]
     controller = children.start_node("controller_node", plan.controller, *arguments)
     return [children.start_node("sim_node", plan.simulator, *arguments), controller]
-
-
-def _plan_senders(
-    directory: Path,
-    inputs: Mapping[str, Sequence[Planned]],
-    recording: Mapping[str, object],
-    fork: Mapping[str, object] | None,
-) -> dict[str, dict[str, object]]:
-    """The parameters of the node that sends what was planned, by its name; none if nothing was."""
-    if not any(inputs.values()) and fork is None:
-        return {}
-    planned = _write_planned(directory, inputs, recording)
-    return {"pusher": planned} if fork is None else {"fork": {**planned, **fork}}
-
-
-def _write_planned(
-    directory: Path,
-    inputs: Mapping[str, Sequence[Planned]],
-    recording: Mapping[str, object],
-) -> dict[str, object]:
-    """Write what was planned; returns the parameters of the process that sends it.
-
-    It waits for the node that it is for, and for a recorder that keeps the topic in a bag.
-    """
-    excluded = recording.get("exclude", ())
-    assert isinstance(excluded, Collection)
-    left_out = {str(name).removeprefix("/") for name in excluded}
-
-    def subscribers(topic: str) -> int:
-        return 2 if recording["write_bag"] and topic not in left_out else 1
-
-    files = {what: directory / PARAMETERS / f"{what}.json" for what in inputs}
-    for what, planned in inputs.items():
-        write_planned(files[what], planned)
-    steers = bool(inputs["velocities"])
-    return {
-        "file": str(files["pushes"]),
-        "throws": str(files["throws"]),
-        **({"velocities": str(files["velocities"])} if steers else {}),
-        "wait_for_subscribers": subscribers("external_wrench"),
-        "throw_subscribers": subscribers("throw"),
-        **({"velocity_subscribers": subscribers("cmd_vel_stamped")} if steers else {}),
-    }
 
 
 @contextmanager
@@ -275,40 +194,3 @@ def wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> N
         time.sleep(_POLL_PERIOD)
     if simulator.exit_code:
         raise RunError(f"{simulator.name} failed: {simulator.last_words()}")
-
-
-def run_in_process(
-    plan: RunPlan,
-    directory: Path,
-    *,
-    progress: Progress = lambda ticks: None,
-    pushes: Sequence[PlannedPush] = (),
-    throws: Sequence[PlannedThrow] = (),
-    watch: Watch | None = None,
-) -> None:
-    """Run the same simulation and controller as one loop without ROS; figures in a directory.
-
-    `watch` is called with the simulation after each tick.
-
-    Raises:
-        SimulationError: the simulation diverged.
-    """
-    write_parameters(directory, "sim_node", plan.simulator)
-    write_parameters(directory, "controller_node", plan.controller)
-    known = configuration.parse(configuration.describe(plan.character, plan.simulator))
-    terrain = make_simulation_settings(plan.simulator).world.terrain
-    measurement = Measurement(known, reader_for(plan.character, terrain))
-    controller = make_controller(plan.character, plan.reference, plan.controller)
-    mode = None
-    started = time.perf_counter()
-    ticks = ticks_in_process(plan, pushes, throws, controller, watch)
-    for count, tick in enumerate(ticks, start=1):
-        if controller.mode is not None and controller.mode is not mode:
-            mode = controller.mode
-            measurement.add_mode(mode.stamp_ns, mode.phase.mode.value)
-        measurement.add(tick)
-        if count % _IN_PROCESS_REPORT == 0:
-            progress(count)
-    metrics = measurement.summary(wall_time=time.perf_counter() - started)
-    summary = {"character": known.character, **metrics, **_COUNTS_IN_PROCESS}
-    write_metrics(directory, summary, measurement.series())

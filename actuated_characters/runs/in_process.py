@@ -1,20 +1,40 @@
-"""The loop of simulation and controller joined in one process, without ROS."""
+"""Runs in this process, without ROS: of the nodes on a bus of their own, or of the bare loop."""
 
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from actuated_characters.metrics.run_metrics import Tick
+from actuated_characters.recorder.in_process import InProcessRecorder
+from actuated_characters.recorder.run_directory import LOGS, write_parameters
+from actuated_characters.runs.held_signals import signals_held
+from actuated_characters.runs.perturbation_node import PerturbationNode
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_throws import PlannedThrow
+from actuated_characters.runs.planned_velocities import PlannedVelocity
 from actuated_characters.runs.planned_wrenches import PlannedPush, push_schedule
+from actuated_characters.runs.senders import check_recorded, plan_senders
 from controller_node.controller import Controller
+from controller_node.node import ControllerNode
 from controller_node.parameters import make_controller
+from msgs_config.bus.composition import ComposableNode, run_nodes
+from msgs_config.bus.in_process import Bus
 from msgs_config.messages.clock import TickClock
+from msgs_config.messages.session import SESSION, make_session
+from sim_node.node import SimNode
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.throws import ThrowQueue
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
+_PROGRESS_PERIOD = 0.1  # s between words on the progress
+_NOTHING_GIVEN: Mapping[str, object] = {}
+
+Progress = Callable[[int], None]
+"""Is called with the number of ticks so far."""
 Watch = Callable[[Simulation], object]
 """Is called with the simulation after each tick."""
 
@@ -57,3 +77,52 @@ def ticks_in_process(
             if watch is not None:
                 watch(simulation)
             yield Tick(state, following, reference)
+
+
+def run_in_process(
+    plan: RunPlan,
+    directory: Path,
+    *,
+    write_bag: bool = True,
+    progress: Progress = lambda ticks: None,
+    recording: Mapping[str, object] = _NOTHING_GIVEN,
+    pushes: Sequence[PlannedPush] = (),
+    throws: Sequence[PlannedThrow] = (),
+    velocities: Sequence[PlannedVelocity] = (),
+) -> None:
+    """Run the nodes of a run over topics on a bus of this process; all else is as there.
+
+    They send the same messages in the same order, so the bag differs in wall times alone.
+
+    Raises:
+        ActuatedCharactersError: one of the nodes failed, or the simulator rejected an input.
+    """
+    session = {SESSION.name: make_session("/sim_node")}
+    recording = {**recording, "directory": str(directory), "write_bag": write_bag}
+    planned = {"pushes": pushes, "throws": throws, "velocities": velocities}
+    senders = plan_senders(directory, planned, recording, None)
+    given: dict[str, dict[str, object]] = {
+        "recorder": {**recording, "progress_period": _PROGRESS_PERIOD},
+        **senders,
+        "controller_node": {**plan.controller, "wait_for_subscribers": 2 + len(senders)},
+        "sim_node": {**plan.simulator, "wait_for_subscribers": 2},
+    }
+    for name, parameters in given.items():
+        write_parameters(directory, name, parameters)
+    bus = Bus(partial(_log, directory / LOGS))
+    places = {name: bus.node(name, {**parameters, **session}) for name, parameters in given.items()}
+    recorder = InProcessRecorder(places["recorder"], progress)
+    with closing(recorder), signals_held(most=1) as stop:
+        nodes: list[ComposableNode] = [recorder]
+        nodes += [PerturbationNode(places[name]) for name in senders]
+        nodes += [ControllerNode(places["controller_node"]), SimNode(places["sim_node"])]
+        run_nodes(nodes, stop)
+    recorder.conclude()
+    check_recorded(directory, plan.ticks, {"pushes": len(pushes), "throws": len(throws)})
+
+
+def _log(folder: Path, name: str, severity: str, sentence: str) -> None:
+    """Write what a node logs into its file, as rcutils does."""
+    line = f"[{severity.upper().removesuffix('ING')}] [{time.time():.9f}] [{name}]: {sentence}\n"
+    with (folder / f"{name.replace('/', '.')}.log").open("a", encoding="utf-8") as file:
+        file.write(line)

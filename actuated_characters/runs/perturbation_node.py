@@ -4,22 +4,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rclpy.node import Node
-
 from actuated_characters.runs.planned_throws import read_throws
 from actuated_characters.runs.planned_velocities import read_velocities
 from actuated_characters.runs.planned_wrenches import read_pushes
-from msgs_config.bus.dds import create_publisher
-from msgs_config.bus.polling import DirectSubscription, PollingExecutor
-from msgs_config.bus.ros_parameters import declare, given_parameters
+from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
+from msgs_config.bus.node import BusNode, Executor, Stop
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import encode
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import SESSION, given_session
 from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.process import StopSignal
 
 PARAMETERS = [
     Parameter("file", "pushes.json", "the pushes, as a run writes them"),
@@ -36,26 +31,28 @@ PARAMETERS = [
 _TIMEOUT = 10.0  # s until the simulator has the messages
 
 
-class PerturbationNode(Node):
+class PerturbationNode(ComposableNode):
     """Sends what was planned, and only then subscribes to the torques.
 
     A controller that waits for that subscription answers no state before all of it is there.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, node: BusNode | None = None) -> None:
         """Read the pushes, the throws and the velocities.
+
+        Without a place on a bus it is a node of ROS.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or a file cannot be read.
         """
-        super().__init__("pusher")
-        values = resolve(PARAMETERS, given_parameters(self))
-        declare(self, PARAMETERS, values)
+        super().__init__(node or ros_node("pusher"))
+        values = resolve(PARAMETERS, self.node.given_parameters())
+        self.node.declare(PARAMETERS, values)
         session = given_session(values)
         pushes = read_pushes(Path(values.text("file")))
         self._outgoing = [
             _PlannedPublisher(
-                self,
+                self.node,
                 topics.EXTERNAL_WRENCH,
                 [encode_wrenches(replace(push.arrays(), frame_id=session)) for push in pushes],
                 values.integer("wait_for_subscribers"),
@@ -65,7 +62,7 @@ class PerturbationNode(Node):
             throws, codec = read_throws(Path(values.text("throws"))), ThrowCodec(session)
             self._outgoing.append(
                 _PlannedPublisher(
-                    self,
+                    self.node,
                     topics.THROW,
                     [codec.encode(each.stamp_ns, each.throw) for each in throws],
                     values.integer("throw_subscribers"),
@@ -75,38 +72,36 @@ class PerturbationNode(Node):
             velocities = read_velocities(Path(values.text("velocities")))
             self._outgoing.append(
                 _PlannedPublisher(
-                    self,
+                    self.node,
                     topics.CMD_VEL_STAMPED,
-                    [encode(each.message()) for each in velocities],
+                    [each.encode() for each in velocities],
                     values.integer("velocity_subscribers"),
                 )
             )
-        self._torques: DirectSubscription | None = None
 
-    def run(self, stop: StopSignal) -> None:
+    def turns(self, stop: Stop, executor: Executor) -> Turns:
         """Send as soon as all subscribers are there, then stay until `stop`."""
-        executor = PollingExecutor(self)
-        try:
-            while not stop:
-                if self._torques is None and all(each.is_ready for each in self._outgoing):
-                    for each in self._outgoing:
-                        each.send()
-                    self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
-                if self._torques is None or self._torques.take() is None:
-                    executor.rest()
-                else:
-                    executor.received()
-        finally:
-            executor.close()
+        while not stop and not all(each.is_ready for each in self._outgoing):
+            yield UNTIL_A_MESSAGE
+        if stop:
+            return
+        for each in self._outgoing:
+            each.send()
+        torques = self.node.subscription(topics.JOINT_TORQUES)
+        while not stop:
+            is_heard = torques.take() is not None
+            if is_heard:
+                executor.received()
+            yield AT_ONCE if is_heard else UNTIL_A_MESSAGE
 
 
 class _PlannedPublisher:
     """Serialised messages for one topic, and how many subscribers they wait for."""
 
     def __init__(
-        self, node: Node, topic: Topic, messages: Sequence[bytes], subscribers: int
+        self, node: BusNode, topic: Topic, messages: Sequence[bytes], subscribers: int
     ) -> None:
-        self._publisher = create_publisher(node, topic)
+        self._publisher = node.publisher(topic)
         self._messages = messages
         self._subscribers = subscribers
 

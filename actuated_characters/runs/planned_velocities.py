@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from geometry_msgs.msg import TwistStamped
-
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_files import Planned, read_planned
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import VelocityCommand
 from msgs_config.errors import ConfigurationError
-from msgs_config.messages.cdr import split_stamp
+from msgs_config.messages import typed
 from msgs_config.messages.clock import TickClock
 
 _EXAMPLE = "'0.8,0,0.3@2 0,0,0@8'"
@@ -28,13 +26,12 @@ class PlannedVelocity(Planned):
     left: float  # m/s
     turn: float  # rad/s
 
-    def message(self) -> TwistStamped:
-        """As the message of `cmd_vel_stamped`."""
-        message = TwistStamped()
-        message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(self.stamp_ns)
+    def encode(self) -> bytes:
+        """The serialised message of `cmd_vel_stamped`."""
+        message = typed.stamped(typed.TWIST_STAMPED, self.stamp_ns)
         message.twist.linear.x, message.twist.linear.y = self.forward, self.left
         message.twist.angular.z = self.turn
-        return message
+        return typed.encode(message)
 
 
 def read_velocities(file: Path) -> list[PlannedVelocity]:

@@ -7,13 +7,12 @@ import signal
 import subprocess
 import sys
 import tempfile
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from actuated_characters.runs.run_directory import LOGS, PARAMETERS, write_parameters
+from actuated_characters.recorder.run_directory import LOGS, PARAMETERS, write_parameters
+from actuated_characters.runs.held_signals import signals_held
 
 MODULES = {
     "sim_node": "sim_node.main",
@@ -210,30 +209,10 @@ class Children:
             command += ["--params-file", str(file)]
         command += ros_arguments
         log = self.directory / LOGS / f"{name}.log"
-        with _signals_held():
+        with signals_held():
             child = Child(command, log, environment=self._environment)
             self._children.append(child)
         return child
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Keep signals for afterwards; a mask would hold them back from one thread alone."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # signals come to the main thread
-        return
-    received: list[int] = []
-    handlers = {
-        number: signal.signal(number, lambda number, frame: received.append(number))
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        for caught in received:
-            signal.raise_signal(caught)
 
 
 def end_with_parent(number: signal.Signals) -> None:

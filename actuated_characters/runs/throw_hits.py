@@ -9,7 +9,6 @@ import numpy as np
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned_throws import PlannedThrow
 from msgs_config.arrays import FloatArray
-from sim_node.physics.simulation import Simulation
 from sim_node.physics.sphere_sweep import BallAndCharacter
 from sim_node.physics.world import World, WorldSettings
 from sim_node.simulation_factory import make_simulation_settings
@@ -32,11 +31,6 @@ def read_states(bag: Path) -> States | None:
     nothing = np.empty((0, 13))
     motions = [nothing if balls is None else balls.motion for balls in recording.balls]
     return list(zip(recording.position, motions, strict=True))[1:] if motions else None
-
-
-def watch_states(states: States, simulation: Simulation) -> None:
-    """Add the present state of a simulation."""
-    states.append((simulation.characters[0].state.position, simulation.ball_motion()))
 
 
 def describe_hits(

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from actuated_characters.runs.execution import (
-    Progress,
     run_environment,
     wait_for_end,
     watch,
 )
+from actuated_characters.runs.in_process import Progress
 from actuated_characters.runs.plan import RUN_DEFAULTS
 from actuated_characters.runs.processes import Children
 from actuated_characters.scenes.scene import SIMULATOR, Scene

@@ -5,14 +5,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from rclpy.node import Node
-from std_msgs.msg import Header, String
 
 from actuated_characters.bags.rebuilding import Rebuilt, rebuild
 from actuated_characters.viewer.latest import BallReader, CharacterReader
 from msgs_config.bus.polling import DirectSubscription
 from msgs_config.errors import ActuatedCharactersError, MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode
+from msgs_config.messages.cdr import decode_header, decode_string
 from msgs_config.messages.session import episode_session
 
 _CONFIGURATION = "/" + topics.CONFIGURATION.of(topics.SIM_NODE).name
@@ -79,7 +78,7 @@ class Simulators:
             if newest is None:
                 continue
             try:
-                text = decode(newest, String).data
+                text = decode_string(newest)
                 watched.rebuilt = rebuild(text, watched.below.lstrip("/"))
             except (ActuatedCharactersError, OSError) as error:
                 self._log(f"'{watched.below}{_CONFIGURATION}' cannot be shown: {error}")
@@ -91,7 +90,7 @@ class Simulators:
         before = watched.episode_text
         with suppress(MessageError):
             while (raw := watched.episode.take()) is not None:
-                watched.episode_text = str(decode(raw, Header).frame_id)
+                watched.episode_text = decode_header(raw)[1]
         watched.is_new_episode = watched.episode_text != before
 
     def gone(self) -> list[Watched]:

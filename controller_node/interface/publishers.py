@@ -2,12 +2,9 @@
 
 import json
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import TwistStamped
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory
 
 from controller_node.actuation import net_wrench
 from controller_node.behaviours.base import ModeReport
@@ -20,8 +17,8 @@ from msgs_config.bus.node import BusNode, Publisher
 from msgs_config.bus.publishing import Outgoing, flush, has_subscribers, publish_together
 from msgs_config.character.layout import JointLayout
 from msgs_config.frame_names import WORLD
-from msgs_config.messages import topics
-from msgs_config.messages.cdr import DoublesEncoder, encode, encode_string, split_stamp
+from msgs_config.messages import topics, typed
+from msgs_config.messages.cdr import DoublesEncoder, encode_string
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedReference, StampedState
@@ -140,25 +137,23 @@ class Publishers:
         """Publish what the controller is and has in force, as JSON."""
         self._configurations.publish(encode_string(text))
 
-    def publish_trajectory(self, trajectory: JointTrajectory) -> None:
-        """Publish a trajectory that was taken, with the stamp that it begins at."""
-        self._trajectories.publish(encode(trajectory))
+    def publish_trajectory(self, trajectory: Any) -> None:
+        """Publish a `JointTrajectory` that was taken, with the stamp that it begins at."""
+        self._trajectories.publish(typed.encode(trajectory))
 
     def publish_velocity(self, command: VelocityCommand, start_ns: int) -> None:
         """Publish a velocity as it was taken, with the stamp that it begins at."""
-        message = TwistStamped()
-        message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)
+        message = typed.stamped(typed.TWIST_STAMPED, start_ns)
         message.twist.linear.x, message.twist.linear.y = command.forward, command.left
         message.twist.angular.z = command.turn
-        self._velocities.publish(encode(message))
+        self._velocities.publish(typed.encode(message))
 
     def publish_strengths(self, strengths: Strengths) -> None:
         """Publish strengths that were taken, of every joint, with the stamp that they begin at."""
-        message = JointState()
-        message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(strengths.start_ns)
         values = strengths.by_joint(self._layout)
-        message.name, message.effort = list(values), list(values.values())
-        self._strengths.publish(encode(message))
+        encoder = JointStateEncoder(list(values), "")
+        effort = np.array(list(values.values()))
+        self._strengths.publish(encoder.encode(strengths.start_ns, effort=effort))
 
     def begin_episode(self) -> None:
         """Publish the next mode even where it is the one of before."""
@@ -175,7 +170,7 @@ class Publishers:
         if outlook is not None and outlook is not self._published_outlook:
             self._published_outlook = outlook
             if has_subscribers(self._plans):
-                self._plans.publish(encode(plan_message(outlook, stamp_ns)))
+                self._plans.publish(plan_message(outlook, stamp_ns))
         if mode is not None and mode is not self._published_mode:
             self._published_mode = mode
             self._modes.publish(encode_string(json.dumps(mode.content(), allow_nan=False)))

@@ -2,18 +2,15 @@
 
 from typing import Any
 
-from builtin_interfaces.msg import Duration, Time
-
 from msgs_config.bus.stamped_subscription import PastStampError
 from msgs_config.errors import MotionError
-from msgs_config.messages.cdr import decode
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages import typed
 
 _MAX_BYTES = 2**25  # bytes of a message
 _LATEST_NS = 10**15  # after now
 
 
-def decode_stamped(raw: bytes, message_type: type, what: str, state_ns: int) -> tuple[Any, int]:
+def decode_stamped(raw: bytes, type_name: str, what: str, state_ns: int) -> tuple[Any, int]:
     """A message with a header, and the stamp in ns that it counts from; without one the state's.
 
     Raises:
@@ -23,9 +20,9 @@ def decode_stamped(raw: bytes, message_type: type, what: str, state_ns: int) -> 
     """
     if len(raw) > _MAX_BYTES:
         raise MotionError(f"{what}: it has {len(raw)} bytes; it must have {_MAX_BYTES} or fewer")
-    message = decode(raw, message_type)
+    message = typed.decode(raw, type_name)
     stamp = message.header.stamp
-    start_ns = nanoseconds(stamp) or state_ns
+    start_ns = typed.nanoseconds(stamp) or state_ns
     if start_ns < state_ns:
         raise PastStampError(
             f"{what}: it begins at {start_ns} ns, which is over; it must be {state_ns} ns or "
@@ -37,8 +34,3 @@ def decode_stamped(raw: bytes, message_type: type, what: str, state_ns: int) -> 
             "within 1e6 s"
         )
     return message, start_ns
-
-
-def nanoseconds(time: Time | Duration) -> int:
-    """A time of a message in ns."""
-    return int(time.sec) * NANOSECONDS_PER_SECOND + int(time.nanosec)

@@ -1,21 +1,18 @@
 """Trajectories, velocities and strengths that come over topics, and count from their stamps on."""
 
 from functools import partial
-
-from geometry_msgs.msg import Twist, TwistStamped
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory
+from typing import Any
 
 from controller_node.controller import Controller
 from controller_node.interface.publishers import Publishers
-from controller_node.interface.stamped_message import decode_stamped, nanoseconds
+from controller_node.interface.stamped_message import decode_stamped
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
 from msgs_config.bus.node import BusNode
 from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.bus.stamped_subscription import StampedSubscription
-from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode, split_stamp
+from msgs_config.messages import topics, typed
+from msgs_config.messages.cdr import JOINT_STATE
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
 
@@ -77,12 +74,15 @@ class StampedTopics:
         self._strengths.take()
 
     def _set_trajectory(self, raw: bytes) -> None:
-        message, start_ns = decode_stamped(raw, JointTrajectory, "trajectory", self._now_ns)
+        message, start_ns = decode_stamped(raw, typed.JOINT_TRAJECTORY, "trajectory", self._now_ns)
         points = message.points
         self._controller.set_trajectory(
             points_of_lists(
                 message.joint_names,
-                [nanoseconds(point.time_from_start) / NANOSECONDS_PER_SECOND for point in points],
+                [
+                    typed.nanoseconds(point.time_from_start) / NANOSECONDS_PER_SECOND
+                    for point in points
+                ],
                 [point.positions for point in points],
                 [point.velocities for point in points],
                 [point.accelerations for point in points],
@@ -91,17 +91,17 @@ class StampedTopics:
             now_ns=self._now_ns,
             episode_ns=self._episode_ns,
         )
-        message.header.stamp.sec, message.header.stamp.nanosec = split_stamp(start_ns)
+        typed.set_stamp(message, start_ns)
         self._outputs.publish_trajectory(message)
 
     def _steer_stamped(self, raw: bytes) -> None:
-        message, start_ns = decode_stamped(raw, TwistStamped, "cmd_vel", self._now_ns)
+        message, start_ns = decode_stamped(raw, typed.TWIST_STAMPED, "cmd_vel", self._now_ns)
         self._take_velocity(message.twist, start_ns)
 
     def _steer(self, raw: bytes) -> None:
-        self._take_velocity(decode(raw, Twist), self._now_ns)
+        self._take_velocity(typed.decode(raw, typed.TWIST), self._now_ns)
 
-    def _take_velocity(self, velocity: Twist, start_ns: int) -> None:
+    def _take_velocity(self, velocity: Any, start_ns: int) -> None:
         """Steer by the parts that a character on the ground has; the others do not count."""
         clock = self._controller.clock
         start_ns = clock.stamp_ns(clock.first_tick_from(start_ns))
@@ -120,7 +120,7 @@ class StampedTopics:
         self._outputs.publish_velocity(command, start_ns)
 
     def _set_strengths(self, raw: bytes) -> None:
-        message, start_ns = decode_stamped(raw, JointState, "strength", self._now_ns)
+        message, start_ns = decode_stamped(raw, JOINT_STATE, "strength", self._now_ns)
         layout, clock = self._controller.layout, self._controller.clock
         start_ns = clock.stamp_ns(clock.first_tick_from(start_ns))
         strengths = strengths_of(layout, tuple(message.name), tuple(message.effort), start_ns)

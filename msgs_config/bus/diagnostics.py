@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-
 from msgs_config.bus.node import BusNode
-from msgs_config.messages.cdr import encode, split_stamp
+from msgs_config.messages import typed
 from msgs_config.messages.topics import DIAGNOSTICS
 
 DIAGNOSTICS_PERIOD = 1.0  # s of wall time
+_STATUS, _KEY_VALUE = "diagnostic_msgs/msg/DiagnosticStatus", "diagnostic_msgs/msg/KeyValue"
 
 
 class DiagnosticsPublisher:
@@ -39,18 +38,18 @@ class DiagnosticsPublisher:
         the character's as its `hardware_id`: in one namespace, so both nodes have the same.
         """
         namespace = "/".join(filter(None, (self._node.get_namespace().strip("/"), below)))
-        level = DiagnosticStatus.OK if warning is None else DiagnosticStatus.WARN
-        status = DiagnosticStatus(
-            level=level if fault is None else DiagnosticStatus.ERROR,
+        levels = typed.constants(_STATUS)
+        level = levels.OK if warning is None else levels.WARN
+        status = typed.new(
+            _STATUS,
+            level=level if fault is None else levels.ERROR,
             name=f"{namespace}/{self._node.get_name()}".lstrip("/"),
             message=fault or warning or "running",
             hardware_id=f"{namespace}/{character}".lstrip("/"),
-            values=[KeyValue(key=name, value=str(value)) for name, value in values.items()],
+            values=[typed.new(_KEY_VALUE, key=k, value=str(v)) for k, v in values.items()],
         )
-        message = DiagnosticArray(status=[status])
-        stamp = message.header.stamp
-        stamp.sec, stamp.nanosec = split_stamp(self._node.now_ns())
-        self._publisher.publish(encode(message))
+        message = typed.stamped(DIAGNOSTICS.type_name, self._node.now_ns(), status=[status])
+        self._publisher.publish(typed.encode(message))
 
     def flush(self, seconds: float) -> bool:
         """Wait until every subscriber has the last report, at most `seconds`; whether it has."""

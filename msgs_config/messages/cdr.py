@@ -9,11 +9,9 @@ its size, counted from the end of the four bytes of encapsulation header.
 
 import struct
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import JointState, MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import MessageError
@@ -23,10 +21,12 @@ CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 STAMP_START = 4  # after the encapsulation header
 NAMES_START = 12  # after the encapsulation header and the stamp
 _FRAME_START = 16  # after the length of the frame's name
+JOINT_STATE = "sensor_msgs/msg/JointState"
+MULTI_DOF_JOINT_STATE = "sensor_msgs/msg/MultiDOFJointState"
 _WIDTHS = {  # doubles in an entry of each list
-    JointState: (1, 1, 1),  # position, velocity, effort
+    JOINT_STATE: (1, 1, 1),  # position, velocity, effort
     # transforms (translation, rotation xyzw), twist (linear, angular), wrench (force, torque)
-    MultiDOFJointState: (7, 6, 6),
+    MULTI_DOF_JOINT_STATE: (7, 6, 6),
 }
 _EMPTY = np.zeros(0)
 
@@ -89,29 +89,9 @@ def encode_text(text: str) -> bytes:
     return struct.pack("<I", len(content)) + content + bytes(padding(len(content), 4))
 
 
-def decode(raw: bytes, message_type: type) -> Any:
-    """A message of any type from its serialised form.
-
-    Raises:
-        MessageError: the bytes are no such message.
-    """
-    if message_type is JointState:  # the middleware would print a line if a list is too long
-        read_message(raw, JointState)
-    try:
-        return deserialize_message(raw, message_type)
-    except Exception as error:  # rclpy has no exception type for bytes that it cannot decode
-        raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
-
-
-def encode(message: Any) -> bytes:
-    """A message of any type, serialised."""
-    return bytes(serialize_message(message))
-
-
 def encode_string(text: str) -> bytes:
     """A serialised std_msgs/String."""
-    content = text.encode() + b"\0"
-    return CDR_LITTLE_ENDIAN + struct.pack("<I", len(content)) + content
+    return CDR_LITTLE_ENDIAN + encode_text(text)
 
 
 def decode_string(raw: bytes) -> str:
@@ -128,9 +108,7 @@ def decode_string(raw: bytes) -> str:
 
 def encode_header(stamp_ns: int, frame_id: str) -> bytes:
     """A serialised std_msgs/Header."""
-    content = frame_id.encode() + b"\0"
-    head = with_stamp(CDR_LITTLE_ENDIAN + bytes(8), stamp_ns)
-    return head + struct.pack("<I", len(content)) + content
+    return with_stamp(CDR_LITTLE_ENDIAN + bytes(8), stamp_ns) + encode_text(frame_id)
 
 
 def decode_header(raw: bytes) -> tuple[int, str]:
@@ -155,7 +133,7 @@ class NamedLists(NamedTuple):
     lists: list[FloatArray]  # (m * width,) each
 
 
-def read_message(raw: bytes, message_type: type) -> NamedLists:
+def read_message(raw: bytes, type_name: str) -> NamedLists:
     """The content of a serialised JointState or MultiDOFJointState.
 
     Raises:
@@ -170,9 +148,10 @@ def read_message(raw: bytes, message_type: type) -> NamedLists:
         for _ in range(count):
             name, offset = _read_text(raw, offset, order)
             names.append(name)
-        lists = _read_lists(raw, offset, order, _WIDTHS[message_type])
+        lists = _read_lists(raw, offset, order, _WIDTHS[type_name])
     except (KeyError, struct.error, ValueError) as error:
-        raise MessageError(f"{len(raw)} bytes that are no {message_type.__name__}") from error
+        name = type_name.rpartition("/")[2]
+        raise MessageError(f"{len(raw)} bytes that are no {name}") from error
     return NamedLists(stamp_ns, frame_id, tuple(names), lists)
 
 

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from sensor_msgs.msg import JointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import LayoutError, MessageError
 from msgs_config.messages.cdr import (
     CDR_LITTLE_ENDIAN,
+    JOINT_STATE,
     LITTLE_ENDIAN,
     NAMES_START,
     STAMP_START,
@@ -85,7 +85,7 @@ class JointStateDecoder:
                 if (arrays := form.read(raw)) is not None:
                     return arrays
                 break
-        stamp_ns, frame_id, names, lists = read_message(raw, JointState)
+        stamp_ns, frame_id, names, lists = read_message(raw, JOINT_STATE)
         position, velocity, effort = lists
         arrays = JointArrays(stamp_ns, names, position, velocity, effort, frame_id)
         head = encode_names(names, frame_id)

@@ -8,11 +8,16 @@ in kg, m and m/s, world axes; everything else in the message is unused. Where th
 from dataclasses import dataclass
 
 import numpy as np
-from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import FloatArray
 from msgs_config.frame_names import WORLD
-from msgs_config.messages.cdr import encode_arrays, encode_head, read_message, with_stamp
+from msgs_config.messages.cdr import (
+    MULTI_DOF_JOINT_STATE,
+    encode_arrays,
+    encode_head,
+    read_message,
+    with_stamp,
+)
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, parse_throw
 from msgs_config.messages.wrenches import NO_ROWS
@@ -68,7 +73,7 @@ def decode_balls(raw: bytes) -> BallStates:
     Raises:
         MessageError: the bytes are no such message.
     """
-    stamp_ns, _, names, lists = read_message(raw, MultiDOFJointState)
+    stamp_ns, _, names, lists = read_message(raw, MULTI_DOF_JOINT_STATE)
     poses, twists = lists[0].reshape(-1, 7), lists[1].reshape(-1, 6)
     count = min(len(names), len(poses), len(twists))
     motion = np.hstack((poses[:count], twists[:count]))

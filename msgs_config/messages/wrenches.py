@@ -9,12 +9,17 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from sensor_msgs.msg import MultiDOFJointState
 
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.frame_names import WORLD
 from msgs_config.geometry.rotations import IDENTITY_XYZW
-from msgs_config.messages.cdr import encode_arrays, encode_head, read_message, with_stamp
+from msgs_config.messages.cdr import (
+    MULTI_DOF_JOINT_STATE,
+    encode_arrays,
+    encode_head,
+    read_message,
+    with_stamp,
+)
 
 NO_ROWS = np.zeros((0, 6))
 _MAX_KEPT_HEADS = 256
@@ -103,7 +108,7 @@ def decode_wrenches(raw: bytes) -> WrenchArrays:
     Raises:
         MessageError: the bytes are no such message.
     """
-    stamp_ns, frame_id, links, lists = read_message(raw, MultiDOFJointState)
+    stamp_ns, frame_id, links, lists = read_message(raw, MULTI_DOF_JOINT_STATE)
     transforms, _, wrenches = lists
     points = transforms.reshape(-1, 7)[:, :3].copy()
     return WrenchArrays(stamp_ns, links, wrenches.reshape(-1, 6), points, frame_id)

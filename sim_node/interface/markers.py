@@ -6,25 +6,24 @@ A message is filled and serialised once, with numbers in it that are found again
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Point, Vector3
-from rclpy.serialization import serialize_message
-from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker, MarkerArray
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, Shape, ShapeType
 from msgs_config.frame_names import WORLD
 from msgs_config.geometry import rotations
+from msgs_config.messages import topics, typed
 from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.throw import ProjectileThrow
 
-_TYPES = {
-    ShapeType.BOX: Marker.CUBE,
-    ShapeType.SPHERE: Marker.SPHERE,
-    ShapeType.CYLINDER: Marker.CYLINDER,
-    ShapeType.MESH: Marker.MESH_RESOURCE,
+_MARKER = "visualization_msgs/msg/Marker"
+_TYPES = {  # the names of its constants
+    ShapeType.BOX: "CUBE",
+    ShapeType.SPHERE: "SPHERE",
+    ShapeType.CYLINDER: "CYLINDER",
+    ShapeType.MESH: "MESH_RESOURCE",
 }
 _POSE = 7  # doubles: position and orientation, xyzw
 _FIND_POSE = -7.125e250  # times 1, 2, 3 and so on
@@ -84,10 +83,12 @@ class MarkerEncoder:
         turns = [shape.pose.orientation_xyzw for _, shape in shapes]
         self._turns_xyzw = np.array(turns).reshape(-1, 4)
         markers = [_marker(number, shape) for number, (_, shape) in enumerate(shapes)]
-        deleted = [Marker(id=len(shapes) + i, action=Marker.DELETE) for i in range(gone)]
+        delete = typed.constants(_MARKER).DELETE
+        deleted = [typed.new(_MARKER, id=len(shapes) + i, action=delete) for i in range(gone)]
         for marker in deleted:
             marker.header.frame_id = WORLD
-        self._content = bytearray(serialize_message(MarkerArray(markers=markers + deleted)))
+        message = typed.new(topics.VISUALIZATION.type_name, markers=markers + deleted)
+        self._content = bytearray(typed.encode(message))
         numbers = range(len(shapes))
         self._stamps = [_find(self._content, "<iI", _FIND_SECONDS, number) for number in numbers]
         self._poses = [_find(self._content, "<d", _FIND_POSE * (n + 1)) for n in numbers]
@@ -109,26 +110,31 @@ def _shapes(character: Character) -> Iterator[tuple[int, Shape]]:
                 yield row, part
 
 
-def _marker(number: int, shape: Shape) -> Marker:
+def _marker(number: int, shape: Shape) -> Any:
     """A marker whose stamp and pose are the numbers that are looked for."""
-    marker = Marker(type=_TYPES[shape.type], id=number, scale=_scale(shape))
+    kind = getattr(typed.constants(_MARKER), _TYPES[shape.type])
+    marker = typed.new(_MARKER, type=kind, id=number, scale=_scale(shape))
     marker.header.frame_id = WORLD
     marker.header.stamp.sec, marker.header.stamp.nanosec = _FIND_SECONDS, number
-    marker.pose.position = Point(x=_FIND_POSE * (number + 1))
-    marker.color = ColorRGBA(**dict(zip("rgba", shape.color_rgba, strict=True)))
+    marker.pose.position.x = _FIND_POSE * (number + 1)
+    colour = dict(zip("rgba", shape.color_rgba, strict=True))
+    marker.color = typed.new("std_msgs/msg/ColorRGBA", **colour)
     if shape.mesh:
         marker.mesh_resource = Path(shape.mesh).as_uri()
         marker.mesh_use_embedded_materials = True
     return marker
 
 
-def _scale(shape: Shape) -> Vector3:
+def _scale(shape: Shape) -> Any:
     """A marker's edges or diameters."""
     if shape.type is ShapeType.SPHERE:
         (radius,) = shape.size
-        return Vector3(x=2.0 * radius, y=2.0 * radius, z=2.0 * radius)
+        return _vector(2.0 * radius, 2.0 * radius, 2.0 * radius)
     if shape.type is ShapeType.CYLINDER:
         radius, length = shape.size
-        return Vector3(x=2.0 * radius, y=2.0 * radius, z=length)
-    x, y, z = shape.size
-    return Vector3(x=x, y=y, z=z)
+        return _vector(2.0 * radius, 2.0 * radius, length)
+    return _vector(*shape.size)
+
+
+def _vector(x: float, y: float, z: float) -> Any:
+    return typed.new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)

@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.metrics.run_metrics import COLUMNS
-from actuated_characters.render.stills import save_png
-from actuated_characters.report.metrics_plot import plot_metrics
-from actuated_characters.runs.planned_files import write_planned
-from actuated_characters.runs.planned_wrenches import PlannedPush
-from actuated_characters.runs.run_directory import (
+from actuated_characters.recorder.run_directory import (
     PARAMETERS,
     PLOT,
     SERIES,
@@ -22,6 +18,10 @@ from actuated_characters.runs.run_directory import (
     write_metrics,
     write_parameters,
 )
+from actuated_characters.render.stills import save_png
+from actuated_characters.report.metrics_plot import plot_metrics
+from actuated_characters.runs.planned_files import write_planned
+from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.whole_files import part_of, write_whole, writing
 from msgs_config.errors import RecordingError
 from tests.support.limits import file_size_limit

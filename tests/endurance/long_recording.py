@@ -22,8 +22,8 @@ from rich.console import Console  # noqa: E402 - after the limit on threads
 
 from actuated_characters.bags.format.metadata import BAG  # noqa: E402
 from actuated_characters.bags.reader import read_messages  # noqa: E402
+from actuated_characters.recorder.run_directory import read_metrics  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
-from actuated_characters.runs.run_directory import read_metrics  # noqa: E402
 from benchmarks.recorder import RATE, walk  # noqa: E402
 from benchmarks.support.nodes import Nodes, processor_time  # noqa: E402
 from msgs_config.messages import topics  # noqa: E402

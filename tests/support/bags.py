@@ -111,6 +111,6 @@ def add_timed(
     """Write messages with their wall times into a bag that is open."""
     names = {f"/{topic.under(namespace).name}": topic for (topic, _), _ in messages}
     for name, topic in names.items():
-        bag.add_topic(name, topic.message_type, topic.qos)
+        bag.add_topic(name, topic.type_name, topic.quality)
     for (topic, raw), log_time_ns in messages:
         bag.write(f"/{topic.under(namespace).name}", raw, log_time_ns)

@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from actuated_characters.commands.run import add_run, planned_run
-from actuated_characters.runs.execution import run_in_process
-from actuated_characters.runs.run_directory import prepare_directory
+from actuated_characters.recorder.run_directory import prepare_directory
+from actuated_characters.runs.in_process import run_in_process
 
 FILE = Path(__file__).parents[1] / "data" / "state_hashes.json"
 ENGINES = ("pybullet", "mujoco-core")
@@ -72,7 +72,12 @@ def summary_here(arguments: str, folder: Path) -> dict[str, Any]:
     run = planned_run(options)
     prepare_directory(folder, overwrite=True)
     run_in_process(
-        run.plan, folder, progress=lambda ticks: None, pushes=run.pushes, throws=run.throws
+        run.plan,
+        folder,
+        write_bag=False,
+        pushes=run.pushes,
+        throws=run.throws,
+        velocities=run.velocities,
     )
     return _summary_in(folder)
 

@@ -40,7 +40,7 @@ def rewrite(
             name = rename(message.topic)
             if name not in added:
                 topic = _TYPES[name.rpartition("/")[2]]
-                writer.add_topic(name, topic.message_type, topic.qos)
+                writer.add_topic(name, topic.type_name, topic.quality)
                 added.add(name)
             writer.write(name, raw, message.log_time_ns)
     return target

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import yaml
 
+from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.run_directory import prepare_directory
 from tests.support.ros import Process, Processes, wait_until
 
 FAMILY = "ACTUATED_CHARACTERS_TEST"

@@ -1,4 +1,4 @@
-"""Message types and their definitions, from the packages that are installed."""
+"""Message types and their definitions: of the packages that are installed, or of rosbags."""
 
 import json
 from functools import cache
@@ -6,8 +6,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from msgs_config.bus.endpoint_types import type_name
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+
 from msgs_config.errors import RecordingError
+from msgs_config.messages import typed
 from msgs_config.messages.topic import find_message_class
 
 
@@ -32,13 +35,18 @@ def find_message_type(name: str) -> Any:
         raise RecordingError(f"message type {name} is not installed") from error
 
 
-def read_definition(message_type: type) -> MessageDefinition:
-    """Read the definition of a message type from the package that it is installed with.
+def read_definition(name: str) -> MessageDefinition:
+    """Read the definition of a type such as `std_msgs/msg/String`.
+
+    It is that of the package that the type is installed with; without ROS that of rosbags, which
+    has no comments, and the same hash.
 
     Raises:
         RecordingError: A file of the definition is not installed.
     """
-    name = type_name(message_type)
+    if find_spec(name.partition("/")[0]) is None and name in typed.types().fielddefs:
+        text, _ = typed.types().generate_msgdef(name, ros_version=2)
+        return MessageDefinition(name, text, typed.types().hash_rihs01(name))
     description = json.loads(_read_installed(name, ".json"))
     hashes = {entry["type_name"]: entry["hash_string"] for entry in description["type_hashes"]}
     texts = [_read_installed(name, ".msg")]
@@ -47,6 +55,27 @@ def read_definition(message_type: type) -> MessageDefinition:
         text = _read_installed(nested["type_name"], ".msg")
         texts.append(f"{'=' * 80}\nMSG: {package}/{short}\n{text}")
     return MessageDefinition(name, "\n".join(texts), hashes[name])
+
+
+@cache
+def first_field(name: str) -> str:
+    """The type of the first field of a message type, as `std_msgs/msg/Header`.
+
+    That of a list ends in `[]`; empty where it has no field, or the type is not known.
+    """
+    try:
+        text = read_definition(name).text.partition("=" * 80)[0]
+        store = get_typestore(Stores.EMPTY)
+        store.register(get_types_from_msg(text, name))
+    except (RecordingError, TypesysError):
+        return ""
+    _, fields = store.fielddefs[name]
+    match fields[0][1] if fields else None:
+        case (Nodetype.NAME, type_name):
+            return str(type_name)
+        case (Nodetype.SEQUENCE, ((Nodetype.NAME, type_name), _)):
+            return f"{type_name}[]"
+    return ""
 
 
 def _read_installed(name: str, suffix: str) -> str:

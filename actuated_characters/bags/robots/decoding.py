@@ -1,16 +1,12 @@
 """Decodes messages of any ROS 2 robot, also of types that are not installed here, such as tf2's."""
 
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
-
 from actuated_characters.bags.reader import RecordedMessage, read_messages
-from msgs_config.errors import RecordingError
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.errors import MessageError, RecordingError
+from msgs_config.messages import typed
 
 
 class Timed(NamedTuple):
@@ -21,11 +17,6 @@ class Timed(NamedTuple):
     published_ns: int | None  # wall time; None where only a simulated log time is known
 
 
-@cache
-def _types() -> Typestore:
-    return get_typestore(Stores.ROS2_JAZZY)
-
-
 def decode(message: RecordedMessage) -> Any:
     """A message with the fields of its type.
 
@@ -33,8 +24,8 @@ def decode(message: RecordedMessage) -> Any:
         RecordingError: the type is not one of ROS' own, or the bytes are no such message.
     """
     try:
-        return _types().deserialize_cdr(message.raw, message.type_name)
-    except Exception as error:  # what is too short or malformed raises anything
+        return typed.decode(message.raw, message.type_name)
+    except MessageError as error:
         raise RecordingError(
             f"message on '{message.topic}' at {message.log_time_ns} ns is no {message.type_name}"
         ) from error
@@ -52,4 +43,4 @@ def read_timed(bag: Path, topic: str) -> Iterator[Timed]:
 
 def stamp_ns(header: Any) -> int:
     """The stamp of a message's header, ns; 0 where its sender has set none."""
-    return int(header.stamp.sec) * NANOSECONDS_PER_SECOND + int(header.stamp.nanosec)
+    return typed.nanoseconds(header.stamp)

@@ -12,9 +12,8 @@ import numpy as np
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import Recording, find_bag, read_recording
 from msgs_config.errors import RecordingError
-from msgs_config.messages import topics
+from msgs_config.messages import topics, typed
 from msgs_config.messages.cdr import (
-    decode,
     decode_header,
     decode_string,
     encode_header,
@@ -152,7 +151,7 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
         RecordingError: the bag cannot be read.
     """
     rare, by_topic = RareMessages(), dict[str, list[tuple[int, bytes]]]()
-    types = {_name(recording, topic): topic.message_type for topic in (*REQUESTS, *_ACCEPTED)}
+    types = {_name(recording, topic): topic.type_name for topic in (*REQUESTS, *_ACCEPTED)}
     for message in read_messages(find_bag(path)):
         if message.topic == _name(recording, _CONFIGURATION):
             since_ns = json.loads(decode_string(message.raw)).get(SINCE)
@@ -162,7 +161,9 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
             stamp_ns = _raw_stamp_ns(message.raw)
             rare.episodes[int(np.searchsorted(recording.stamps_ns, stamp_ns))] = message.raw
         elif message.topic in types:
-            decode(message.raw, types[message.topic])  # what is none of its type is not sent again
+            typed.decode(
+                message.raw, types[message.topic]
+            )  # what is none of its type is not sent again
             by_topic.setdefault(message.topic, []).append((message.sent_ns, message.raw))
     for topic, active in zip(REQUESTS, _ACCEPTED, strict=True):
         sent = by_topic.get(_name(recording, active)) or by_topic.get(_name(recording, topic), [])

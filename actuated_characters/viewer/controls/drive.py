@@ -13,14 +13,12 @@ from functools import partial
 from typing import Any, Literal
 
 import viser
-from geometry_msgs.msg import Twist
 from rclpy.node import Node
 
 from actuated_characters.viewer.controls.actions import ActionQueue
 from msgs_config.bus.dds import create_publisher
 from msgs_config.bus.node import Publisher
-from msgs_config.messages import topics
-from msgs_config.messages.cdr import encode
+from msgs_config.messages import topics, typed
 
 _WALK, _RUN, _BACK, _TURN = 1.0, 2.2, -0.4, 0.8  # m/s and rad/s, by keys
 _PERIOD = 0.1  # s between two velocities
@@ -43,11 +41,11 @@ class Velocity:
     left: float = 0.0  # m/s
     turn: float = 0.0  # rad/s, to the left
 
-    def message(self) -> Twist:
-        """As the message of `cmd_vel`."""
-        twist = Twist()
+    def encode(self) -> bytes:
+        """The serialised message of `cmd_vel`."""
+        twist = typed.new(typed.TWIST)
         twist.linear.x, twist.linear.y, twist.angular.z = self.forward, self.left, self.turn
-        return twist
+        return typed.encode(twist)
 
 
 @dataclass(frozen=True)
@@ -148,7 +146,7 @@ class DrivingControls:
             return
         velocity = self._input.velocity if now < self._input.until else Velocity()
         if self._moves or velocity != Velocity():  # of zeros only the first
-            self._publisher.publish(encode(velocity.message()))
+            self._publisher.publish(velocity.encode())
             self._next_velocity = now + _PERIOD
         self._moves = velocity != Velocity()
 
@@ -177,7 +175,7 @@ class DrivingControls:
     def _close(self) -> None:
         """Stop what was driven."""
         if self._publisher is not None and self._moves:
-            self._publisher.publish(encode(Twist()))
+            self._publisher.publish(Velocity().encode())
         for command in self._commands:
             command.remove()
         self._publisher, self._commands = None, []

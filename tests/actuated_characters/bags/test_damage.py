@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType
 from rclpy.qos import QoSProfile
-from std_msgs.msg import String
 
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.writer import BagWriter
@@ -26,7 +25,7 @@ def own(compression: str) -> Callable[[Path], None]:
     def make(bag: Path) -> None:
         with BagWriter(bag, compression=compression) as writer:
             for topic in ("/a", "/b"):
-                writer.add_topic(topic, String, QoSProfile(depth=10))
+                writer.add_topic(topic, "std_msgs/msg/String", QoSProfile(depth=10))
             for number, sent in enumerate(SENT):
                 writer.write(sent.topic, sent.cdr, sent.log_time_ns)
                 if number % 10 == 9:

@@ -44,7 +44,7 @@ def in_time(made: Made) -> list[RawMessage]:
 def write(path: Path, messages: list[RawMessage], part_bytes: int) -> LastPartsWriter:
     bag = LastPartsWriter(path, part_bytes)
     for topic in {topic.name: topic for topic, _ in messages}.values():
-        bag.add_topic(f"/{topic.name}", topic.message_type, topic.qos)
+        bag.add_topic(f"/{topic.name}", topic.type_name, topic.quality)
     for number, (topic, raw) in enumerate(messages):
         bag.write(f"/{topic.name}", raw, START_NS + number)
     return bag

@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 from rclpy.qos import QoSProfile
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.writer import BagWriter
+from msgs_config.bus.endpoint_types import type_name
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import SENT
 
@@ -25,7 +24,7 @@ HASHED_WRONG_BY_ROSBAGS = ["std_msgs/msg/Char"]
 def recording(tmp_path: Path) -> Path:
     with BagWriter(tmp_path / "walk.1") as writer:
         for topic in ("/a", "/b", "/silent"):
-            writer.add_topic(topic, String, QOS)
+            writer.add_topic(topic, "std_msgs/msg/String", QOS)
         for sent in SENT:
             writer.write(sent.topic, sent.cdr, sent.log_time_ns)
     return tmp_path / "walk.1"
@@ -98,7 +97,7 @@ def test_the_definition_of_every_message_of_a_package_yields_its_type_hash(packa
     ]
     assert message_types
     for message_type in message_types:
-        definition = read_definition(message_type)
+        definition = read_definition(type_name(message_type))
         typestore = get_typestore(Stores.EMPTY)
         typestore.register(get_types_from_msg(definition.text, definition.type_name))
         confirmed = typestore.hash_rihs01(definition.type_name) == definition.type_hash
@@ -108,9 +107,9 @@ def test_the_definition_of_every_message_of_a_package_yields_its_type_hash(packa
 def test_a_type_without_an_installed_definition_is_refused_by_name(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as writer:
         with pytest.raises(RecordingError, match=r"message type std_srvs/srv/Trigger_Request: "):
-            writer.add_topic("/trigger", Trigger.Request, QOS)
+            writer.add_topic("/trigger", "std_srvs/srv/Trigger_Request", QOS)
         with pytest.raises(RecordingError, match=r"message type int: share/int.json is not inst"):
-            writer.add_topic("/number", int, QOS)
+            writer.add_topic("/number", "int", QOS)
 
     assert list(read_messages(tmp_path / "bag")) == []
 
@@ -134,7 +133,7 @@ def test_a_definition_is_found_in_a_workspace_and_its_parts_elsewhere(
     (share / "Sample.json").write_text(json.dumps(description))
     monkeypatch.syspath_prepend(code)
 
-    definition = read_definition(SAMPLE_TYPE)
+    definition = read_definition("own_msgs/msg/Sample")
 
     own, string = definition.text.split("\n" + "=" * 80 + "\n")
     assert own == "std_msgs/String text"
@@ -143,4 +142,4 @@ def test_a_definition_is_found_in_a_workspace_and_its_parts_elsewhere(
     assert definition.type_hash == "RIHS01_0"
     (share / "Sample.msg").unlink()
     with pytest.raises(RecordingError, match=r"share/own_msgs/msg/Sample\.msg is not installed"):
-        read_definition(SAMPLE_TYPE)
+        read_definition("own_msgs/msg/Sample")

@@ -28,6 +28,7 @@ from std_msgs.msg import String
 from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.writer import BagWriter
+from msgs_config.bus.endpoint_types import type_name
 from msgs_config.errors import ConfigurationError, RecordingError
 from tests.support.foreign_bags import TextMessage
 from tests.support.limits import file_size_limit, unprivileged
@@ -75,7 +76,7 @@ def write_samples(path: Path, **options: str) -> Path:
     """A closed recording of the sample messages, 1 ms apart."""
     with BagWriter(path, **options) as writer:
         for number, (topic, message) in enumerate(sample_messages().items()):
-            writer.add_topic(topic, type(message), QOS)
+            writer.add_topic(topic, type_name(type(message)), QOS)
             log_time_ns = FIRST_LOG_TIME_NS + number * 1_000_000
             writer.write(topic, serialize_message(message), log_time_ns)
     return path
@@ -89,7 +90,7 @@ def recording(tmp_path: Path) -> Path:
 def write(path: Path, count: int, **options: str) -> BagWriter:
     """A recording of `count` messages that is still open."""
     writer = BagWriter(path, **options)
-    writer.add_topic("/text", String, QOS)
+    writer.add_topic("/text", "std_msgs/msg/String", QOS)
     for number in range(count):
         writer.write("/text", HELLO, number)
     return writer
@@ -203,7 +204,7 @@ def test_the_metadata_has_every_field_of_rosbag2_version_9(recording: Path) -> N
     assert [topic["message_count"] for topic in topics] == [1] * 5
     for name, topic in topic_metadata(recording).items():
         message_type = type(sample_messages()[name])
-        assert topic["type"] == read_definition(message_type).type_name
+        assert topic["type"] == read_definition(type_name(message_type)).type_name
         assert topic["serialization_format"] == "cdr"
         more = {"offered_qos_profiles", "type_description_hash"}
         assert set(topic) == {"name", "type", "serialization_format"} | more
@@ -215,7 +216,7 @@ def test_hash_and_qos_are_those_that_a_publisher_announces(
 ) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     with BagWriter(tmp_path / "bag") as writer:
-        writer.add_topic("/joint_states", JointState, qos)
+        writer.add_topic("/joint_states", "sensor_msgs/msg/JointState", qos)
 
     announced = announcement("/joint_states", JointState, qos)
 
@@ -289,9 +290,9 @@ def test_a_directory_that_cannot_be_made_is_one_clear_error(tmp_path: Path) -> N
 
 def test_a_topic_is_added_once_and_before_its_messages(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as writer:
-        writer.add_topic("/text", String, QOS)
+        writer.add_topic("/text", "std_msgs/msg/String", QOS)
         with pytest.raises(RecordingError, match="has topic '/text' already"):
-            writer.add_topic("/text", String, QOS)
+            writer.add_topic("/text", "std_msgs/msg/String", QOS)
         with pytest.raises(RecordingError, match=r"'/texts'; did you mean '/text'\? there"):
             writer.write("/texts", b"", 1)
 
@@ -301,7 +302,7 @@ def test_a_log_time_out_of_range_is_refused_and_harms_nothing(
     tmp_path: Path, log_time_ns: int
 ) -> None:
     with BagWriter(tmp_path / "bag") as writer:
-        writer.add_topic("/text", String, QOS)
+        writer.add_topic("/text", "std_msgs/msg/String", QOS)
         with pytest.raises(RecordingError, match=f"log time {log_time_ns} ns is not within"):
             writer.write("/text", b"", log_time_ns)
         writer.write("/text", b"1", 2**63 - 1)
@@ -320,7 +321,7 @@ def test_nothing_is_written_after_the_end_and_closing_again_does_nothing(tmp_pat
     writer.close()
     late: list[Callable[[], None]] = [
         lambda: writer.write("/text", b"2", 2),
-        lambda: writer.add_topic("/more", String, QOS),
+        lambda: writer.add_topic("/more", "std_msgs/msg/String", QOS),
         writer.flush,
     ]
     for act in late:
@@ -332,7 +333,7 @@ def test_nothing_is_written_after_the_end_and_closing_again_does_nothing(tmp_pat
 
 def test_an_error_inside_the_block_still_leaves_a_complete_recording(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt), BagWriter(tmp_path / "bag") as writer:
-        writer.add_topic("/text", String, QOS)
+        writer.add_topic("/text", "std_msgs/msg/String", QOS)
         writer.write("/text", b"1", 1)
         raise KeyboardInterrupt
 
@@ -418,7 +419,7 @@ def test_messages_after_a_flush_are_in_the_recording_as_well(
     writer = BagWriter(tmp_path / "bag", compression=compression)
     writer.flush()
     for number, topic in enumerate(("/a", "/b")):
-        writer.add_topic(topic, String, QOS)
+        writer.add_topic(topic, "std_msgs/msg/String", QOS)
         writer.flush()
         writer.write(topic, HELLO, number)
         writer.flush()
@@ -445,7 +446,7 @@ def test_messages_come_back_by_time_and_those_of_equal_time_as_written(
     path = tmp_path_factory.mktemp("bags") / "bag"
     with BagWriter(path) as writer:
         for topic in ("/a", "/b", "/c"):
-            writer.add_topic(topic, String, QOS)
+            writer.add_topic(topic, "std_msgs/msg/String", QOS)
         for message in written:
             writer.write(*message)
 

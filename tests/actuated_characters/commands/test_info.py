@@ -98,7 +98,7 @@ def test_storage_compression_and_a_topic_without_messages_are_named(
     chunks = compression if storage == "mcap" else "none"
     with BagWriter(tmp_path / "own" / "bag", compression=chunks) as bag:
         add_to(bag, pendulum.messages())
-        bag.add_topic("/contacts", topics.CONTACTS.message_type, topics.CONTACTS.qos)
+        bag.add_topic("/contacts", topics.CONTACTS.type_name, topics.CONTACTS.quality)
     if storage == "sqlite3":
         compressed = compression == "zstd"
         to_sqlite(tmp_path / "own" / "bag", tmp_path / "other" / "bag", compressed=compressed)

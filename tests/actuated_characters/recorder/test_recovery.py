@@ -10,7 +10,6 @@ import pytest
 from mcap.reader import make_reader
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags.highlevel import AnyReader
-from std_msgs.msg import String
 
 from actuated_characters import cli
 from actuated_characters.bags.format.definitions import read_definition
@@ -18,7 +17,7 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.recorder.recovery import recover
-from actuated_characters.runs.run_directory import SUMMARY, read_metrics, write_metrics
+from actuated_characters.recorder.run_directory import SUMMARY, read_metrics, write_metrics
 from msgs_config.errors import RecordingError
 from tests.support.bags import add_to, make_run
 from tests.support.foreign_bags import SENT, texts
@@ -42,7 +41,7 @@ from std_msgs.msg import String
 from actuated_characters.bags.writer import BagWriter
 rng = np.random.default_rng(int(sys.argv[3]))
 bag = BagWriter(Path(sys.argv[1]), compression=sys.argv[2])
-bag.add_topic("/text", String, QoSProfile(depth=10))
+bag.add_topic("/text", "std_msgs/msg/String", QoSProfile(depth=10))
 number = 0
 while True:
     for _ in range(int(rng.integers(1, 2000))):
@@ -64,7 +63,7 @@ def unclosed(bag: Path, compression: str = "none") -> BagWriter:
     """A bag with SAID flushed, and five messages more that were not."""
     writer = BagWriter(bag, compression=compression)
     for topic in ("/a", "/b"):
-        writer.add_topic(topic, String, LATCHED_QOS if topic == "/b" else QOS)
+        writer.add_topic(topic, "std_msgs/msg/String", LATCHED_QOS if topic == "/b" else QOS)
     for sent in SENT:
         writer.write(sent.topic, sent.cdr, sent.log_time_ns)
     writer.flush()
@@ -139,7 +138,7 @@ def test_all_that_was_flushed_is_recovered_with_type_hash_and_qos(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["alive", "bag", "bag.damaged"]
     whole = (tmp_path / "alive" / "bag" / "bag.mcap").stat().st_size
     assert (bag / "bag.mcap").stat().st_size == pytest.approx(whole, rel=0.2)  # compressed likewise
-    definition = read_definition(String)
+    definition = read_definition("std_msgs/msg/String")
     with AnyReader([bag]) as new, AnyReader([tmp_path / "alive" / "bag"]) as old:
         assert [c.digest for c in new.connections] == [definition.type_hash] * 2
         assert {c.topic: (c.ext, c.msgdef, c.msgtype) for c in new.connections} == {
@@ -151,7 +150,7 @@ def test_a_recorder_that_was_killed_before_its_first_flush_leaves_nothing_to_rec
     tmp_path: Path,
 ) -> None:
     writer = BagWriter(tmp_path / "alive" / "bag")
-    writer.add_topic("/a", String, QOS)
+    writer.add_topic("/a", "std_msgs/msg/String", QOS)
     leave(writer, tmp_path / "run" / "bag")
 
     with pytest.raises(RecordingError, match=r"nothing to recover in .*: no message reached the d"):
@@ -186,7 +185,7 @@ def test_a_file_that_was_being_compressed_is_read_once(tmp_path: Path) -> None:
 def test_topics_without_messages_are_kept(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "alive" / "bag")
     for topic in ("/a", "/silent"):
-        writer.add_topic(topic, String, QOS)
+        writer.add_topic(topic, "std_msgs/msg/String", QOS)
     writer.write("/a", SENT[1].cdr, 1)
     writer.flush()
 

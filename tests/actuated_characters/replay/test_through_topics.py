@@ -19,6 +19,7 @@ from trajectory_msgs.msg import JointTrajectory
 from actuated_characters.bags.reader import RecordedMessage
 from actuated_characters.bags.recording import find_bag, read_recording
 from actuated_characters.cli import main
+from actuated_characters.recorder.run_directory import SUMMARY, read_metrics
 from actuated_characters.replay.command_comparison import CommandComparison, recorded_commands
 from actuated_characters.replay.players.controller_parameters import (
     first_parameters,
@@ -26,7 +27,6 @@ from actuated_characters.replay.players.controller_parameters import (
 )
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.replay.through_topics import replay_commands, replay_states
-from actuated_characters.runs.run_directory import SUMMARY, read_metrics
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.topics import CMD_VEL_STAMPED

@@ -7,9 +7,9 @@ import pytest
 
 from actuated_characters.cli import main
 from actuated_characters.metrics.run_metrics import COLUMNS
+from actuated_characters.recorder.run_directory import read_metrics
 from actuated_characters.report.charts import Marks, Timeline, path_chart
 from actuated_characters.report.metrics_plot import describe_metrics, draw_metrics
-from actuated_characters.runs.run_directory import read_metrics
 
 RUN = ("run", "--in-process", "--duration", "0.2")
 PANELS = {

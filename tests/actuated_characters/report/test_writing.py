@@ -20,11 +20,11 @@ from actuated_characters.cli import main
 from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.recording_metrics import contact_series, measure_recording
 from actuated_characters.metrics.run_metrics import Measurement
+from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.report.decimation import decimated, span_maxima, span_means
 from actuated_characters.report.page import NOT_KNOWN, Chapter, Section, Table, render_page
 from actuated_characters.report.sections import NAMES
 from actuated_characters.report.writing import default_directory, write_report
-from actuated_characters.runs.run_directory import prepare_directory
 from msgs_config.errors import RecordingError
 from msgs_config.messages import configuration
 from msgs_config.messages.topic import STREAM, Topic
@@ -85,7 +85,7 @@ def run(walk: Eventful, tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("walk")
     with BagWriter(directory / "bag") as bag:
         add_timed(bag, walk.messages())
-        bag.add_topic(HOSTILE, String, STREAM.profile)
+        bag.add_topic(HOSTILE, "std_msgs/msg/String", STREAM.profile)
         bag.write(HOSTILE, serialize_message(String(data="")), walk.log_times_ns[-1])
     assert main(["report", str(directory), "--stills", "2"]) == 0
     return directory

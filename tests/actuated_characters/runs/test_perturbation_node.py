@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import Recording, read_recording
-from actuated_characters.runs.execution import run_in_process
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
+from actuated_characters.runs.in_process import run_in_process, ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_files import write_planned
 from actuated_characters.runs.planned_throws import PlannedThrow, read_throws
@@ -20,7 +20,6 @@ from actuated_characters.runs.planned_wrenches import (
     plan_push,
     read_pushes,
 )
-from actuated_characters.runs.run_directory import prepare_directory, read_metrics
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import Recording, read_recording
+from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
-from actuated_characters.runs.execution import run_in_process
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.in_process import run_in_process, ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_throws import (
     PlannedThrow,
@@ -23,13 +23,11 @@ from actuated_characters.runs.planned_throws import (
     plan_throws,
 )
 from actuated_characters.runs.planned_wrenches import plan_push
-from actuated_characters.runs.run_directory import prepare_directory, read_metrics
 from actuated_characters.runs.throw_hits import (
     States,
     describe_hits,
     find_hit,
     read_states,
-    watch_states,
 )
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -39,6 +37,7 @@ from sim_node.physics.simulation import Simulation
 from sim_node.physics.sphere_sweep import find_impact
 from tests.support.physics import character
 from tests.support.runs import run_plan
+from tests.support.thrown_states import watch_states
 
 RATE = 240
 CLOCK = TickClock(RATE)

@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 
 from actuated_characters.bags.recording import read_recording
+from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_states
-from actuated_characters.runs.execution import run_in_process
+from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_files import write_planned
 from actuated_characters.runs.planned_velocities import (
@@ -15,7 +16,6 @@ from actuated_characters.runs.planned_velocities import (
     plan_velocities,
     read_velocities,
 )
-from actuated_characters.runs.run_directory import prepare_directory
 from controller_node.references.steering.reference import SteeredReference
 from msgs_config.errors import ConfigurationError
 from msgs_config.messages.clock import TickClock
@@ -110,7 +110,7 @@ def test_a_steered_run_is_the_one_in_one_process_and_is_replayed_to_the_bit(
     plan, planned = plan_velocities(plan_of(2.0), "0.8,0.1,0.5@0.2 0,0,0@1")
     alone, sent = tmp_path / "alone", tmp_path / "sent"
     prepare_directory(alone, overwrite=False)
-    run_in_process(plan, alone)
+    run_in_process(plan, alone, velocities=planned)
 
     run_plan(plan, sent, velocities=planned)
 

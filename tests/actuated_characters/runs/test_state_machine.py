@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import read_recording
+from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_states
 from actuated_characters.report.reactions import mode_spans
-from actuated_characters.runs.execution import run_in_process
+from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_velocities import PlannedVelocity, plan_velocities
 from actuated_characters.runs.planned_wrenches import parse_push
-from actuated_characters.runs.run_directory import prepare_directory
 from actuated_characters.studies.athletics.measures import longest_flight
 from benchmarks.athletics.trial import Trial, moments
 from controller_node.behaviours.state_machine.file import read_machine
@@ -37,7 +37,7 @@ def test_a_run_over_topics_is_the_one_in_one_process_and_is_replayed_to_the_bit(
     push = parse_push("root:60,0,0@1.1", plan)
     alone, sent = tmp_path / "alone", tmp_path / "sent"
     prepare_directory(alone, overwrite=False)
-    run_in_process(plan, alone, pushes=[push])
+    run_in_process(plan, alone, velocities=velocities, pushes=[push])
 
     run_plan(plan, sent, velocities=velocities, pushes=[push])
 

@@ -10,12 +10,13 @@ import pytest
 from actuated_characters.runs.in_process import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned_throws import PlannedThrow
-from actuated_characters.runs.throw_hits import States, find_hit, watch_states
+from actuated_characters.runs.throw_hits import States, find_hit
 from msgs_config.character.bullet import pybullet
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.simulation import Simulation
 from tests.support.physics import character
+from tests.support.thrown_states import watch_states
 
 RATE = 240
 FOOT_Y = -0.085  # m, of the middle of the right foot; its tip is at x = 0.13

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from actuated_characters.runs.execution import run_in_process, run_over_topics
+from actuated_characters.recorder.run_directory import prepare_directory
+from actuated_characters.runs.execution import run_over_topics
+from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.run_directory import prepare_directory
 from actuated_characters.viewer.web.server import open_socket
 from tests.support.page_client import PageClient
 from tests.support.ros import Processes, wait_until
@@ -96,7 +97,7 @@ def test_in_one_process_there_is_nothing_to_view(processes: Processes) -> None:
     command = processes.command("run", "--in-process", "--view")
 
     assert command.wait() == 1
-    assert command.stderr == "error: --view shows what is on topics; --in-process has none\n"
+    assert command.stderr == "error: --view shows what is on ROS' topics; --in-process has none\n"
 
 
 def test_the_command_ends_with_the_signal_and_says_where_it_listens(processes: Processes) -> None:

@@ -7,7 +7,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from msgs_config.bus.polling import DirectSubscription, PollingExecutor
-from msgs_config.messages.cdr import decode
+from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.topic import Quality, Topic
 from tests.support.ros import wait_until
 
@@ -36,7 +36,7 @@ def test_of_more_than_it_keeps_the_oldest_go_and_that_is_said_once(
             )
 
         # Assert
-        texts = [int(decode(raw, String).data) for raw in iter(subscription.take, None)]
+        texts = [int(decode_string(raw)) for raw in iter(subscription.take, None)]
     finally:
         spinner.close()
         for node in (sender, receiver):
@@ -49,4 +49,4 @@ def test_of_more_than_it_keeps_the_oldest_go_and_that_is_said_once(
 def newest(subscription: DirectSubscription) -> int | None:
     """The number in the newest message that waits; None if none does."""
     pending = subscription._pending
-    return int(decode(pending[-1].raw, String).data) if pending else None
+    return int(decode_string(pending[-1].raw)) if pending else None

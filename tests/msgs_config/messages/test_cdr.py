@@ -12,6 +12,7 @@ from std_msgs.msg import Header
 
 from msgs_config.errors import MessageError
 from msgs_config.messages.cdr import (
+    MULTI_DOF_JOINT_STATE,
     DoublesEncoder,
     encode_arrays,
     encode_clock,
@@ -54,7 +55,7 @@ def test_lists_of_rows_are_read_by_ros_and_back(stamp_ns: int, frame_id: str, ro
         [(w.force.x, w.torque.z) for w in message.wrench],
     ]
     assert flat == [[(row[0], row[-1]) for row in rows] for rows in lists]
-    found = read_message(raw, MultiDOFJointState)
+    found = read_message(raw, MULTI_DOF_JOINT_STATE)
     assert found[:3] == (stamp_ns, frame_id, tuple(names))
     for values, wanted in zip(found.lists, lists, strict=True):
         np.testing.assert_array_equal(values, wanted.ravel())
@@ -67,7 +68,7 @@ def test_what_ros_wrote_is_read() -> None:
     message.wrench[0].torque.z = -3.0
     message.header.frame_id = "größe"
 
-    found = read_message(serialize_message(message), MultiDOFJointState)
+    found = read_message(serialize_message(message), MULTI_DOF_JOINT_STATE)
 
     assert (found.frame_id, found.names) == ("größe", ("chest",))
     np.testing.assert_array_equal(found.lists[0], [0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0])

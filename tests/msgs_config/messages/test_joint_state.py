@@ -16,7 +16,8 @@ from sensor_msgs.msg import JointState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.errors import LayoutError, MessageError
-from msgs_config.messages.cdr import decode
+from msgs_config.messages import typed
+from msgs_config.messages.cdr import JOINT_STATE
 from msgs_config.messages.joint_state import (
     JointArrays,
     JointStateDecoder,
@@ -340,7 +341,7 @@ def test_a_message_that_claims_more_names_than_there_are_is_refused_in_silence(
 ) -> None:
     raw = cdr([b"knee\0", b"hip\0"], [[1.0, 2.0], [], []], name_count=count)
 
-    for read in (JointStateDecoder().decode, partial(decode, message_type=JointState)):
+    for read in (JointStateDecoder().decode, partial(typed.decode, type_name=JOINT_STATE)):
         with pytest.raises(MessageError, match="bytes that are no JointState"):
             read(raw)
     assert capfd.readouterr() == ("", "")

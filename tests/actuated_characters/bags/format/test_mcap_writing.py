@@ -16,7 +16,6 @@ from mcap.stream_reader import CRCValidationError
 from rclpy.qos import QoSProfile
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
-from std_msgs.msg import String
 
 from actuated_characters.bags.format.definitions import read_definition
 from actuated_characters.bags.reader import RecordedMessage, read_messages
@@ -35,7 +34,7 @@ def write(path: Path, **options: str) -> Path:
     """A bag of two chunks."""
     with BagWriter(path, **options) as bag:
         for topic in ("/a", "/b"):
-            bag.add_topic(topic, String, QoSProfile(depth=10))
+            bag.add_topic(topic, "std_msgs/msg/String", QoSProfile(depth=10))
         for place, (topic, log_time_ns) in enumerate(SENT):
             raw = TextMessage(topic, place, f"text {place}").cdr
             bag.write(topic, raw, log_time_ns, 1_000_000 + place)
@@ -122,7 +121,9 @@ def test_an_independent_reader_confirms_checksums_numbers_and_times(
     assert found == expected
     assert summary is not None
     for channel in summary.channels.values():
-        assert channel.metadata["topic_type_hash"] == read_definition(String).type_hash
+        assert (
+            channel.metadata["topic_type_hash"] == read_definition("std_msgs/msg/String").type_hash
+        )
         assert yaml.safe_load(channel.metadata["offered_qos_profiles"])[0]["depth"] == 10
 
 
@@ -251,7 +252,7 @@ def test_a_chunk_that_recovery_leaves_out_is_a_gap_in_the_numbers(tmp_path: Path
 @pytest.mark.parametrize("published_ns", [-1, 2**63])
 def test_a_time_of_publishing_out_of_range_is_refused(tmp_path: Path, published_ns: int) -> None:
     with BagWriter(tmp_path / "bag") as bag:
-        bag.add_topic("/a", String, QoSProfile(depth=10))
+        bag.add_topic("/a", "std_msgs/msg/String", QoSProfile(depth=10))
         with pytest.raises(RecordingError, match=f"time of publishing {published_ns} ns is not"):
             bag.write("/a", b"", 1, published_ns)
         bag.write("/a", b"", 1)
