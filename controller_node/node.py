@@ -18,7 +18,7 @@ from controller_node.interface.state_decoder import StateDecoder
 from controller_node.parameters import PARAMETERS, character_parameters, check_world
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
 from msgs_config.bus.live_parameters import LiveParameters
-from msgs_config.bus.node import BusNode, Executor, Stop
+from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.bus.once_logger import UNLOGGED, OnceLogger
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
@@ -113,7 +113,7 @@ class ControllerNode(ComposableNode):
             self._published_first = first
             self._outputs.publish_initial_state(first)
 
-    def turns(self, stop: Stop, executor: Executor) -> Turns:
+    def turns(self, stop: StopFlag, executor: Executor) -> Turns:
         """Answer states until `stop`.
 
         Raises:

@@ -4,7 +4,7 @@ import time
 
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
 from msgs_config.bus.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
-from msgs_config.bus.node import BusNode, Executor, Stop
+from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.bus.once_logger import UNLOGGED, OnceLogger
 from msgs_config.errors import SimulationError
 from msgs_config.messages import topics
@@ -108,7 +108,7 @@ class SimNode(ComposableNode):
             self.node, [each.states for each in self._characters], self.session, self._once_logger
         )
 
-    def turns(self, stop: Stop, executor: Executor) -> Turns:
+    def turns(self, stop: StopFlag, executor: Executor) -> Turns:
         """Simulate until `max_ticks`, or until `stop`.
 
         Raises:
@@ -139,7 +139,7 @@ class SimNode(ComposableNode):
     def _complete(self) -> bool:
         return all(each.commands.complete for each in self._characters)
 
-    def _begin(self, stop: Stop) -> Turns:
+    def _begin(self, stop: StopFlag) -> Turns:
         """Begin the first episode when initial states and subscribers are there."""
         states = yield from self._initial_states.wait(stop)
         if stop:

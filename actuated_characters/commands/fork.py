@@ -68,7 +68,9 @@ def add_fork(commands: "Commands[argparse.ArgumentParser]") -> None:
     )
     fork.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
     fork.add_argument(
-        "--composed", action="store_true", help="simulator and controller in one process"
+        "--through-topics",
+        action="store_true",
+        help="run all nodes as processes that speak over topics, not in this process: the same bag",
     )
 
 
@@ -107,7 +109,7 @@ def _fork(options: argparse.Namespace) -> None:
                 planned,
                 directory,
                 progress=lambda ticks: bar.update(bar.task_ids[0], completed=min(ticks, last)),
-                composed=options.composed,
+                through_topics=options.through_topics,
             )
         except KeyboardInterrupt:
             print(f"the results in {directory} are not complete", file=sys.stderr)

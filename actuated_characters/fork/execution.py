@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.fork.node import ForkNode
 from actuated_characters.fork.plan import ForkPlan
 from actuated_characters.recorder.forked_from import KEY
 from actuated_characters.recorder.run_directory import PARAMETERS
 from actuated_characters.replay.players.character_files import write_character, write_urdf
 from actuated_characters.runs.execution import run_over_topics
-from actuated_characters.runs.in_process import Progress
+from actuated_characters.runs.in_process import Progress, run_in_process
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.throw_hits import describe_hits, read_states
 from msgs_config.character.loading import load_character
@@ -24,14 +26,16 @@ def run_fork(
     directory: Path,
     *,
     progress: Progress = lambda ticks: None,
-    composed: bool = False,
+    through_topics: bool = False,
 ) -> None:
-    """Run a fork over topics; the directory, which was prepared, gets what a run's gets.
+    """Run a fork in this process, or over topics; its directory, prepared, gets what a run's gets.
 
     Raises:
-        RunError: one of the processes failed, or a state up to the fork is not the recorded one.
+        ActuatedCharactersError: one of the nodes failed, or a state up to the fork is not the
+            recorded one.
     """
-    run_over_topics(
+    run = run_over_topics if through_topics else partial(run_in_process, make_sender=ForkNode)
+    run(
         _with_files(fork.plan, fork.recording, directory / PARAMETERS),
         directory,
         write_bag=True,
@@ -39,7 +43,6 @@ def run_fork(
         recording={KEY: fork.origin.to_json(), "sensors": list(fork.sensors)},
         pushes=fork.pushes,
         throws=fork.throws,
-        composed=composed,
         fork=fork.node,
         resets=fork.resets,
     )

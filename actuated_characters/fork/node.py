@@ -13,10 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.client import Client
-from rclpy.node import Node
-from std_srvs.srv import SetBool, Trigger
 
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.fork.inputs import ForkPoint, Stop, Stops, recorded_stops
@@ -33,10 +29,8 @@ from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_
 from actuated_characters.runs.planned_files import Planned
 from actuated_characters.runs.planned_throws import read_throws
 from actuated_characters.runs.planned_wrenches import read_pushes
-from msgs_config.bus.dds import create_publisher
-from msgs_config.bus.node import Publisher
-from msgs_config.bus.polling import DirectSubscription, PollingExecutor
-from msgs_config.bus.ros_parameters import declare, given_parameters, set_request
+from msgs_config.bus.composition import ComposableNode, Turns, ros_node
+from msgs_config.bus.node import BusNode, Executor, Publisher, StopFlag, Subscription
 from msgs_config.errors import ReplayError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK, TickClock
@@ -46,7 +40,6 @@ from msgs_config.messages.session import SESSION, given_session, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, Values, resolve
-from msgs_config.runtime.process import StopSignal
 from msgs_config.versions import describe_changes, installed_versions
 
 PARAMETERS = [
@@ -65,21 +58,24 @@ PARAMETERS = [
 _ACKNOWLEDGE_TIMEOUT = 10.0  # s until a node has what it was sent
 _PACE = "real_time_factor"
 _REST = 0.01  # s between looks at the topics: one waking up for many messages
+_SERVICES = {"pause": True, "step": False, "reset": False}  # whether each takes a flag
 _HELD_PACE = 1e-9  # of it: the first tick is years away, while states and their answers pass
 
 
-class ForkNode(Node):
+class ForkNode(ComposableNode):
     """Steps the simulator from input to input, and lets it run after the last one."""
 
-    def __init__(self) -> None:
+    def __init__(self, node: BusNode | None = None) -> None:
         """Read the recording and the new inputs.
+
+        Without a place on a bus it is a node of ROS.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be repeated.
         """
-        super().__init__("fork")
-        values = resolve(PARAMETERS, given_parameters(self))
-        declare(self, PARAMETERS, values)
+        super().__init__(node or ros_node("fork"))
+        values = resolve(PARAMETERS, self.node.given_parameters())
+        self.node.declare(PARAMETERS, values)
         path, self._row = Path(values.text("recording")), values.integer("row")
         self._recording = recording = read_recording(path)
         point = ForkPoint(self._row, values.integer("ticks"), values.flag("later_inputs"))
@@ -103,64 +99,55 @@ class ForkNode(Node):
         sent = [(topics.EXTERNAL_WRENCH, pushed), (topics.THROW, thrown)]
         sent += [(topic, pushed) for topic in REQUESTS if topic.name in requested]
         self._outgoing: dict[str, tuple[Publisher, int]] = {
-            topic.name: (create_publisher(self, topic), values.integer(count))
-            for topic, count in sent
+            topic.name: (self.node.publisher(topic), values.integer(count)) for topic, count in sent
         }
-        self._setters = {
-            node: self.create_client(SetParametersAtomically, f"{node}/set_parameters_atomically")
-            for node in (topics.SIM_NODE, topics.CONTROLLER_NODE)
+        self._clients = {
+            topics.SIM_NODE: self.node.client(topics.SIM_NODE, _SERVICES),
+            topics.CONTROLLER_NODE: self.node.client(topics.CONTROLLER_NODE),
         }
-        of_simulator = {"pause": SetBool, "step": Trigger, "reset": Trigger}
-        self._simulator_clients = {
-            name: self.create_client(service, f"{topics.SIM_NODE}/{name}")
-            for name, service in of_simulator.items()
-        }
-        self._torques: DirectSubscription | None = None
-        self._states: DirectSubscription | None = None
+        self._torques: Subscription | None = None
+        self._states: Subscription | None = None
 
-    def run(self, stop: StopSignal) -> None:
+    def turns(self, stop: StopFlag, executor: Executor) -> Turns:
         """Repeat the run and send what is new, then stay until `stop`.
 
         Raises:
             ReplayError: a state before the fork, or its own, is not the recorded one.
             RunError: a node does not answer, or does not accept what it is sent.
         """
-        self._is_stopped, self._executor = stop, PollingExecutor(self)
-        try:
-            self._play()
-            while not stop:
-                self._executor.rest_for(_REST)
-        finally:
-            self._executor.close()
+        self._stop = stop
+        yield from self._play()
+        while not stop:
+            yield _REST
 
-    def _play(self) -> None:
+    def _play(self) -> Turns:
         # no limit for the start: the command that has started all knows one
-        self._wait(self._is_connected, "simulator and controller", np.inf)
+        yield from self._wait(self._is_connected, "simulator and controller", np.inf)
         # the first tick is held by its time: a paused simulator would not repeat the first state
-        self._set(topics.SIM_NODE, {_PACE: _HELD_PACE})
-        self._send(0)
-        self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
-        self._states = DirectSubscription(self, topics.JOINT_STATES)  # which the simulator awaits
-        self._wait_for_answer(0, np.inf)
-        self._call("pause", SetBool.Request(data=True))
-        self._set(topics.SIM_NODE, {_PACE: 0.0})
+        yield from self._set(topics.SIM_NODE, {_PACE: _HELD_PACE})
+        yield from self._send(0)
+        self._torques = self.node.subscription(topics.JOINT_TORQUES)
+        self._states = self.node.subscription(topics.JOINT_STATES)  # which the simulator awaits
+        yield from self._wait_for_answer(0, np.inf)
+        yield from self._call("pause")
+        yield from self._set(topics.SIM_NODE, {_PACE: 0.0})
         present = 0
         for row in sorted({*self._stops, *self._requests, self._row + 1} - {0}):
-            if self._is_stopped:
+            if self._stop:
                 return
-            present = self._step(present, row - 1)
+            yield from self._step(present, row - 1)
+            present = row - 1
             if row == self._row + 1:
-                self._end_comparison()
-            self._send(row)
+                yield from self._end_comparison()
+            yield from self._send(row)
             present += self._stops[row].resets
         self._torques.close()
         self._torques = None
-        self._call("pause", SetBool.Request(data=False))
+        yield from self._call("pause", flag=False)
 
     def _is_connected(self) -> bool:
         """Whether all are there that will be called or sent something."""
-        clients: list[Client] = [*self._setters.values(), *self._simulator_clients.values()]
-        return all(each.service_is_ready() for each in clients) and all(
+        return all(each.is_ready for each in self._clients.values()) and all(
             self._is_heard(name) for name in self._outgoing.keys() - late_topics(self._recording)
         )
 
@@ -169,27 +156,26 @@ class ForkNode(Node):
         publisher, count = self._outgoing[name]
         return publisher.get_subscription_count() >= count
 
-    def _step(self, present: int, row: int) -> int:
-        """Go on from a row's state to another's; returns that row."""
+    def _step(self, present: int, row: int) -> Turns:
+        """Go on from a row's state to another's."""
         if row > present:
-            self._set(topics.SIM_NODE, {"step_count": row - present})
-            self._call("step", Trigger.Request(), timeout=np.inf)
-        return row
+            yield from self._set(topics.SIM_NODE, {"step_count": row - present})
+            yield from self._call("step", timeout=np.inf)
 
-    def _end_comparison(self) -> None:
+    def _end_comparison(self) -> Turns:
         """Wait until all states up to the fork have been compared; the later ones are its own."""
-        self._wait(lambda: self._compared > self._row, f"state {self._compared}")
+        yield from self._wait(lambda: self._compared > self._row, f"state {self._compared}")
         assert self._states is not None
         self._states.close()
         self._states = None
 
-    def _send(self, row: int) -> None:
+    def _send(self, row: int) -> Turns:
         """Send the inputs of a stop."""
         stop = self._stops.get(row, Stop())
         if row and (stop.settings or self._requests.get(row)):
-            self._wait_for_answer(row - 1)
+            yield from self._wait_for_answer(row - 1)
         for node, settings in stop.settings:
-            self._set(node, settings)
+            yield from self._set(node, settings)
         messages: list[tuple[str, bytes]] = [*self._requests.get(row, ())]
         for push in stop.pushes:
             content = replace(push.arrays(), frame_id=self._session)
@@ -198,57 +184,50 @@ class ForkNode(Node):
             raw = self._throw_codec.encode(throw.stamp_ns, throw.throw)
             messages.append((topics.THROW.name, raw))
         for name, message in messages:
-            self._wait(partial(self._is_heard, name), f"subscribers of '{name}'")
+            yield from self._wait(partial(self._is_heard, name), f"subscribers of '{name}'")
             self._outgoing[name][0].publish(message)
         for name in dict.fromkeys(name for name, _ in messages):
             if not self._outgoing[name][0].is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
                 raise RunError(f"what was sent on '{name}' was not acknowledged")
         if stop.resets:
-            self._call("reset", Trigger.Request())
+            yield from self._call("reset")
 
-    def _wait_for_answer(self, row: int, timeout: float = ANSWER_TIMEOUT) -> None:
+    def _wait_for_answer(self, row: int, timeout: float = ANSWER_TIMEOUT) -> Turns:
         stamp_ns = self._tick_clock.stamp_ns(FIRST_TICK + row)
         what = f"the answer to the state of {stamp_ns} ns"
-        self._wait(lambda: self._answered_ns >= stamp_ns, what, timeout)
+        yield from self._wait(lambda: self._answered_ns >= stamp_ns, what, timeout)
 
-    def _set(self, node: str, settings: dict[str, Any]) -> None:
+    def _set(self, node: str, settings: dict[str, Any]) -> Turns:
         """Set parameters of a node. Raises RunError if it rejects one."""
-        response = self._ask(self._setters[node], set_request(settings))
-        if response is not None and not response.result.successful:
-            raise RunError(f"{node} rejected {', '.join(settings)}: {response.result.reason}")
+        answer = self._clients[node].set_parameters(settings)
+        yield from self._wait(lambda: answer.is_given, f"{node} to take {', '.join(settings)}")
+        if answer.is_given and not answer.success:
+            raise RunError(f"{node} rejected {', '.join(settings)}: {answer.message}")
 
-    def _call(
-        self, name: str, request: SetBool.Request | Trigger.Request, timeout: float = ANSWER_TIMEOUT
-    ) -> None:
+    def _call(self, name: str, *, flag: bool = True, timeout: float = ANSWER_TIMEOUT) -> Turns:
         """Call a service of the simulator. Raises RunError if it does not do it."""
-        response = self._ask(self._simulator_clients[name], request, timeout)
-        if response is not None and not response.success:
-            raise RunError(f"sim_node did not {name}: {response.message}")
-
-    def _ask(self, client: Client, request: object, timeout: float = ANSWER_TIMEOUT) -> Any:
-        """The response of a service; None if this node is to stop meanwhile."""
-        future = client.call_async(request)
-        self._wait(future.done, client.srv_name, timeout)
-        return future.result() if future.done() else None
+        answer = self._clients[topics.SIM_NODE].call(name, flag)
+        yield from self._wait(lambda: answer.is_given, f"{topics.SIM_NODE} to {name}", timeout)
+        if answer.is_given and not answer.success:
+            raise RunError(f"sim_node did not {name}: {answer.message}")
 
     def _wait(
         self, condition: Callable[[], bool], what: str, timeout: float = ANSWER_TIMEOUT
-    ) -> None:
+    ) -> Turns:
         """Compare states until a condition holds, or until this node is to stop.
 
         Raises:
-            ReplayError: see `run`.
+            ReplayError: see `turns`.
             RunError: it took longer than the timeout in s.
         """
         deadline = time.monotonic() + timeout
-        while not self._is_stopped:
+        while not self._stop:
             self._take_messages()
-            self._executor.serve_pending()
             if condition():
                 return
             if time.monotonic() > deadline:
                 raise RunError(f"waited {timeout:g} s for {what}")
-            time.sleep(_REST)
+            yield _REST
 
     def _take_messages(self) -> None:
         """Take the states and torques that have come, of the session of this run."""

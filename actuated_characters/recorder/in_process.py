@@ -10,7 +10,7 @@ from actuated_characters.recorder.session_filter import Heard
 from actuated_characters.recorder.topics import RecordedTopic, wanted_topics
 from msgs_config.bus.composition import UNTIL_A_MESSAGE, ComposableNode, Turns
 from msgs_config.bus.in_process import InProcessNode
-from msgs_config.bus.node import Executor, Stop
+from msgs_config.bus.node import Executor, StopFlag
 from msgs_config.parameters import resolve
 
 _FLUSH_PERIOD = 0.5  # s: messages that are older outlive even a kill of the process
@@ -39,7 +39,7 @@ class InProcessRecorder(ComposableNode):
         self._heard_ns = max(time.time_ns(), self._heard_ns)  # the wall clock may be set back
         self._recorder.take(Heard(recorded, raw, self._heard_ns))
 
-    def turns(self, stop: Stop, executor: Executor) -> Turns:
+    def turns(self, stop: StopFlag, executor: Executor) -> Turns:
         """Flush the bag and tell the progress where it is time; others' turns are the work."""
         next_flush = next_word = 0.0
         while not stop:

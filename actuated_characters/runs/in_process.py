@@ -23,6 +23,7 @@ from controller_node.node import ControllerNode
 from controller_node.parameters import make_controller
 from msgs_config.bus.composition import ComposableNode, run_nodes
 from msgs_config.bus.in_process import Bus
+from msgs_config.bus.node import BusNode
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.session import SESSION, make_session
 from sim_node.node import SimNode
@@ -89,10 +90,14 @@ def run_in_process(
     pushes: Sequence[PlannedPush] = (),
     throws: Sequence[PlannedThrow] = (),
     velocities: Sequence[PlannedVelocity] = (),
+    fork: Mapping[str, object] | None = None,
+    resets: int = 0,
+    make_sender: Callable[[BusNode], ComposableNode] = PerturbationNode,
 ) -> None:
     """Run the nodes of a run over topics on a bus of this process; all else is as there.
 
     They send the same messages in the same order, so the bag differs in wall times alone.
+    `make_sender` makes the node that sends what was planned.
 
     Raises:
         ActuatedCharactersError: one of the nodes failed, or the simulator rejected an input.
@@ -100,12 +105,12 @@ def run_in_process(
     session = {SESSION.name: make_session("/sim_node")}
     recording = {**recording, "directory": str(directory), "write_bag": write_bag}
     planned = {"pushes": pushes, "throws": throws, "velocities": velocities}
-    senders = plan_senders(directory, planned, recording, None)
+    senders = plan_senders(directory, planned, recording, fork)
     given: dict[str, dict[str, object]] = {
         "recorder": {**recording, "progress_period": _PROGRESS_PERIOD},
         **senders,
         "controller_node": {**plan.controller, "wait_for_subscribers": 2 + len(senders)},
-        "sim_node": {**plan.simulator, "wait_for_subscribers": 2},
+        "sim_node": {**plan.simulator, "wait_for_subscribers": 2 + (fork is not None)},
     }
     for name, parameters in given.items():
         write_parameters(directory, name, parameters)
@@ -114,11 +119,12 @@ def run_in_process(
     recorder = InProcessRecorder(places["recorder"], progress)
     with closing(recorder), signals_held(most=1) as stop:
         nodes: list[ComposableNode] = [recorder]
-        nodes += [PerturbationNode(places[name]) for name in senders]
+        nodes += [make_sender(places[name]) for name in senders]
         nodes += [ControllerNode(places["controller_node"]), SimNode(places["sim_node"])]
         run_nodes(nodes, stop)
     recorder.conclude()
-    check_recorded(directory, plan.ticks, {"pushes": len(pushes), "throws": len(throws)})
+    counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
+    check_recorded(directory, plan.ticks - resets, counts)
 
 
 def _log(folder: Path, name: str, severity: str, sentence: str) -> None:

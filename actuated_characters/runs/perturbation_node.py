@@ -8,7 +8,7 @@ from actuated_characters.runs.planned_throws import read_throws
 from actuated_characters.runs.planned_velocities import read_velocities
 from actuated_characters.runs.planned_wrenches import read_pushes
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
-from msgs_config.bus.node import BusNode, Executor, Stop
+from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import SESSION, given_session
@@ -79,7 +79,7 @@ class PerturbationNode(ComposableNode):
                 )
             )
 
-    def turns(self, stop: Stop, executor: Executor) -> Turns:
+    def turns(self, stop: StopFlag, executor: Executor) -> Turns:
         """Send as soon as all subscribers are there, then stay until `stop`."""
         while not stop and not all(each.is_ready for each in self._outgoing):
             yield UNTIL_A_MESSAGE

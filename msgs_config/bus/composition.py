@@ -9,7 +9,7 @@ from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from msgs_config.bus.node import BusNode, Executor, Stop
+from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.errors import ActuatedCharactersError
 
 AT_ONCE = 0.0
@@ -31,7 +31,7 @@ class ComposableNode:
         """Leave the bus."""
         self.node.destroy_node()
 
-    def turns(self, stop: Stop, executor: Executor) -> Turns:
+    def turns(self, stop: StopFlag, executor: Executor) -> Turns:
         """Work until the end or until `stop`; each turn yields for how many s it needs no other.
 
         A node that is closed before its end leaves in good order, too. It gives the executor turns
@@ -39,7 +39,7 @@ class ComposableNode:
         """
         raise NotImplementedError
 
-    def run(self, stop: Stop) -> None:
+    def run(self, stop: StopFlag) -> None:
         """Work until the end or until `stop`, alone in this thread; raises what `turns` raises."""
         run_nodes([self], stop)
 
@@ -57,7 +57,7 @@ class Composition:
     def __init__(self, nodes: Sequence[ComposableNode]) -> None:
         self._nodes = nodes
 
-    def run(self, stop: Stop) -> None:
+    def run(self, stop: StopFlag) -> None:
         """Let the nodes work until one ends or until `stop`; raises what one of them raises."""
         run_nodes(self._nodes, stop)
 
@@ -72,7 +72,7 @@ def destroy_nodes(nodes: Sequence[ComposableNode]) -> None:
         node.destroy_node()
 
 
-def run_nodes(nodes: Sequence[ComposableNode], stop: Stop) -> None:
+def run_nodes(nodes: Sequence[ComposableNode], stop: StopFlag) -> None:
     """Give each node its turn, one after the other, until one ends; then close the others.
 
     The thread rests only when no node has done anything in its last turn, and no longer than the

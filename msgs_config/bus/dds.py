@@ -15,7 +15,7 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
-from msgs_config.bus.node import Answer, Change, Endpoint, Handler, Refusal
+from msgs_config.bus.node import NO_SERVICES, Answer, Change, Endpoint, Handler, Refusal
 from msgs_config.bus.polling import DirectSubscription, PollingExecutor
 from msgs_config.bus.ros_parameters import declare, given_parameters, plain_value, set_request
 from msgs_config.messages.topic import Topic
@@ -58,25 +58,25 @@ class DdsPublisher:
 class DdsClient:
     """Calls services of another node, and sets its parameters."""
 
-    def __init__(self, node: Node, name: str) -> None:
-        self._node, self._name = node, name
+    def __init__(self, node: Node, name: str, services: Mapping[str, bool]) -> None:
         self._setter = node.create_client(
             SetParametersAtomically, f"{name}/set_parameters_atomically"
         )
-        self._services: dict[str, RosClient] = {}
+        self._takes_flag = services
+        self._services: dict[str, RosClient] = {
+            service: node.create_client(SetBool if takes_flag else Trigger, f"{name}/{service}")
+            for service, takes_flag in services.items()
+        }
 
     @property
     def is_ready(self) -> bool:
         """Whether the other node answers."""
         return all(each.service_is_ready() for each in (self._setter, *self._services.values()))
 
-    def call(self, service: str, flag: bool | None = None) -> Answer:
-        """Call `~/SERVICE` of the node: a `SetBool` with a flag, a `Trigger` without."""
-        kind = Trigger if flag is None else SetBool
-        if service not in self._services:
-            self._services[service] = self._node.create_client(kind, f"{self._name}/{service}")
-        request = Trigger.Request() if flag is None else SetBool.Request(data=flag)
-        answer = Answer()
+    def call(self, service: str, flag: bool = True) -> Answer:
+        """Call `~/SERVICE` of the node, with the flag where it takes one."""
+        takes_flag, answer = self._takes_flag[service], Answer()
+        request = SetBool.Request(data=flag) if takes_flag else Trigger.Request()
         future = self._services[service].call_async(request)
         future.add_done_callback(
             lambda done: answer.give(done.result().success, done.result().message)
@@ -138,9 +138,9 @@ class DdsNode(Node):
         kind = SetBool if takes_flag else Trigger
         self.create_service(kind, f"~/{service}", respond, callback_group=group)
 
-    def client(self, node: str) -> DdsClient:
-        """A client of the services of another node, by its name in this namespace."""
-        return DdsClient(self, node)
+    def client(self, node: str, services: Mapping[str, bool] = NO_SERVICES) -> DdsClient:
+        """A client of another node, by its name in this namespace."""
+        return DdsClient(self, node, services)
 
     def given_parameters(self) -> dict[str, object]:
         """The values that command line and parameter files set for this node."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from msgs_config.bus.node import Answer, Change, Endpoint, Handler, Refusal
+from msgs_config.bus.node import NO_SERVICES, Answer, Change, Endpoint, Handler, Refusal
 from msgs_config.messages.topic import Topic
 from msgs_config.parameters import Parameter, Values
 
@@ -130,13 +130,13 @@ class InProcessClient:
         """Whether the other node is there."""
         return self._bus.find(self._name) is not None
 
-    def call(self, service: str, flag: bool | None = None) -> Answer:
-        """Call `~/SERVICE` of the node, with a flag or without."""
+    def call(self, service: str, flag: bool = True) -> Answer:
+        """Call `~/SERVICE` of the node, with the flag where it takes one."""
         node = self._bus.find(self._name)
         handler = None if node is None else node.handlers.get(service)
         if handler is None:
             return Answer(False, f"{self._name} has no service {service}")
-        return handler(flag is None or flag)
+        return handler(flag)
 
     def set_parameters(self, values: Mapping[str, Any]) -> Answer:
         """Set parameters of the node, all or none."""
@@ -238,8 +238,9 @@ class InProcessNode:
         del takes_flag  # a call without a flag hands over true
         self.handlers[service] = handler
 
-    def client(self, node: str) -> InProcessClient:
-        """A client of the services of another node, by its name in this namespace."""
+    def client(self, node: str, services: Mapping[str, bool] = NO_SERVICES) -> InProcessClient:
+        """A client of another node, by its name in this namespace."""
+        del services  # which are those of the node
         return InProcessClient(self._bus, self.resolve_topic_name(node))
 
     def given_parameters(self) -> dict[str, object]:

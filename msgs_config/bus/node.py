@@ -103,6 +103,9 @@ Change = Callable[[dict[str, Any]], None]
 """Takes changes of parameters, which can be."""
 
 
+NO_SERVICES: Mapping[str, bool] = {}
+
+
 class Client(Protocol):
     """Calls services of another node, and sets its parameters."""
 
@@ -110,14 +113,14 @@ class Client(Protocol):
     def is_ready(self) -> bool:
         """Whether the other node answers."""
 
-    def call(self, service: str, flag: bool | None = None) -> Answer:
-        """Call `~/SERVICE` of the node: a `SetBool` with a flag, a `Trigger` without."""
+    def call(self, service: str, flag: bool = True) -> Answer:
+        """Call `~/SERVICE` of the node, with the flag where it takes one."""
 
     def set_parameters(self, values: Mapping[str, Any]) -> Answer:
         """Set parameters of the node, all or none."""
 
 
-class Stop(Protocol):
+class StopFlag(Protocol):
     """Becomes true when a loop is to end in good order."""
 
     def __bool__(self) -> bool:
@@ -182,8 +185,11 @@ class BusNode(Protocol):
         Calls are handled between the turns of the node.
         """
 
-    def client(self, node: str) -> Client:
-        """A client of the services of another node, by its name in this namespace."""
+    def client(self, node: str, services: Mapping[str, bool] = NO_SERVICES) -> Client:
+        """A client of another node, by its name in this namespace.
+
+        `services` says of each that will be called whether it takes a flag.
+        """
 
     def given_parameters(self) -> dict[str, object]:
         """The values that a user has set for this node."""

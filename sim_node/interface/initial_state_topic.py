@@ -4,7 +4,7 @@ import time
 from collections.abc import Generator, Iterable, Mapping
 
 from msgs_config.bus.composition import UNTIL_A_MESSAGE
-from msgs_config.bus.node import BusNode, Stop
+from msgs_config.bus.node import BusNode, StopFlag
 from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.errors import LayoutError, MessageError, SimulationError
 from msgs_config.messages import topics
@@ -57,7 +57,7 @@ class InitialStates:
                 character = self._characters[each.name]
                 self._subscriptions.append(_Subscription(self._node, character, self._speed_limit))
 
-    def wait(self, stop: Stop) -> Generator[float, None, dict[str, StampedState]]:
+    def wait(self, stop: StopFlag) -> Generator[float, None, dict[str, StampedState]]:
         """Wait, in turns, for the states, by the characters' names; none if `stop` comes first.
 
         Raises:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator, Sequence
 
 from msgs_config.bus.composition import UNTIL_A_MESSAGE, Turns
-from msgs_config.bus.node import BusNode, Publisher, Stop
+from msgs_config.bus.node import BusNode, Publisher, StopFlag
 from msgs_config.bus.publishing import Outgoing, has_subscribers, publish_together
 from msgs_config.character.model import UrdfOptions
 from msgs_config.messages import configuration, topics
@@ -193,7 +193,7 @@ def wait_for_subscribers(
     node: BusNode,
     publishers: Sequence[Publishers],
     wanted: int,
-    stop: Stop,
+    stop: StopFlag,
 ) -> Turns:
     """Wait, in turns, until each character's states have as many subscribers, or until `stop`."""
     watchdog = Watchdog()

@@ -69,7 +69,7 @@ def test_a_wrong_option_is_one_line(
 def test_without_a_bag_nothing_can_be_repeated(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["run", "--character", "pendulum", "--duration", "0.1", "--in-process"]
+    arguments = ["run", "--character", "pendulum", "--duration", "0.1", "--no-record"]
     assert main([*arguments, "--output", str(tmp_path / "run")]) == 0
     capsys.readouterr()
 
