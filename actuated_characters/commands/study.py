@@ -1,7 +1,6 @@
 """The command `actuated_characters study`: the lecture's figures by runs of the real nodes."""
 
 import argparse
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,8 +45,6 @@ def add_study(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 
 def _study(options: argparse.Namespace) -> None:
-    from actuated_characters.runs.ros_domain import own_domain
-
     names = NAMES if options.name == _ALL else (options.name,)
     directories = {name: options.output.absolute() / name for name in names}
     for directory in directories.values():
@@ -57,16 +54,14 @@ def _study(options: argparse.Namespace) -> None:
             )
     if _COMPARES_PLANS in names:
         require_extra("plan", f"study {_COMPARES_PLANS}, which has the planner walk,")
-    with own_domain() as domain:  # one for all runs
-        os.environ.setdefault("ROS_DOMAIN_ID", str(domain))
-        for number, (name, directory) in enumerate(directories.items(), start=1):
-            label = f"{name} ({number} of {len(names)})" if len(names) > 1 else name
-            _run_study(load_study(name), label, directory, options)
+    for number, (name, directory) in enumerate(directories.items(), start=1):
+        label = f"{name} ({number} of {len(names)})" if len(names) > 1 else name
+        _run_study(load_study(name), label, directory, options)
 
 
 def _run_study(study: "Study", label: str, directory: Path, options: argparse.Namespace) -> None:
     """Run a study with its progress on standard error, write and print its results."""
-    from actuated_characters.studies.framework.runner import TopicRunner
+    from actuated_characters.studies.framework.runner import Runner
 
     console, done = Console(), dict[str, float]()
     with progress_bar(label, float(study.runs), "runs") as bar:
@@ -79,9 +74,7 @@ def _run_study(study: "Study", label: str, directory: Path, options: argparse.Na
             total = max(float(study.runs), float(len(done)))
             bar.update(task, completed=sum(done.values()), total=total, state=run)
 
-        runner = TopicRunner(
-            directory, keep_runs=options.keep_runs, report=report, fine=options.fine
-        )
+        runner = Runner(directory, keep_runs=options.keep_runs, report=report, fine=options.fine)
         result = study.run(runner)
         bar.update(task, completed=bar.tasks[task].total, state="")
     files = result.write(directory)

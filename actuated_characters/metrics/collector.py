@@ -47,7 +47,8 @@ class MetricsCollector:
     def __init__(self, simulator: str = topics.SIM_NODE) -> None:
         """`simulator` is the name of its status in the diagnostics."""
         self._simulator = simulator
-        self._decoder = JointStateDecoder()
+        # one each: a decoder is fast for messages of one form, and a reference has no efforts
+        self._states, self._references = JointStateDecoder(), JointStateDecoder()
         self._configuration: RunConfiguration | None = None
         self._texts: set[str] = set()  # of configurations
         self._early: list[tuple[str, bytes, int | None]] = []
@@ -85,12 +86,13 @@ class MetricsCollector:
             self._take_mode(decode_string(raw))
         elif topic == topics.DIAGNOSTICS.name:
             self._take_counts(typed.decode(raw, "diagnostic_msgs/msg/DiagnosticArray"))
-        elif topic in (topics.JOINT_STATES.name, REFERENCE):
-            state = state_in_layout(self._configuration.layout, self._decoder.decode(raw))
-            if topic == REFERENCE:
-                desired = StampedReference(state.stamp_ns, state.position, state.velocity)
-                self._assembler.add_reference(desired)
-            elif self._assembler.add_state(state):
+        elif topic == REFERENCE:
+            state = state_in_layout(self._configuration.layout, self._references.decode(raw))
+            desired = StampedReference(state.stamp_ns, state.position, state.velocity)
+            self._assembler.add_reference(desired)
+        elif topic == topics.JOINT_STATES.name:
+            state = state_in_layout(self._configuration.layout, self._states.decode(raw))
+            if self._assembler.add_state(state):
                 self._last_state_ns = published_ns
 
     def results(self) -> tuple[dict[str, object], Series]:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
@@ -22,8 +22,9 @@ from controller_node.controller import Controller
 from controller_node.node import ControllerNode
 from controller_node.parameters import make_controller
 from msgs_config.bus.composition import ComposableNode, run_nodes
-from msgs_config.bus.in_process import Bus
+from msgs_config.bus.in_process import Bus, InProcessNode
 from msgs_config.bus.node import BusNode
+from msgs_config.errors import RecordingError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.session import SESSION, make_session
 from sim_node.node import SimNode
@@ -116,15 +117,30 @@ def run_in_process(
         write_parameters(directory, name, parameters)
     bus = Bus(partial(_log, directory / LOGS))
     places = {name: bus.node(name, {**parameters, **session}) for name, parameters in given.items()}
-    recorder = InProcessRecorder(places["recorder"], progress)
-    with closing(recorder), signals_held(most=1) as stop:
+    with signals_held(most=1) as stop, _recorder(places["recorder"], progress) as recorder:
         nodes: list[ComposableNode] = [recorder]
         nodes += [make_sender(places[name]) for name in senders]
         nodes += [ControllerNode(places["controller_node"]), SimNode(places["sim_node"])]
         run_nodes(nodes, stop)
-    recorder.conclude()
     counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
     check_recorded(directory, plan.ticks - resets, counts)
+
+
+@contextmanager
+def _recorder(
+    node: InProcessNode, progress: Callable[[int], object]
+) -> Iterator[InProcessRecorder]:
+    """A recorder whose bag and figures are there in the end, also after an error of the others."""
+    recorder = InProcessRecorder(node, progress)
+    try:
+        yield recorder
+    except BaseException:
+        recorder.close()
+        with suppress(RecordingError):  # that little was recorded is not what went wrong
+            recorder.conclude()
+        raise
+    recorder.close()
+    recorder.conclude()
 
 
 def _log(folder: Path, name: str, severity: str, sentence: str) -> None:

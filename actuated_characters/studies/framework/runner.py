@@ -1,4 +1,4 @@
-"""Makes a study's runs, over topics."""
+"""Makes a study's runs."""
 
 import shutil
 from collections.abc import Callable, Sequence
@@ -9,11 +9,11 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
-from actuated_characters.runs.execution import run_over_topics
+from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.planned_throws import plan_throws
 from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies.framework.study import RunResult, RunSpec
-from msgs_config.errors import RunError
+from msgs_config.errors import RunError, SimulationError
 
 Report = Callable[[str, float], None]
 """Called with a run's label and the share of it that is done."""
@@ -27,8 +27,8 @@ _UNREAD = [  # topics, at a cost each tick
 ]
 
 
-class TopicRunner:
-    """Runs cases as processes that speak over topics."""
+class Runner:
+    """Runs cases in this process, with the nodes and the bags of a run over topics."""
 
     def __init__(
         self, directory: Path, *, keep_runs: bool, report: Report, fine: bool = False
@@ -47,17 +47,16 @@ class TopicRunner:
         diverged = ""
         self._report(case.label, 0.0)
         try:
-            run_over_topics(
+            run_in_process(
                 plan,
                 directory,
-                write_bag=True,
                 progress=lambda ticks: self._report(case.label, min(ticks / plan.ticks, 1.0)),
                 recording={"exclude": _UNREAD if case.contacts else [*_UNREAD, "contacts"]},
                 pushes=case.pushes,
                 throws=throws,
                 velocities=velocities,
             )
-        except RunError as error:
+        except SimulationError as error:
             if _DIVERGED not in str(error):
                 raise
             diverged = str(error).partition(": ")[2]

@@ -67,7 +67,7 @@ class StudyRunner(Protocol):
     fine: bool  # whether more runs than usual are wanted, where they make a finer figure
 
     def run(self, case: RunSpec) -> RunResult:
-        """Run a case over topics, to its end or until it diverges.
+        """Run a case to its end, or until it diverges.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or a process failed.

@@ -1,21 +1,16 @@
 """The studies `feedforward` and `forward_inverse`: efforts played again, efforts worked out."""
 
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from actuated_characters.runs.plan import make_plan
-from actuated_characters.runs.planned_wrenches import PlannedPush
 from actuated_characters.studies import feedforward, forward_inverse
 from actuated_characters.studies.framework.result import StudyResult
-from actuated_characters.studies.framework.runner import TopicRunner
-from actuated_characters.studies.framework.study import RunSpec
 from controller_node.references.signals import SineReference
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.messages.clock import TickClock
 from tests.support.in_process import InProcessRunner
 from tests.support.physics import character
 
@@ -182,33 +177,3 @@ def test_the_weight_is_drawn_beside_the_force(inverted: StudyResult) -> None:
 
 
 # The runners
-
-
-def test_a_run_in_this_process_is_that_of_the_nodes_to_the_bit(domain: int, tmp_path: Path) -> None:
-    # Arrange
-    del domain
-    stamp_ns = TickClock(240).stamp_ns(30)
-    case = RunSpec(
-        label="pushed",
-        character="pendulum",
-        duration=0.5,
-        reference={"reference": "sine"},
-        controller={"law": "pd"},
-        pushes=[PlannedPush(stamp_ns, "rod", (2.0, 0.0, 0.0, 0.0, 0.0, 0.0))],
-        contacts=True,
-    )
-
-    # Act
-    over_topics = TopicRunner(tmp_path, keep_runs=False, report=lambda label, share: None)
-    by_nodes = over_topics.run(case).recording
-    here = InProcessRunner(tmp_path).run(case).recording
-
-    # Assert
-    assert by_nodes.position.tobytes() == here.position.tobytes()
-    assert by_nodes.velocity.tobytes() == here.velocity.tobytes()
-    assert by_nodes.effort.tobytes() == here.effort.tobytes()
-    assert by_nodes.reference_position[:-1].tobytes() == here.reference_position[:-1].tobytes()
-    pushed = [bool(each and each.links) for each in here.applied_wrench]
-    assert pushed == [bool(each and each.links) for each in by_nodes.applied_wrench]
-    assert sum(pushed) == 24  # 0.1 s
-    assert len(here.contacts) == len(by_nodes.contacts) == 120
