@@ -149,7 +149,7 @@ class ControllerNode(ComposableNode):
         raw = self._simulators.next_state(self._states.take)
         if raw is None or not self._simulators.runs_on:
             return raw
-        for _ in range(topics.JOINT_STATES.qos.depth):
+        for _ in range(topics.JOINT_STATES.quality.depth):
             newer = self._simulators.next_state(self._states.take)
             if newer is None:
                 break

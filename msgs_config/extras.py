@@ -11,6 +11,7 @@ PACKAGES = {
     "search": ("cma",),
     "video": ("av",),
     "view": ("viser", "websockets"),
+    "wheels": ("rclpy",),
     "xacro": ("xacro",),
 }
 """Python packages of the extras of `setup.py`, by the extras' names."""
@@ -18,9 +19,10 @@ PACKAGES = {
 
 def hint(extra: str) -> str:
     """How to install an extra."""
+    elsewhere = ", or source the setup file of a ROS 2 Jazzy" if extra == "wheels" else ""
     return (
         f"pip install 'actuated_characters[{extra}]', or in a clone "
-        f".venv/bin/pip install -e '.[{extra}]'"
+        f".venv/bin/pip install -e '.[{extra}]'{elsewhere}"
     )
 
 

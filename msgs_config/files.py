@@ -12,7 +12,6 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 import yaml
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
 from msgs_config.errors import ActuatedCharactersError
 
@@ -53,7 +52,9 @@ def resolve(path: str, relative_to: Path, error: type[ActuatedCharactersError]) 
 
 
 def _package_directory(package: str, error: type[ActuatedCharactersError]) -> Path:
-    with suppress(PackageNotFoundError, ValueError, OSError):  # OSError: no ROS environment
+    with suppress(ImportError, LookupError, ValueError, OSError):  # without ROS, or its environment
+        from ament_index_python.packages import get_package_share_directory
+
         return Path(get_package_share_directory(package))
     with suppress(ValueError):  # a module that was never found, such as the main one
         spec = importlib.util.find_spec(package) if package.isidentifier() else None

@@ -106,6 +106,8 @@ def _run(options: argparse.Namespace) -> None:
 
     if options.view:
         require_extra("view", "--view")
+    if not options.in_process:
+        require_extra("wheels", "a run over topics, unlike one --in-process,")
     run = planned_run(options)
     plan, motion = run.plan, _motion_name(run.plan)
     name = f"{plan.character.name}-{Path(motion).stem}"

@@ -26,7 +26,7 @@ from msgs_config.messages import topics
 from sim_node.node_settings import make_node_settings
 from sim_node.physics.wrenches import ExternalWrench
 
-_MOST_PUSHES = topics.EXTERNAL_WRENCH.qos.depth  # that wait for the simulator, paused
+_MOST_PUSHES = topics.EXTERNAL_WRENCH.quality.depth  # that wait for the simulator, paused
 
 
 @dataclass

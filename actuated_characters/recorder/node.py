@@ -6,11 +6,12 @@ from typing import Any
 
 from rclpy.qos import QoSProfile
 
+from actuated_characters.recorder.named_topics import NamedTopics
 from actuated_characters.recorder.parameters import PARAMETERS
 from actuated_characters.recorder.recorder import Recorder
 from actuated_characters.recorder.session_filter import Heard
 from actuated_characters.recorder.topic_reader import TopicReader
-from actuated_characters.recorder.topics import NamedTopics, RecordedTopic, wanted_topics
+from actuated_characters.recorder.topics import RecordedTopic, wanted_topics
 from msgs_config.bus.dds import DdsNode
 from msgs_config.bus.polling import PollingExecutor
 from msgs_config.errors import RecordingError

@@ -1,20 +1,14 @@
 """Which topics are recorded: those of the contract, and others that are asked for by name."""
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rclpy.exceptions import InvalidTopicNameException
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.validate_topic_name import validate_topic_name
-
-from actuated_characters.bags.format.definitions import find_message_type
 from msgs_config.bus.node import BusNode
 from msgs_config.character.sensors import SensorType
-from msgs_config.errors import ConfigurationError, RecordingError, one_of
+from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages import topics
-from msgs_config.messages.topic import Kept, Quality, Topic
+from msgs_config.messages.topic import Kept, Topic
 from msgs_config.parameters import Values
 
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
@@ -68,7 +62,7 @@ def contract_topics(
     twice = [name for name, count in Counter(characters).items() if count > 1]
     if twice:
         raise ConfigurationError(f"parameter 'characters' has '{twice[0]}' twice")
-    _check_names("characters", characters)
+    check_names(node, "characters", characters)
     found = [_recorded(node, topic, None) for topic in _RECORDED if topic.of_world]
     of_each = [topic for topic in _RECORDED if not topic.of_world]
     found += [_recorded(node, topic, name) for topic in of_each for name in characters]
@@ -92,7 +86,7 @@ def sensor_topics(node: BusNode, names: Sequence[str]) -> list[RecordedTopic]:
     Raises:
         ConfigurationError: a name is not one that a sensor's topic can have.
     """
-    _check_names("sensors", names)
+    check_names(node, "sensors", names)
     types = {each.value: each for each in SensorType}
     found = []
     for name in names:
@@ -118,55 +112,8 @@ def _recorded(node: BusNode, topic: Topic, character: str | None) -> RecordedTop
     return RecordedTopic(below, node.resolve_topic_name(below.name), topic.name, character)
 
 
-class NamedTopics:
-    """Looks for topics by their names alone; publishers have the type and quality of service."""
-
-    def __init__(self, node: Node, names: Sequence[str], known: Collection[str]) -> None:
-        """Look for all names, resolved, but those that are known.
-
-        Raises:
-            ConfigurationError: a name is not one that a topic can have.
-        """
-        self._node = node
-        _check_names("topics", names)
-        resolved = [node.resolve_topic_name(name) for name in names]
-        self.missing = {name for name in resolved if name not in known}
-        """Names of which no publisher was seen so far."""
-
-    def look(self) -> Iterator[tuple[RecordedTopic, QoSProfile]]:
-        """Yield topics that have a publisher now, each once, with the QoS of the first publisher.
-
-        A type that is not installed is logged, and the topic not looked for any more.
-        """
-        for name in sorted(self.missing):
-            endpoints = self._node.get_publishers_info_by_topic(name)
-            if not endpoints:
-                continue
-            self.missing.discard(name)
-            try:
-                find_message_type(endpoints[0].topic_type)
-            except RecordingError as error:
-                self._node.get_logger().error(f"'{name}' is not recorded: {error}")
-                continue
-            profiles = [endpoint.qos_profile for endpoint in endpoints]
-            topic = Topic(name, endpoints[0].topic_type, fitting_quality(profiles))
-            yield RecordedTopic(topic, name, name, None), profiles[0]
-
-
-def fitting_quality(profiles: Sequence[QoSProfile]) -> Quality:
-    """The strictest quality of service with which a subscription fits all of these publishers."""
-    return Quality(
-        depth=1,
-        is_latched=all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in profiles),
-        is_reliable=all(each.reliability is ReliabilityPolicy.RELIABLE for each in profiles),
-    )
-
-
-def _check_names(parameter: str, names: Sequence[str]) -> None:
+def check_names(node: BusNode, parameter: str, names: Sequence[str]) -> None:
     """Raise ConfigurationError if one of a parameter's names is none for ROS."""
     for name in filter(None, names):
-        try:
-            validate_topic_name(name)
-        except InvalidTopicNameException as error:
-            reason = str(error).removeprefix("Invalid topic name: ").partition(":\n")[0]
-            raise ConfigurationError(f"parameter '{parameter}' has {name!r}: {reason}") from error
+        if fault := node.name_fault(name):
+            raise ConfigurationError(f"parameter '{parameter}' has {name!r}: {fault}")

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from actuated_characters.recorder.run_directory import LOGS, PARAMETERS, write_parameters
 from actuated_characters.runs.held_signals import signals_held
+from msgs_config.extras import require_extra
 
 MODULES = {
     "sim_node": "sim_node.main",
@@ -154,7 +155,12 @@ class Children:
     """The package's nodes in a `with` block; leaving it ends them, the last one started first."""
 
     def __init__(self, directory: Path, environment: Mapping[str, str] | None = None) -> None:
-        """Parameter files and logs go below `directory`, as those of a run do."""
+        """Parameter files and logs go below `directory`, as those of a run do.
+
+        Raises:
+            ConfigurationError: there is no ROS.
+        """
+        require_extra("wheels", "a node that is a process of its own")
         self.directory = directory
         self._environment = environment
         self._children: list[Child] = []

@@ -3,11 +3,11 @@
 The subscriptions are best effort: no publisher waits for them, or sends anything again.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rclpy.node import Node
 
-from msgs_config.arrays import FloatArray
+from actuated_characters.viewer.drawing.sample import CharacterSample
 from msgs_config.bus.polling import DirectSubscription
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import LayoutError, MessageError
@@ -16,10 +16,9 @@ from msgs_config.messages.cdr import read_frame_id
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
 from msgs_config.messages.session import ANONYMOUS, read_session
-from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.topic import Quality, Topic
-from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
+from msgs_config.messages.wrenches import decode_wrenches
 
 _THROWS = 100  # that may come between two looks: as many as an episode can have
 _UNUSABLE_MESSAGE = (MessageError, LayoutError)
@@ -58,16 +57,6 @@ class _Newest:
         except MessageError:
             return None
         return newest if session in (self._session, ANONYMOUS) else None
-
-
-@dataclass
-class CharacterSample:
-    """What is known of a character at present; None where nothing has come."""
-
-    state: StampedState | None = None
-    reference: FloatArray | None = None  # (n,) position, message form
-    contacts: WrenchArrays | None = None
-    pushes: WrenchArrays | None = None
 
 
 class CharacterReader:

@@ -9,10 +9,12 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.client import Client as RosClient
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.task import Future
+from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import SetBool, Trigger
 
 from msgs_config.bus.node import NO_SERVICES, Answer, Change, Endpoint, Handler, Refusal
@@ -105,6 +107,14 @@ class DdsNode(Node):
     def subscription(self, topic: Topic) -> DirectSubscription:
         """A subscription of a topic of the contract."""
         return DirectSubscription(self, topic)
+
+    def name_fault(self, topic: str) -> str:
+        """Why a topic cannot have this name; empty if it can."""
+        try:
+            validate_topic_name(topic)
+        except InvalidTopicNameException as error:
+            return str(error).removeprefix("Invalid topic name: ").partition(":\n")[0]
+        return ""
 
     def endpoints(self, topic: Topic) -> list[Endpoint]:
         """All that publish on a topic."""

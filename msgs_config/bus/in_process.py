@@ -210,6 +210,11 @@ class InProcessNode:
             return self.get_fully_qualified_name() + topic[1:]
         return f"{self._namespace.rstrip('/')}/{topic}"
 
+    def name_fault(self, topic: str) -> str:
+        """Why a topic cannot have this name: here any will do."""
+        del topic
+        return ""
+
     def count_publishers(self, topic_name: str) -> int:
         """How many publish on a topic."""
         return len(self._channel(topic_name).publishers)

@@ -167,6 +167,9 @@ class BusNode(Protocol):
     def resolve_topic_name(self, topic: str) -> str:
         """The absolute name of a topic as this node names it."""
 
+    def name_fault(self, topic: str) -> str:
+        """Why a topic cannot have this name; empty if it can."""
+
     def count_publishers(self, topic_name: str) -> int:
         """How many publish on a topic."""
 

@@ -34,7 +34,7 @@ class DirectSubscription:
     ) -> None:
         """Subscribe; with `events` also to the middleware's events of the subscription."""
         # as many as the middleware keeps, and like it the newest; a flood must not fill the memory
-        self._pending: deque[Received] = deque(maxlen=topic.qos.depth)
+        self._pending: deque[Received] = deque(maxlen=topic.quality.depth)
         self.dropped = 0  # messages, as more came than were taken
         self._node = node
         self._message_type = topic.message_type

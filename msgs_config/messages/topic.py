@@ -108,8 +108,12 @@ class Topic:
 
     @property
     def is_installed(self) -> bool:
-        """Whether the package of its message type is; that of `/tf` is not among the wheels."""
-        return find_spec(self.type_name.partition("/")[0]) is not None
+        """Whether the package of its message type is; that of `/tf` is not among the wheels.
+
+        Where there is no ROS at all, nobody needs it, and it counts as installed.
+        """
+        packages = self.type_name.partition("/")[0], "rclpy"
+        return find_spec(packages[0]) is not None or find_spec(packages[1]) is None
 
     def of(self, node_name: str) -> "Topic":
         """The topic as another node names it: `~` is the node that publishes it."""

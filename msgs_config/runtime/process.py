@@ -166,9 +166,11 @@ def _find(place: str) -> Callable[[], RunnableNode]:
 
 
 def _leave(node: RunnableNode | None, code: int) -> None:
+    sys.stdout.flush()
+    if "rclpy" not in sys.modules:
+        return
     import rclpy
 
-    sys.stdout.flush()
     exit_after(LEAVE_TIME, code)
     if node is not None:
         node.destroy_node()
@@ -201,6 +203,7 @@ def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
 def _start_ros(about: str) -> None:
     os.environ.update(middleware_settings(os.environ))
     remove_orphans()
+    require_extra("wheels", "a node")
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args

@@ -9,6 +9,7 @@ import pytest
 
 from actuated_characters.metrics.run_metrics import COLUMNS
 from actuated_characters.recorder.run_directory import (
+    LOGS,
     PARAMETERS,
     PLOT,
     SERIES,
@@ -35,7 +36,7 @@ LIMITED = (
     "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
     "from actuated_characters.cli import main; sys.exit(main(sys.argv[1:]))"
 )
-IN_PROCESS = ("run", "--in-process", "--character", "pendulum", "--duration", "1")
+IN_PROCESS = ("run", "--in-process", "--no-record", "--character", "pendulum", "--duration", "1")
 
 
 def files_below(directory: Path) -> set[str]:
@@ -151,7 +152,8 @@ def test_a_run_on_a_full_disk_ends_with_the_file_and_the_reason(
 
     (error,) = [line for line in run.stderr.splitlines() if line.startswith("error: ")]
     assert error == f"error: cannot write {tmp_path / 'run' / SERIES}: File too large"
-    names = {f"{PARAMETERS}/{node}.yaml" for node in ("sim_node", "controller_node")}
+    nodes = ("sim_node", "controller_node", "recorder")
+    names = {f"{PARAMETERS}/{node}.yaml" for node in nodes} | {f"{LOGS}/recorder.log"}
     assert files_below(tmp_path / "run") == names
 
     again = processes.command(*IN_PROCESS, "--output", "run", "--overwrite")

@@ -9,9 +9,9 @@ import viser
 from actuated_characters.render.engine.camera_pose import Spheres
 from actuated_characters.render.engine.shape_meshes import triangles_of
 from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
+from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene_poses import set_poses
 from actuated_characters.viewer.drawing.support import support_polygon
-from actuated_characters.viewer.latest import CharacterSample
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType

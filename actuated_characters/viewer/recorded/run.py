@@ -8,7 +8,7 @@ import numpy as np
 from actuated_characters.bags.recording import Recording
 from actuated_characters.bags.robots.reading import RobotSource, read_any
 from actuated_characters.render.scene import Scene, make_scene
-from actuated_characters.viewer.latest import CharacterSample
+from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.recorded.timeline import row_at
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import RecordingError

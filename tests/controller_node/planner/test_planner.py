@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rclpy.serialization import serialize_message
-from sensor_msgs.msg import PointCloud2
 
 from actuated_characters.bags.plans import decode_plan
 from actuated_characters.bags.recording import Recording, read_recording
@@ -35,6 +33,7 @@ from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import ConfigurationError, MessageError
+from msgs_config.messages import topics, typed
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import resolve
@@ -425,7 +424,7 @@ def test_it_says_where_each_plan_leads_and_what_that_costs() -> None:
     assert first is not None
     assert last is not None
 
-    message = plan_message(first, sent[0].stamp_ns)
+    message = typed.decode(plan_message(first, sent[0].stamp_ns), topics.PLAN.type_name)
 
     assert all(each is first for each in outlooks[:12])
     assert last is not first
@@ -566,7 +565,7 @@ def check_a_run_that_ended_at_once(recording: Recording) -> None:
     assert len(plan_chart(short, Marks()).axes) == 4
 
 
-BROKEN: dict[str, tuple[Callable[[PointCloud2], object], str]] = {
+BROKEN: dict[str, tuple[Callable[[Any], object], str]] = {
     "a field is missing": (lambda message: message.fields.pop(), "a plan without its fields"),
     "a field is a float": (
         lambda message: setattr(message.fields[0], "datatype", 7),
@@ -581,15 +580,18 @@ BROKEN: dict[str, tuple[Callable[[PointCloud2], object], str]] = {
         "a plan of 432 bytes that should be 48",
     ),
     "its times go back": (
-        lambda message: setattr(message, "data", 2 * message.data[:216]),
+        lambda message: setattr(message, "data", np.tile(message.data[:216], 2)),
         "a plan whose times",
     ),
     "its times are no numbers": (
-        lambda message: setattr(message, "data", b"\xff" * 432),
+        lambda message: setattr(message, "data", np.full(432, 255, np.uint8)),
         "a plan whose times",
     ),
     "it has no points": (
-        lambda message: (setattr(message, "width", 0), setattr(message, "data", b"")),
+        lambda message: (
+            setattr(message, "width", 0),
+            setattr(message, "data", message.data[:0]),
+        ),
         "a plan of 0 bytes that should be 0",
     ),
 }
@@ -601,13 +603,13 @@ def test_what_is_no_plan_is_not_read_as_one(case: str) -> None:
     (state,) = states(controller, 1)
     controller.compute_effort(state, state.stamp_ns)
     assert controller.outlook is not None
-    message = plan_message(controller.outlook, state.stamp_ns)
-    whole = decode_plan(serialize_message(message))
+    raw = plan_message(controller.outlook, state.stamp_ns)
+    whole, message = decode_plan(raw), typed.decode(raw, topics.PLAN.type_name)
     alter, text = BROKEN[case]
     alter(message)
 
     with pytest.raises(MessageError, match=text):
-        decode_plan(serialize_message(message))
+        decode_plan(typed.encode(message))
 
     assert whole.stamp_ns == state.stamp_ns
     np.testing.assert_array_equal(whole.centres, controller.outlook.centres)

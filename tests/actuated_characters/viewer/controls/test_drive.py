@@ -5,6 +5,7 @@ import math
 import pytest
 
 from actuated_characters.viewer.controls.drive import KEYS, DrivingInput, Key, Velocity
+from msgs_config.messages import typed
 
 
 def key(name: str, modifier: str | None = None) -> Key:
@@ -74,7 +75,7 @@ def test_the_button_asks_for_a_velocity_while_it_sends() -> None:
 
 
 def test_the_message_has_the_velocity_in_the_characters_own_frame() -> None:
-    twist = Velocity(1.0, 0.2, -0.8).message()
+    twist = typed.decode(Velocity(1.0, 0.2, -0.8).encode(), typed.TWIST)
 
     assert (twist.linear.x, twist.linear.y, twist.linear.z) == (1.0, 0.2, 0.0)
     assert (twist.angular.x, twist.angular.y, twist.angular.z) == (0.0, 0.0, -0.8)
